@@ -102,7 +102,7 @@ mod firmware {
             name,
             own,
             "instructions",
-            [300, if M4F { 700 } else { 980 }],
+            [300, if M4F { 710 } else { 990 }],
         );
         let bounds = MotionBounds::of_mm_mrad(300, 0, 500);
         let report = SCHEDULE.iter().find_map(|cycle| cycle.report.as_ref());

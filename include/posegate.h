@@ -410,6 +410,10 @@ enum posegate_reason
      * The odometry does not reach back to the stamp of the fix.
      */
     POSEGATE_REASON_ODOMETRY_TOO_SHORT = 40,
+    /**
+     * The hypotheses of a report leave out more than the confidence allows.
+     */
+    POSEGATE_REASON_ELSEWHERE_TOO_LIKELY = 41,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -1055,9 +1059,9 @@ typedef struct posegate_evidence {
      */
     uint32_t beside_q24;
     /**
-     * Reserved: 0.
+     * The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of those that are left out.
      */
-    uint32_t reserved;
+    uint32_t elsewhere_q32;
 } posegate_evidence;
 
 /**

@@ -2,6 +2,7 @@
 
 use crate::report::{PoseEstimate, Report};
 use crate::set::Growth;
+use crate::task::Risk;
 
 /// Largest number of hypotheses of one report, the report's own estimate included.
 pub const MOST_HYPOTHESES: usize = 8;
@@ -10,7 +11,8 @@ pub const MOST_HYPOTHESES: usize = 8;
 ///
 /// A source may believe in several places at once: the clusters of a particle filter, the two solutions of a tag that is seen
 /// squarely. The robot is at one of them. A gate permits only if the pose-set of *every* hypothesis is inside. What the listed
-/// hypotheses leave out (clusters of little weight) is not checked; it counts against the confidence of the source.
+/// hypotheses leave out (clusters of little weight) counts against the confidence of the site: the sets grow accordingly, or the
+/// report is denied.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Evidence<'r> {
@@ -20,6 +22,8 @@ pub struct Evidence<'r> {
     pub others: &'r [PoseEstimate],
     /// What the robot can have moved beside the estimates until the stamp: the slip of its odometry.
     pub beside: Growth,
+    /// The probability that the robot is at none of the hypotheses: the weight of the clusters that are left out.
+    pub elsewhere: Risk,
 }
 
 impl<'r> Evidence<'r> {
@@ -30,6 +34,7 @@ impl<'r> Evidence<'r> {
             report,
             others: &[],
             beside: Growth::NONE,
+            elsewhere: Risk::NONE,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The gate's state machine: closed at first, closed after every error, open only after permits in a row.
 
 use super::doubled::{CorruptWord, RedundantWord};
+use super::elsewhere::allowed_for;
 use super::evidence::{Evidence, MOST_HYPOTHESES};
 use super::permission::{Check, FlowSignature};
 use super::scrub::{Scrub, ScrubProgress};
@@ -10,8 +11,9 @@ use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Sou
 use crate::contain::{self, Decision, second};
 use crate::motion::MotionBounds;
 use crate::report::{PoseEstimate, Report};
-use crate::set::{Growth, PoseSet};
+use crate::set::{Growth, PoseSet, Trust};
 use crate::table::{self, Table};
+use crate::task::Risk;
 use core::hint::black_box;
 
 /// The state of a gate.
@@ -306,7 +308,11 @@ impl<'a> Gate<'a> {
             Ok(source) => source,
             Err(reason) => return Verdict::deny(reason),
         };
-        match belief.pose_set(table.radius_squared(), source.trust) {
+        let radius = table.radius_squared();
+        let Some(trust) = allowed_for(evidence.elsewhere, radius, source.trust) else {
+            return Verdict::deny(Reason::ElsewhereTooLikely);
+        };
+        match belief.pose_set(radius, trust) {
             Ok(set) => {
                 let age_ms = self.now_ms.by_complement().wrapping_sub(report.stamp_ms);
                 let movement = self.settings.movement(source.motion, age_ms);
@@ -509,11 +515,22 @@ impl<'a> Gate<'a> {
         let age_ms = self.now_ms.get()?.wrapping_sub(report.stamp_ms);
         let movement = self.settings.movement(source.motion, age_ms);
         let movement = movement.plus(evidence.beside);
-        if let Err(reason) = first_opinion(table, &report.belief, source, movement) {
+        let radius = table.radius_squared();
+        let allowed;
+        let trust = if evidence.elsewhere == Risk::NONE {
+            &source.trust
+        } else {
+            match allowed_for(evidence.elsewhere, radius, source.trust) {
+                Some(trust) => allowed = trust,
+                None => return Ok(Err(Reason::ElsewhereTooLikely)),
+            }
+            &allowed
+        };
+        if let Err(reason) = first_opinion(table, &report.belief, trust, movement) {
             return Ok(Err(reason));
         }
         for belief in evidence.others {
-            if let Err(reason) = first_opinion(table, belief, source, movement) {
+            if let Err(reason) = first_opinion(table, belief, trust, movement) {
                 return Ok(Err(reason));
             }
         }
@@ -527,8 +544,21 @@ impl<'a> Gate<'a> {
         };
         let movement = self.movement_by_complement(report, source);
         let movement = movement.plus(black_box(evidence).beside);
+        let elsewhere = black_box(evidence).elsewhere;
+        let allowed;
+        let trust = if elsewhere == Risk::NONE {
+            &source.trust
+        } else {
+            // The radius from flash, as for the evaluation itself.
+            let radius = table::stored_radius_squared(self.bytes);
+            match radius.and_then(|radius| allowed_for(elsewhere, radius, source.trust)) {
+                Some(trust) => allowed = trust,
+                None => return Ok(Err(Reason::EvaluationsDisagree)),
+            }
+            &allowed
+        };
         let confirms = |belief: &PoseEstimate| {
-            let word = second::opinion_after(self.bytes, belief, source.trust, movement);
+            let word = second::opinion_after(self.bytes, belief, *trust, movement);
             word == second::INSIDE
         };
         if !confirms(&report.belief) {
@@ -823,10 +853,10 @@ impl<'a> Gate<'a> {
 fn first_opinion(
     table: &Table<'_>,
     belief: &PoseEstimate,
-    source: &Source,
+    trust: &Trust,
     movement: Growth,
 ) -> Result<(), Reason> {
-    let set = belief.pose_set(table.radius_squared(), source.trust);
+    let set = belief.pose_set(table.radius_squared(), *trust);
     // By reference: the set takes more memory than the rest of the step.
     let set = match &set {
         Ok(set) => set,

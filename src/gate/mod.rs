@@ -47,6 +47,7 @@ pub use self::self_test::self_test;
 pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
 
 mod doubled;
+mod elsewhere;
 mod evidence;
 mod interlock;
 mod machine;

@@ -103,11 +103,13 @@ pub enum Reason {
     OdometryBackwards = 39,
     /// The odometry does not reach back to the stamp of the fix.
     OdometryTooShort = 40,
+    /// The hypotheses of a report leave out more than the confidence allows.
+    ElsewhereTooLikely = 41,
 }
 
 impl Reason {
     /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 40] = [
+    pub const ALL: [Self; 41] = [
         Self::NotContained,
         Self::PoseSetTooLarge,
         Self::OutsideTable,
@@ -148,6 +150,7 @@ impl Reason {
         Self::OdometryJump,
         Self::OdometryBackwards,
         Self::OdometryTooShort,
+        Self::ElsewhereTooLikely,
     ];
 
     /// Returns the code of the reason on the wire. No reason has the code 0.
@@ -207,6 +210,7 @@ impl Reason {
             Self::OdometryJump => "odometry_jump",
             Self::OdometryBackwards => "odometry_backwards",
             Self::OdometryTooShort => "odometry_too_short",
+            Self::ElsewhereTooLikely => "elsewhere_too_likely",
         }
     }
 
@@ -324,6 +328,9 @@ impl Reason {
             Self::OdometryTooShort => {
                 "The fix is older than the increments that are kept, so nobody knows how the robot moved since."
             }
+            Self::ElsewhereTooLikely => {
+                "The robot may be at none of the report's hypotheses, with a probability that the confidence does not allow."
+            }
         }
     }
 
@@ -432,6 +439,9 @@ impl Reason {
             Self::OdometryTooShort => {
                 "Wait for the next fix. If it comes back: keep more increments, or make the fixes come sooner."
             }
+            Self::ElsewhereTooLikely => {
+                "Improve the estimate first; or report more hypotheses, at most eight."
+            }
         }
     }
 
@@ -440,12 +450,13 @@ impl Reason {
     #[must_use]
     pub const fn advice(self, look_at: Option<u32>) -> Advice {
         match self {
-            Self::NotContained | Self::PoseSetTooLarge | Self::CovarianceTooLarge => {
-                match look_at {
-                    Some(tag) => Advice::LookAtTag(tag),
-                    None => Advice::Relocalise,
-                }
-            }
+            Self::NotContained
+            | Self::PoseSetTooLarge
+            | Self::CovarianceTooLarge
+            | Self::ElsewhereTooLikely => match look_at {
+                Some(tag) => Advice::LookAtTag(tag),
+                None => Advice::Relocalise,
+            },
             Self::OutsideTable | Self::Tilted => Advice::Restage,
             Self::Stale
             | Self::SourceChanged
@@ -520,6 +531,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(41), None);
+        assert_eq!(Reason::from_code(42), None);
     }
 }

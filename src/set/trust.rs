@@ -43,6 +43,16 @@ impl Inflation {
         self.0
     }
 
+    /// Returns the product of two factors, rounded up. `None` if it is beyond 4096.
+    #[must_use]
+    pub(crate) fn times(self, other: Self) -> Option<Self> {
+        let product = u64::from(self.0)
+            .wrapping_mul(u64::from(other.0))
+            .wrapping_add(0xffff)
+            >> 16;
+        Self::from_q16(u32::try_from(product).ok()?)
+    }
+
     /// Returns a length below 2^40 times the factor's root, rounded up.
     pub(super) fn of_length(self, length: i64) -> i64 {
         if self == Self::NONE {

@@ -117,6 +117,11 @@ pub(crate) fn stored_checksum(bytes: &[u8]) -> u32 {
         .map_or(0, |crc| u32::from_le_bytes(*crc))
 }
 
+/// Returns the squared radius in the header of a table, read from memory at each call.
+pub(crate) fn stored_radius_squared(bytes: &[u8]) -> Option<RadiusSquared> {
+    RadiusSquared::from_q16(u32_at(core::hint::black_box(bytes), 64)?)
+}
+
 /// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
 /// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of
 /// several cancel with a probability of 2^-32. Returns 0 for bytes without a header.

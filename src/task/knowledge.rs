@@ -115,6 +115,12 @@ impl Risk {
         }
     }
 
+    /// Returns a risk from units of 2^-32.
+    #[must_use]
+    pub const fn from_q32(units: u32) -> Self {
+        Self(units)
+    }
+
     /// Returns the risk in units of 2^-32, saturated at the largest value.
     #[must_use]
     pub const fn q32(self) -> u32 {

@@ -51,6 +51,7 @@ use crate::motion::MotionBounds;
 use crate::num::BinaryAngle;
 use crate::report::{Heading, PoseEstimate, Report};
 use crate::set::{self, Growth, PathNoise, RadiusSquared, Trust, Uncertainty};
+use crate::task::Risk;
 
 pub use self::increment::Increment;
 pub use self::model::OdometryErrors;
@@ -103,6 +104,7 @@ impl Tracked {
             report: &self.report,
             others: &[],
             beside: self.beside,
+            elsewhere: Risk::NONE,
         }
     }
 }

@@ -1,12 +1,14 @@
 //! A report with several hypotheses: one message for each, then the report with their number (version 2).
 //!
 //! A controller must not evaluate a report without a hypothesis that was lost on the line, so the report states how many there are.
+//! The messages carry no weights: a sender that leaves hypotheses out inflates its covariances, or denies by itself.
 
 use super::report::{REPORT, body_of, read};
 use super::{LONGEST_BODY, WireError};
 use crate::gate::{Evidence, MOST_HYPOTHESES};
 use crate::report::{FrameId, PoseEstimate, Report};
 use crate::set::Growth;
+use crate::task::Risk;
 use heapless::Vec;
 
 /// The type of hypothesis k is this plus k, from 1 to 7.
@@ -98,6 +100,7 @@ impl HypothesisCollector {
             report: self.report.insert(report),
             others: &self.others,
             beside: Growth::NONE,
+            elsewhere: Risk::NONE,
         }))
     }
 

@@ -5,6 +5,7 @@ use super::{posegate_belief, posegate_report, posegate_status, posegate_verdict}
 use posegate::gate::{Evidence, MOST_HYPOTHESES};
 use posegate::report::{Heading, PoseEstimate, Report};
 use posegate::set::Growth;
+use posegate::task::Risk;
 
 /// Largest number of hypotheses of one report, the report's own estimate included.
 pub const POSEGATE_MOST_HYPOTHESES: usize = MOST_HYPOTHESES;
@@ -26,8 +27,8 @@ pub struct posegate_evidence {
     pub beside_um: u32,
     /// The same for the heading, either way, unit 2^-24 turn.
     pub beside_q24: u32,
-    /// Reserved: 0.
-    pub reserved: u32,
+    /// The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of those that are left out.
+    pub elsewhere_q32: u32,
 }
 
 /// A verdict on a report with several hypotheses.
@@ -73,7 +74,7 @@ impl posegate_evidence {
         other_count: u32::MAX,
         beside_um: 0,
         beside_q24: 0,
-        reserved: 0,
+        elsewhere_q32: 0,
     };
 }
 
@@ -83,6 +84,7 @@ pub(super) struct Read {
     others: [PoseEstimate; POSEGATE_OTHERS],
     count: usize,
     beside: Growth,
+    elsewhere: Risk,
 }
 
 impl Read {
@@ -120,6 +122,7 @@ impl Read {
                     read(&raw const (*evidence).beside_um)?,
                     read(&raw const (*evidence).beside_q24)?,
                 ),
+                elsewhere: Risk::from_q32(read(&raw const (*evidence).elsewhere_q32)?),
             })
         }
     }
@@ -129,6 +132,7 @@ impl Read {
             report: &self.report,
             others: self.others.get(..self.count).unwrap_or_default(),
             beside: self.beside,
+            elsewhere: self.elsewhere,
         }
     }
 }

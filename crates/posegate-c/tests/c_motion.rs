@@ -5,6 +5,7 @@ use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{CrossTerms, Estimate, Growth, Uncertainty};
 use posegate::table::Table;
+use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_c::*;
 use std::collections::BTreeSet;
@@ -341,6 +342,7 @@ fn hypotheses_in_c_are_those_in_rust() {
                 report: &report,
                 others: &expected,
                 beside: Growth::new(beside_um, 0),
+                elsewhere: Risk::NONE,
             },
         );
         assert_eq!(told.verdict.err(), reason, "{} {beside_um}", others.len());
@@ -349,8 +351,18 @@ fn hypotheses_in_c_are_those_in_rust() {
             reason.map_or(0, |reason| u32::from(reason.code()))
         );
     }
-    let gate = gate_of_c(SEE_T7);
     let mut evidence = evidence_of_c(report_of_c(1, 100, good), &[good; 7]);
+    // What is left out: a thousandth is made up for, a fiftieth is more than the confidence of 0.99 leaves open.
+    for (elsewhere_q32, reason) in [
+        (u32::MAX / 1000, 0),
+        (u32::MAX / 50, u32::from(Reason::ElsewhereTooLikely.code())),
+    ] {
+        evidence.elsewhere_q32 = elsewhere_q32;
+        let (status, step) = step_on(gate_of_c(SEE_T7), 110, &evidence);
+        assert_eq!((status, step.reason), (posegate_status::Ok, reason));
+    }
+    evidence.elsewhere_q32 = 0;
+    let gate = gate_of_c(SEE_T7);
     for count in [8, 255, u32::MAX] {
         evidence.other_count = count;
         let (status, step) = step_on(gate, 110, &evidence);

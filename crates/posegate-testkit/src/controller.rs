@@ -9,6 +9,7 @@ use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{Growth, Trust};
 use posegate::table::Table;
+use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate::wire::{HypothesisCollector, Receiver, Telemetry, encode, increment_body};
 use posegate::wire::{increment_from_body, report_body};
@@ -422,6 +423,7 @@ impl Controller {
                     report: &sent,
                     others: &others,
                     beside: Growth::NONE,
+                    elsewhere: Risk::NONE,
                 };
                 let step = self.gate.step_on(told.now_ms, &evidence);
                 assert_eq!(weighed.verdict, step.verdict, "{told:?} {sent:?}");

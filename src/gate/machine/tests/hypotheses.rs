@@ -12,6 +12,7 @@ fn evidence<'r>(report: &'r Report, others: &'r [PoseEstimate], beside: Growth) 
         report,
         others,
         beside,
+        elsewhere: Risk::NONE,
     }
 }
 
@@ -116,4 +117,56 @@ fn the_second_evaluation_decides_on_each_hypothesis_and_movement() {
         ..still
     };
     assert_eq!(with(&fast, &[], Growth::NONE), disagree);
+}
+
+/// What the hypotheses leave out makes the sets larger, in both evaluations.
+#[test]
+fn what_is_left_out_counts() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let risk = |confidence| Risk::from_confidence(confidence).unwrap();
+    // A set that is inside with a margin of a few percent.
+    let mut wide = report(1, 0.0);
+    let spread = |sigma: f64| {
+        let square = sigma * sigma;
+        Some(Uncertainty::Gaussian([
+            [square, 0.0, 0.0],
+            [0.0, square, 0.0],
+            [0.0, 0.0, 1e-5],
+        ]))
+    };
+    let margin_of = |report: &Report, elsewhere| {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        let _ = gate.tick(1010);
+        let evidence = Evidence {
+            elsewhere,
+            ..evidence(report, &[], Growth::NONE)
+        };
+        match gate.examine_on(&evidence).1 {
+            Verdict::Permit { margin } => f64::from(margin.q16()) / 65_536.0,
+            Verdict::Deny { margin, .. } => margin.map_or(0.0, |m| f64::from(m.q16()) / 65_536.0),
+        }
+    };
+    wide.belief.spread = spread(0.1);
+    let alone = margin_of(&wide, Risk::NONE);
+    wide.belief.spread = spread(0.1 * alone / 1.02);
+    let (alone, with) = (margin_of(&wide, Risk::NONE), margin_of(&wide, risk(0.995)));
+    assert!(alone > 1.0 && with < 1.0 && with > 0.85, "{alone} {with}");
+    assert_eq!(margin_of(&wide, risk(0.98)), 0.0);
+    let step = |table: &[u8], elsewhere| {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        gate.table = Ok(Table::parse(table).unwrap());
+        let evidence = Evidence {
+            elsewhere,
+            ..evidence(&wide, &[], Growth::NONE)
+        };
+        gate.step_on(1010, &evidence).verdict
+    };
+    assert_eq!(step(SEE_T7, Risk::NONE), Ok(()));
+    assert_eq!(step(SEE_T7, risk(0.995)), Err(Reason::NotContained));
+    assert_eq!(step(SEE_T7, risk(0.98)), Err(Reason::ElsewhereTooLikely));
+    let larger = wider();
+    assert_eq!(step(&larger, Risk::NONE), Ok(()));
+    let disagree = Err(Reason::EvaluationsDisagree);
+    assert_eq!(step(&larger, risk(0.995)), disagree);
 }
