@@ -301,6 +301,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
         sources: &sources,
         maximum_age_ms: 3 * drive.odometry_ms + drive.response_ms + 20,
         response_ms: drive.response_ms,
+        report_period_ms: 1,
         permit_hold_ms: drive.permit_hold_ms,
         inhibit_hold_ms: 1,
         permits_in_a_row: 1 + rng.below(2) as u16,
