@@ -1,13 +1,15 @@
 //! `recorded`: runs recorded estimates through the emulated controller and the host, and tests models learnt from recorded detections
 //! and from a recorded filter on rows that they were not learnt from.
 
+mod moving;
+
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, release};
 use crate::jobs::docs::release_program;
 use crate::jobs::test::{passed, ran, suite};
 use crate::need::{self, THUMBS};
 use crate::report::Report;
-use crate::shell::{Result, cmd, program_at};
+use crate::shell::{Cmd, Result, cmd, program_at};
 use serde_json::Value;
 use std::path::Path;
 
@@ -25,7 +27,13 @@ pub fn recorded(given: &Arguments) -> Result {
     if passed(&learnt) == 0 {
         return Err("no test of learn is named *recorded*".into());
     }
-    rules(&folder)
+    rules(&folder)?;
+    moving::moving(&folder)
+}
+
+/// Returns the program as it is released.
+fn release_posegate() -> Cmd {
+    program_at(&release("posegate"))
 }
 
 /// Prints what the gate, and the rules that are in use today, would have permitted: for AMCL's estimates of the Nav2 recording, which
@@ -34,7 +42,7 @@ pub fn recorded(given: &Arguments) -> Result {
 fn rules(folder: &Path) -> Result {
     release_program()?;
     need::command("python3", "python3")?;
-    let posegate = || program_at(&release("posegate"));
+    let posegate = release_posegate;
     for task in ["hall", "dock"] {
         let replay = posegate()
             .words("replay examples/sites/turtlebot.toml")
