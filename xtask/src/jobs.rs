@@ -18,6 +18,7 @@ pub mod package;
 pub mod planning;
 pub mod python;
 pub mod recorded;
+pub mod ros2;
 pub mod slurm;
 pub mod steady;
 pub mod test;

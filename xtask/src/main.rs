@@ -218,6 +218,18 @@ const JOBS: &[Job] = &[
         jobs::python::python,
     ),
     job(
+        "ros2",
+        "[RUNS]",
+        "the ROS 2 node with rclpy and Fast DDS from wheels: permits, their end, damaged payloads, rows of a bag",
+        jobs::ros2::ros2,
+    ),
+    job(
+        "behaviortree",
+        "",
+        "the condition PosePermitted, compiled and run with BehaviorTree.CPP",
+        jobs::ros2::behaviortree,
+    ),
+    job(
         "budgets",
         "",
         "every figure of the budgets: bytes, time, instructions, stack, flash",

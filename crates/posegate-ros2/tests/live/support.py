@@ -1,8 +1,10 @@
 """What the live tests share: the node as a process, a peer of rclpy, results as JSON lines. Loopback only."""
 
+import ctypes
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -60,12 +62,18 @@ def end(failure=None):
     os._exit(1 if failure else 0)
 
 
+def end_with_parent():
+    """Has the kernel kill this process when the test ends in any way."""
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 def start(*parameters, options=(), ros=()):
     """Starts the node on the dock of the examples."""
     words = [NODE, str(TABLE), *options, "--ros-args"]
     for parameter in parameters:
         words += ["-p", parameter]
-    process = subprocess.Popen([*words, *ros], stderr=subprocess.DEVNULL)
+    process = subprocess.Popen([*words, *ros], stderr=subprocess.DEVNULL, preexec_fn=end_with_parent)
     started.append(process)
     return process
 

@@ -1,0 +1,166 @@
+//! `ros2`: the node of `crates/posegate-ros2` with rclpy and Fast DDS from wheels, on loopback. `behaviortree`: the condition of
+//! `integrations/behaviortree` with BehaviorTree.CPP.
+
+use crate::arguments::Arguments;
+use crate::files::{self, Scratch, target_folder};
+use crate::jobs::docs::release_program;
+use crate::need;
+use crate::report::Report;
+use crate::shell::{Cmd, Result, cmd, program_at, say};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const CRATE: &str = "crates/posegate-ros2";
+/// How often each cause that ends a permit is tried.
+const RUNS: u64 = 5;
+/// ROS 2 Jazzy as wheels of Python 3.11. There is no installation of ROS in this job.
+const WHEELS: &str = "ros-rclpy==7.1.6 ros-rmw-fastrtps-cpp==8.4.3 ros-geometry-msgs==5.3.6 ros-nav-msgs==5.3.6 ros-std-msgs==5.3.6 \
+                      ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 mcap==1.6.0";
+const MODULES: &str = "rclpy, mcap, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg, std_srvs.srv, diagnostic_msgs.msg, visualization_msgs.msg";
+/// The package of Python whose source has BehaviorTree.CPP 4.8.2 in it.
+const TREES: &str = "behaviortreepy==0.1.4";
+
+/// Lints and tests the crate, builds its program, and runs `tests/live` of the crate. The argument is how often each cause that ends a
+/// permit is tried; 50 is the deep variant.
+pub fn ros2(given: &Arguments) -> Result {
+    let runs = given.number(0, RUNS)?;
+    let python = python()?;
+    let manifest = format!("{CRATE}/Cargo.toml");
+    say("lints");
+    cmd("cargo fmt --check --manifest-path")
+        .arg(&manifest)
+        .run()?;
+    in_target(cmd("cargo clippy --locked --release --all-targets --manifest-path").arg(&manifest))
+        .words("-- -D warnings")
+        .run()?;
+    say("tests without a network, and damaged payloads");
+    in_target(cmd("cargo test --locked --release --manifest-path").arg(&manifest))
+        .words("-- --nocapture --test-threads 1")
+        .json()?;
+    in_target(cmd("cargo build --locked --release --manifest-path").arg(&manifest)).run()?;
+    release_program()?;
+    let folder = Scratch::new()?;
+    let bag = folder.join("drive.mcap");
+    program_at(&target_folder().join("release/examples/drive_bag"))
+        .arg(&bag)
+        .arg(folder.join("drive.csv"))
+        .run()?;
+    say("rclpy");
+    let live = |name: &str| {
+        program_at(&python)
+            .arg(format!("{CRATE}/tests/live/{name}.py"))
+            .env("POSEGATE_NODE", files::release("posegate-node"))
+            .env("POSEGATE", files::release("posegate"))
+            .limit(600)
+    };
+    live("listener").json()?;
+    live("permit").json()?;
+    live("odometry").json()?;
+    live("failsafe").arg(runs.to_string()).json()?;
+    live("rows").arg(&bag).json()?;
+    Ok(())
+}
+
+/// Builds BehaviorTree.CPP, and the condition with its test by CMake, and runs it.
+pub fn behaviortree(_: &Arguments) -> Result {
+    need::command("cmake", "cmake")?;
+    need::command("g++", "g++")?;
+    let library = behavior_tree_library()?;
+    let build = target_folder().join("behaviortree");
+    remove(&build)?;
+    cmd("cmake -S integrations/behaviortree -DCMAKE_BUILD_TYPE=Release -DPOSEGATE_TESTS=ON -B")
+        .arg(&build)
+        .arg(format!("-DCMAKE_PREFIX_PATH={}", library.display()))
+        .run()?;
+    cmd("cmake --build").arg(&build).words("-j 2").run()?;
+    program_at(&build.join("permit_test"))
+        .arg("integrations/behaviortree/trees/dock_if_permitted.xml")
+        .json()?;
+    // What is installed is found by another project.
+    let installed = build.join("installed");
+    cmd("cmake --install")
+        .arg(&build)
+        .words("--prefix")
+        .arg(&installed)
+        .run()?;
+    let user = build.join("user");
+    cmd("cmake -S integrations/behaviortree/tests/user -B")
+        .arg(&user)
+        .arg(format!(
+            "-DCMAKE_PREFIX_PATH={};{}",
+            library.display(),
+            installed.display()
+        ))
+        .run()?;
+    cmd("cmake --build").arg(&user).run()?;
+    let mut report = Report::default();
+    let code = program_at(&user.join("user")).code()?;
+    report.at_most(
+        "behaviortree: a project that finds the package",
+        code,
+        "exit code",
+        0,
+    );
+    report.finish()
+}
+
+/// Returns the Python with ROS.
+fn python() -> Result<PathBuf> {
+    need::command("python3", "python3")?;
+    let version = cmd("python3 --version").read()?;
+    if !version.trim().starts_with("Python 3.11.") {
+        return Err(format!(
+            "the wheels of ROS 2 are for Python 3.11, and python3 is {}",
+            version.trim()
+        )
+        .into());
+    }
+    need::python("ros2-tools", MODULES, WHEELS)
+}
+
+/// Returns the folder in which BehaviorTree.CPP is installed. It is built once.
+fn behavior_tree_library() -> Result<PathBuf> {
+    let folder = target_folder().join("behaviortree-library");
+    let installed = folder.join("installed");
+    if installed.join("lib/cmake/behaviortree_cpp").is_dir() {
+        return Ok(installed);
+    }
+    say("BehaviorTree.CPP");
+    remove(&folder)?;
+    files::make_folder(&folder)?;
+    cmd("python3 -m pip download -q --no-deps --no-binary :all: -d")
+        .arg(&folder)
+        .arg(TREES)
+        .run()?;
+    let archives = files::files_ending(&folder, ".tar.gz")?;
+    let archive = archives.first().ok_or("no source was downloaded")?;
+    cmd("tar -C").arg(&folder).words("-xf").arg(archive).run()?;
+    let name = files::name(archive);
+    let source = folder
+        .join(name.trim_end_matches(".tar.gz"))
+        .join("BehaviorTree.CPP");
+    let build = folder.join("build");
+    cmd("cmake -DCMAKE_BUILD_TYPE=Release -DBTCPP_GROOT_INTERFACE=OFF -DBTCPP_SQLITE_LOGGING=OFF -DBTCPP_EXAMPLES=OFF")
+        .words("-DBTCPP_BUILD_TOOLS=OFF -DBUILD_TESTING=OFF -S")
+        .arg(&source)
+        .arg("-B")
+        .arg(&build)
+        .arg(format!("-DCMAKE_INSTALL_PREFIX={}", installed.display()))
+        .run()?;
+    cmd("cmake --build").arg(&build).words("-j 2").run()?;
+    cmd("cmake --install").arg(&build).run()?;
+    Ok(installed)
+}
+
+/// Returns a command that builds into the folder of the other jobs.
+fn in_target(command: Cmd) -> Cmd {
+    command.env("CARGO_TARGET_DIR", target_folder())
+}
+
+/// Removes a folder of an earlier run.
+fn remove(folder: &Path) -> Result {
+    match folder.exists() {
+        true => Ok(fs::remove_dir_all(folder)?),
+        false => Ok(()),
+    }
+}
