@@ -3,7 +3,7 @@
 
 // readme: begin
 use embedded_hal::digital::OutputPin;
-use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
+use posegate::gate::{Gate, Interlock, Reason, Settings, Source, site_digest};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Report};
 use posegate::set::Trust;
@@ -21,14 +21,9 @@ static SETTINGS: Settings<'static> = Settings {
         trust: Trust::FULL,
         motion: MotionBounds::of_mm_mrad(50, 0, 100), // at most 0.05 m/s and 0.1 rad/s
     }],
-    maximum_age_ms: 200,
-    response_ms: 20,
-    report_period_ms: 50,
-    permit_hold_ms: 100,
-    inhibit_hold_ms: 500,
-    permits_in_a_row: 3,
-    restart: Restart::Automatic,
     look_at: Some(7),
+    // Reports come every 50 ms, up to 50 ms after their stamps.
+    ..Settings::for_source(50, 50)
 };
 
 /// Once, at start: the gate tests itself and the table. It is closed.
