@@ -46,6 +46,8 @@ pub fn docs(_: &Arguments) -> Result {
     }
     let mut report = Report::default();
     check_front_pages(&mut report)?;
+    // Its lines are the README's.
+    cmd("cargo run -p posegate --features std --example may_dock").run()?;
     release_program()?;
     let mut pages = files::files_ending("docs", ".md")?;
     pages.retain(|page| !page.ends_with(OF_PYTHON));
