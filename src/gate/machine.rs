@@ -11,7 +11,7 @@ use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Sou
 use crate::contain::{self, Decision, second};
 use crate::motion::MotionBounds;
 use crate::report::{PoseEstimate, Report};
-use crate::set::{Growth, PoseSet, Trust};
+use crate::set::{Growth, Trust};
 use crate::table::{self, Table};
 use crate::task::Risk;
 use core::hint::black_box;
@@ -856,31 +856,17 @@ fn first_opinion(
     trust: &Trust,
     movement: Growth,
 ) -> Result<(), Reason> {
-    let set = belief.pose_set(table.radius_squared(), *trust);
-    // By reference: the set takes more memory than the rest of the step.
-    let set = match &set {
+    let mut set = belief.pose_set(table.radius_squared(), *trust);
+    // In place: the set takes more memory than the rest of the step.
+    let set = match &mut set {
         Ok(set) => set,
         Err(impossible) => return Err((*impossible).into()),
     };
-    match decide_after(table, set, movement) {
+    set.grow(movement);
+    match contain::decide(table, set) {
         Decision::Inside => Ok(()),
         Decision::Outside(cause) => Err(cause.into()),
     }
-}
-
-/// Decides on a set after a movement. A separate function, so that a set that does not move is not copied.
-#[inline(always)]
-fn decide_after(table: &Table<'_>, set: &PoseSet, movement: Growth) -> Decision {
-    if movement == Growth::NONE {
-        contain::decide(table, set)
-    } else {
-        decide_grown(table, set, movement)
-    }
-}
-
-#[inline(never)]
-fn decide_grown(table: &Table<'_>, set: &PoseSet, movement: Growth) -> Decision {
-    contain::decide(table, &set.grown(movement))
 }
 
 /// Parses a table and checks that it is for the task and site that the controller expects.

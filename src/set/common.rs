@@ -19,19 +19,15 @@ pub(crate) struct Common {
 
 impl Common {
     /// Returns the values of a set that was grown to this extent.
-    pub(super) fn grown(&self, extent: Extent, by: Growth) -> Self {
+    pub(super) fn grow(&mut self, extent: Extent, by: Growth) {
         let yaw_q24 = match extent {
             Extent::Bounded { yaw_q24, .. } => yaw_q24,
             Extent::Gaussian(factor) => factor.yaw,
             Extent::Grown { factor, by } => factor.yaw.wrapping_add(by.yaw_q24()),
         };
         let moved = by.translation_um().unsigned_abs();
-        Self {
-            cos_q15: self.cos_q15,
-            sin_q15: self.sin_q15,
-            broad_um: self.broad_um.wrapping_add(moved),
-            turn: Turn::of(yaw_q24.unsigned_abs()),
-        }
+        self.broad_um = self.broad_um.wrapping_add(moved);
+        self.turn = Turn::of(yaw_q24.unsigned_abs());
     }
 
     pub(super) fn of(mean: Pose, extent: Extent) -> Self {
