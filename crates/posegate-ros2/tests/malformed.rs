@@ -171,7 +171,7 @@ fn damaged_payloads_never_permit_wrongly() {
         }
     }
     println!(
-        "{{\"name\": \"ros2: damaged payloads\", \"value\": {PAYLOADS}, \"parsed\": {parsed}, \"permits\": {permits}, \"wrong\": {wrong}}}"
+        "\n{{\"name\": \"ros2: damaged payloads\", \"value\": {PAYLOADS}, \"parsed\": {parsed}, \"permits\": {permits}, \"wrong\": {wrong}}}"
     );
     assert_eq!(wrong, 0);
     // The test would show nothing if all were refused, or all were harmless.

@@ -15,8 +15,8 @@ const CRATE: &str = "crates/posegate-ros2";
 const RUNS: u64 = 5;
 /// ROS 2 Jazzy as wheels of Python 3.11. There is no installation of ROS in this job.
 const WHEELS: &str = "ros-rclpy==7.1.6 ros-rmw-fastrtps-cpp==8.4.3 ros-geometry-msgs==5.3.6 ros-nav-msgs==5.3.6 ros-std-msgs==5.3.6 \
-                      ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 mcap==1.6.0";
-const MODULES: &str = "rclpy, mcap, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg, std_srvs.srv, diagnostic_msgs.msg, visualization_msgs.msg";
+                      ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 mcap==1.6.0 cyclonedds==11.0.1";
+const MODULES: &str = "rclpy, mcap, cyclonedds, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg, std_srvs.srv, diagnostic_msgs.msg, visualization_msgs.msg";
 /// The package of Python whose source has BehaviorTree.CPP 4.8.2 in it.
 const TREES: &str = "behaviortreepy==0.1.4";
 
@@ -58,6 +58,7 @@ pub fn ros2(given: &Arguments) -> Result {
     live("odometry").json()?;
     live("failsafe").arg(runs.to_string()).json()?;
     live("rows").arg(&bag).json()?;
+    live("cyclone").json()?;
     Ok(())
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::arguments::Command;
+use posegate::set::{CrossTerms, Inflation};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
 
@@ -23,7 +24,7 @@ fn parameters_become_settings() {
     assert_eq!(gate.task, "dock");
     assert_eq!(gate.restart, Restart::OnReset);
     assert_eq!(gate.look_at, Some(7));
-    assert_eq!((gate.response_ms, gate.maximum_age_ms), (270, 1_000));
+    assert_eq!((gate.response_ms, gate.maximum_age_ms), (290, 1_000));
     assert_eq!(
         gate.sources[0].motion,
         MotionBounds::new(0.3, 0.0, 30f64.to_radians()).unwrap()
@@ -97,7 +98,7 @@ fn wrong_parameters_are_refused_with_words() {
         (format!("{STILL} -p maximum_age_ms:=0"), "from 1 to 60000"),
         (format!("{STILL} -p maximum_age_ms:=1.5"), "whole number"),
         (
-            format!("{STILL} -p maximum_age_ms:=270"),
+            format!("{STILL} -p maximum_age_ms:=290"),
             "maximum_age_ms is not above",
         ),
         (format!("{STILL} -p valid_ms:=99"), "twice heartbeat_ms"),

@@ -1,0 +1,319 @@
+//! Parameters by name, each with its type and range.
+
+use super::{Delivery, SettingsError, hex};
+use crate::parameters::{Parameters, Value};
+use posegate::gate::site_digest;
+use posegate::motion::MotionBounds;
+use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
+use posegate::table::Table;
+use posegate::track::{OdometryErrors, TrackerSettings};
+
+/// Every parameter.
+const NAMES: [&str; 36] = [
+    "cross_terms",
+    "cycle_ms",
+    "frame_id",
+    "heartbeat_ms",
+    "inflation",
+    "inhibit_hold_ms",
+    "look_at",
+    "markers",
+    "max_speed",
+    "max_speed_across",
+    "max_yaw_rate_deg",
+    "maximum_age_ms",
+    "maximum_fix_age_ms",
+    "odom_durability",
+    "odom_reliability",
+    "odometry_m_per_sqrt_m",
+    "odometry_m_per_sqrt_s",
+    "odometry_maximum_gap_ms",
+    "odometry_rad_per_sqrt_m",
+    "odometry_rad_per_sqrt_rad",
+    "odometry_rad_per_sqrt_s",
+    "odometry_slip",
+    "odometry_turn_slip",
+    "odometry_turn_slip_per_m",
+    "permit_hold_ms",
+    "permits_in_a_row",
+    "pose_durability",
+    "pose_reliability",
+    "report_period_ms",
+    "restart",
+    "site_digest",
+    "stands_still",
+    "task",
+    "use_odometry",
+    "use_sim_time",
+    "valid_ms",
+];
+
+const TIME: &str = "milliseconds, a whole number from 1 to 60000";
+const NUMBER: &str = "a number that is not below zero";
+
+/// Reads parameters by name.
+pub(super) struct Reader<'p>(pub(super) &'p Parameters);
+
+impl Reader<'_> {
+    pub(super) fn check_names(&self) -> Result<(), SettingsError> {
+        let unknown = self.0.names().find(|name| !NAMES.contains(name));
+        let Some(name) = unknown else {
+            return Ok(());
+        };
+        let similar = NAMES
+            .iter()
+            .map(|known| (distance(name, known), known))
+            .min();
+        let hint = similar.filter(|(distance, _)| *distance <= 3);
+        Err(SettingsError::Unknown {
+            name: name.to_owned(),
+            place: self.0.place(name).to_owned(),
+            hint: hint.map_or(String::new(), |(_, known)| {
+                format!(" (did you mean `{known}`?)")
+            }),
+            all: NAMES.join(", "),
+        })
+    }
+
+    fn invalid(&self, name: &'static str, expected: &'static str) -> SettingsError {
+        let given = match self.0.get(name) {
+            Some(Value::Bool(value)) => value.to_string(),
+            Some(Value::Integer(value)) => value.to_string(),
+            Some(Value::Double(value)) => format!("{value:?}"),
+            Some(Value::Text(value)) => format!("`{value}`"),
+            None => "missing".into(),
+        };
+        SettingsError::Invalid {
+            name,
+            place: self.0.place(name).to_owned(),
+            given,
+            expected,
+        }
+    }
+
+    pub(super) fn bool(&self, name: &'static str, default: bool) -> Result<bool, SettingsError> {
+        match self.0.get(name) {
+            None => Ok(default),
+            Some(Value::Bool(value)) => Ok(*value),
+            Some(_) => Err(self.invalid(name, "true or false")),
+        }
+    }
+
+    pub(super) fn text(&self, name: &'static str, default: &str) -> Result<String, SettingsError> {
+        match self.0.get(name) {
+            None => Ok(default.to_owned()),
+            Some(Value::Text(value)) if !value.is_empty() => Ok(value.clone()),
+            Some(_) => Err(self.invalid(name, "a text that is not empty")),
+        }
+    }
+
+    fn number(&self, name: &'static str) -> Result<Option<f64>, SettingsError> {
+        match self.0.get(name) {
+            None => Ok(None),
+            Some(Value::Double(value)) if value.is_finite() && *value >= 0.0 => Ok(Some(*value)),
+            Some(Value::Integer(value)) if *value >= 0 => Ok(Some(*value as f64)),
+            Some(_) => Err(self.invalid(name, NUMBER)),
+        }
+    }
+
+    pub(super) fn whole(
+        &self,
+        name: &'static str,
+        default: u32,
+        expected: &'static str,
+        range: std::ops::RangeInclusive<i64>,
+    ) -> Result<u32, SettingsError> {
+        match self.0.get(name) {
+            None => Ok(default),
+            Some(Value::Integer(value)) if range.contains(value) => {
+                u32::try_from(*value).map_err(|_| self.invalid(name, expected))
+            }
+            Some(_) => Err(self.invalid(name, expected)),
+        }
+    }
+
+    pub(super) fn ms(&self, name: &'static str, default: u32) -> Result<u32, SettingsError> {
+        self.whole(name, default, TIME, 1..=60_000)
+    }
+
+    /// Returns the index of a text among the choices; the first is the default.
+    pub(super) fn choice<const N: usize>(
+        &self,
+        name: &'static str,
+        choices: [&str; N],
+        expected: &'static str,
+    ) -> Result<usize, SettingsError> {
+        let given = match self.0.get(name) {
+            None => return Ok(0),
+            Some(Value::Text(given)) => choices.iter().position(|choice| choice == given),
+            Some(_) => None,
+        };
+        given.ok_or_else(|| self.invalid(name, expected))
+    }
+
+    pub(super) fn site(
+        &self,
+        option: Option<&str>,
+        table: &Table<'_>,
+    ) -> Result<([u8; 32], bool), SettingsError> {
+        let expected = "the 64 hexadecimal digits that `posegate table info` prints";
+        let parameter = match self.0.get("site_digest") {
+            None => None,
+            Some(Value::Text(digits)) => Some(digits.as_str()),
+            Some(_) => return Err(self.invalid("site_digest", expected)),
+        };
+        let Some(digits) = option.or(parameter) else {
+            return Ok((table.site_digest(), false));
+        };
+        let digest = site_digest(digits).ok_or_else(|| SettingsError::Invalid {
+            name: "site_digest",
+            place: if option.is_some() {
+                "--site-digest"
+            } else {
+                self.0.place("site_digest")
+            }
+            .to_owned(),
+            given: format!("`{digits}`"),
+            expected,
+        })?;
+        if digest == table.site_digest() {
+            Ok((digest, true))
+        } else {
+            Err(SettingsError::WrongSite {
+                found: hex(&table.site_digest()),
+                expected: digits.to_owned(),
+            })
+        }
+    }
+
+    pub(super) fn trust(&self) -> Result<Trust, SettingsError> {
+        let inflation = Inflation::new(self.number("inflation")?.unwrap_or(1.0))
+            .ok_or_else(|| self.invalid("inflation", "a factor from 1 to 4096"))?;
+        let expected = "`yaw_unknown` (AMCL), `all_unknown` (variances alone) or `filled` (all terms are the filter's)";
+        let cross_terms = match self.choice(
+            "cross_terms",
+            ["yaw_unknown", "all_unknown", "filled"],
+            expected,
+        )? {
+            0 => CrossTerms::YawUnknown(SplitWeight::HALF),
+            1 => CrossTerms::AllUnknown(SplitWeight::HALF),
+            _ => CrossTerms::Filled,
+        };
+        Ok(Trust {
+            inflation,
+            cross_terms,
+        })
+    }
+
+    pub(super) fn bounds(&self) -> Result<MotionBounds, SettingsError> {
+        let speeds = [
+            self.number("max_speed")?,
+            self.number("max_speed_across")?,
+            self.number("max_yaw_rate_deg")?,
+        ];
+        if self.bool("stands_still", false)? {
+            return match speeds {
+                [None, None, None] => Ok(MotionBounds::STANDS_STILL),
+                _ => Err(SettingsError::TwoMotionBounds),
+            };
+        }
+        let [Some(along), across, Some(turn)] = speeds else {
+            return Err(SettingsError::NoMotionBounds);
+        };
+        // A robot that is stated not to move at all is one that stands still: that has its own parameter.
+        let across = across.unwrap_or(0.0);
+        if along + across + turn == 0.0 {
+            return Err(SettingsError::NoMotionBounds);
+        }
+        MotionBounds::new(along, across, turn.to_radians()).ok_or_else(|| {
+            self.invalid(
+                "max_speed",
+                "speeds up to 1000 m/s and turn rates up to 1375 degrees/s",
+            )
+        })
+    }
+
+    pub(super) fn look_at(&self) -> Result<Option<u32>, SettingsError> {
+        let expected = "the id of a tag, a whole number that is not below zero";
+        match self.0.get("look_at") {
+            None => Ok(None),
+            Some(_) => self
+                .whole("look_at", 0, expected, 0..=i64::from(u32::MAX))
+                .map(Some),
+        }
+    }
+
+    pub(super) fn delivery(
+        &self,
+        reliability: &'static str,
+        durability: &'static str,
+        is_latched: bool,
+    ) -> Result<Delivery, SettingsError> {
+        let reliable = self.choice(
+            reliability,
+            ["reliable", "best_effort"],
+            "`reliable` or `best_effort`",
+        )? == 0;
+        let expected = "`transient_local` or `volatile`";
+        let transient_local = match self.0.get(durability) {
+            None => is_latched,
+            Some(_) => self.choice(durability, ["transient_local", "volatile"], expected)? == 0,
+        };
+        Ok(Delivery {
+            reliable,
+            // Messages from before can only be kept for a reliable subscription.
+            transient_local: transient_local && reliable,
+        })
+    }
+
+    pub(super) fn tracker(
+        &self,
+        bounds: MotionBounds,
+        trust: Trust,
+        table: &Table<'_>,
+    ) -> Result<Option<TrackerSettings>, SettingsError> {
+        if !self.bool("use_odometry", false)? {
+            return Ok(None);
+        }
+        let required = |name: &'static str| {
+            self.number(name)?
+                .ok_or(SettingsError::NoOdometryErrors(name))
+        };
+        let optional =
+            |name: &'static str| Ok::<f64, SettingsError>(self.number(name)?.unwrap_or(0.0));
+        let errors = OdometryErrors {
+            m_per_sqrt_m: required("odometry_m_per_sqrt_m")?,
+            rad_per_sqrt_rad: required("odometry_rad_per_sqrt_rad")?,
+            rad_per_sqrt_m: required("odometry_rad_per_sqrt_m")?,
+            m_per_sqrt_s: optional("odometry_m_per_sqrt_s")?,
+            rad_per_sqrt_s: optional("odometry_rad_per_sqrt_s")?,
+            slip: required("odometry_slip")?,
+            turn_slip: optional("odometry_turn_slip")?,
+            turn_slip_per_m: optional("odometry_turn_slip_per_m")?,
+        };
+        Ok(Some(TrackerSettings {
+            errors,
+            bounds,
+            trust,
+            radius_squared: table.radius_squared(),
+            maximum_gap_ms: self.ms("odometry_maximum_gap_ms", 100)?,
+            maximum_fix_age_ms: self.ms("maximum_fix_age_ms", 1_500)?,
+        }))
+    }
+}
+
+/// Returns the number of single-letter changes between two names.
+fn distance(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (i, a) in from.chars().take(64).enumerate() {
+        let mut before = row[0];
+        row[0] = i + 1;
+        for (j, b) in to.iter().enumerate() {
+            let changed = before + usize::from(a != *b);
+            before = row[j + 1];
+            row[j + 1] = changed.min(before + 1).min(row[j] + 1);
+        }
+    }
+    row[to.len()]
+}

@@ -1,0 +1,107 @@
+"""The permit with Cyclone DDS: a peer on bare DDS that publishes poses and follows the heartbeat, without rclpy."""
+
+import os
+
+# Loopback alone.
+os.environ["CYCLONEDDS_URI"] = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces>"
+    "<AllowMulticast>true</AllowMulticast></General></Domain></CycloneDDS>"
+)
+
+import time  # noqa: E402
+from dataclasses import dataclass  # noqa: E402
+
+from cyclonedds.core import Policy, Qos  # noqa: E402
+from cyclonedds.domain import DomainParticipant  # noqa: E402
+from cyclonedds.idl import IdlStruct  # noqa: E402
+from cyclonedds.idl.types import array, float64, int32, sequence, uint8, uint32  # noqa: E402
+from cyclonedds.pub import DataWriter  # noqa: E402
+from cyclonedds.sub import DataReader  # noqa: E402
+from cyclonedds.topic import Topic  # noqa: E402
+from cyclonedds.util import duration  # noqa: E402
+from support import end, figure, require, start  # noqa: E402
+from permit_listener import PermitWatch  # noqa: E402
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovarianceStamped_"):
+    header: Header
+    pose: array[float64, 7]
+    covariance: array[float64, 36]
+
+
+@dataclass
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+class Status(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@dataclass
+class Array(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header
+    status: sequence[Status]
+
+
+def main():
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    reliable = Policy.Reliability.Reliable(duration(milliseconds=100))
+    # Classic CDR, as ROS writes it.
+    classic = Policy.DataRepresentation(use_cdrv0_representation=True)
+    latched = Qos(reliable, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), classic)
+    writer = DataWriter(participant, Topic(participant, "rt/amcl_pose", PoseStamped), qos=latched)
+    plain = Qos(reliable, Policy.Durability.Volatile, Policy.History.KeepLast(1), classic)
+    reader = DataReader(participant, Topic(participant, "rt/posegate/permission", Array), qos=plain)
+    watch = PermitWatch("dock")
+
+    def drive(seconds, x, until):
+        begin, due = time.monotonic(), 0.0
+        while time.monotonic() - begin < seconds:
+            if x is not None and time.monotonic() >= due:
+                due = time.monotonic() + 0.05
+                sec, nanosec = divmod(time.time_ns(), 10**9)
+                covariance = [0.0] * 36
+                covariance[0] = covariance[7] = 1e-4
+                covariance[35] = 1e-5
+                writer.write(PoseStamped(Header(Time(sec, nanosec), "map"), [x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], covariance))
+            for message in reader.take(N=10):
+                watch.heartbeat(message, time.time_ns(), time.monotonic_ns())
+            if until(watch.permitted(time.monotonic_ns())):
+                return time.monotonic() - begin
+            time.sleep(0.002)
+        return None
+
+    node = start("stands_still:=true")
+    took = drive(20.0, 0.0, lambda permitted: permitted)
+    require(took is not None, f"no permit with Cyclone DDS: {watch.reason}")
+    took = drive(1.0, 0.5, lambda permitted: not permitted)
+    require(took is not None and watch.reason == "outside_table", f"a bad pose: {watch.reason}")
+    require(drive(20.0, 0.0, lambda permitted: permitted) is not None, "no permit again")
+    node.kill()
+    took = drive(2.0, 0.0, lambda permitted: not permitted)
+    require(took is not None, "the permit outlives its node")
+    figure("Cyclone DDS: kill -9 to `no permit`", round(took * 1e3, 1), "ms", 265, at_least=False)
+
+
+main()
+end()
