@@ -132,7 +132,7 @@ fn the_jobs_of_the_documents_exist() {
             for part in text.split(call).skip(1) {
                 let job: String = part
                     .chars()
-                    .take_while(|c| c.is_ascii_lowercase() || *c == '_')
+                    .take_while(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || *c == '_')
                     .collect();
                 assert!(
                     job.is_empty() || jobs.contains(&job.as_str()),
