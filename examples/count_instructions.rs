@@ -253,9 +253,9 @@ mod firmware {
             };
             let limits = match (is_union, M4F) {
                 (false, true) => [20_000, 29_000],
-                (false, false) => [60_000, 145_000],
-                (true, true) => [20_000, 460_000],
-                (true, false) => [60_000, 1_600_000],
+                (false, false) => [60_000, 112_000],
+                (true, true) => [20_000, 456_000],
+                (true, false) => [60_000, 1_350_000],
             };
             counter.short_of(cost, search.cost(), "instructions", limits);
             let most = if is_union { 2_176 } else { 1_024 };

@@ -120,6 +120,12 @@ impl Movement {
         broad: 0,
         by: Growth::NONE,
     };
+
+    /// A movement that is not none has a length or a turn of a unit at least: both are rounded up.
+    #[inline(always)]
+    const fn is_none(&self) -> bool {
+        self.length | self.turn == 0
+    }
 }
 
 /// A set's point in a frame, and how far any of its poses moves it.
@@ -159,19 +165,26 @@ fn holds_at(
     slabs: &mut u32,
 ) -> bool {
     // Below a radian the slabs are few, and the heading's whole circle is far too much.
-    if sweep.radius.is_some() || sweep.turn() > ONE {
-        let section = sweep.section(facet, axes, point, 0);
-        if let Some(radius) = sweep.radius {
-            return sweep.cylinder_holds(facet, &section, radius);
-        }
-        if sweep.holds_at_any_heading(facet, &section) {
-            return true;
-        }
-        if sweep.yaw > ONE_TURN {
-            return false;
-        }
+    if (sweep.radius.is_some() || sweep.turn() > ONE)
+        && let Some(decided) = at_once(sweep, facet, axes, point)
+    {
+        return decided;
     }
     in_slabs(sweep, facet, axes, point, first, slabs)
+}
+
+/// Returns whether the facet holds, if that is decided without slabs: for a cylinder, and at any heading. A separate function, so that
+/// the slabs do not need its stack.
+#[inline(never)]
+fn at_once(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2]) -> Option<bool> {
+    let section = sweep.section(facet, axes, point, 0);
+    if let Some(radius) = sweep.radius {
+        return Some(sweep.cylinder_holds(facet, &section, radius));
+    }
+    if sweep.holds_at_any_heading(facet, &section) {
+        return Some(true);
+    }
+    (sweep.yaw > ONE_TURN).then_some(false)
 }
 
 /// The same for an ellipsoid that turns by at most one turn, slab by slab.
@@ -198,7 +211,7 @@ fn in_slabs(
             .wrapping_mul(width.in_u.unsigned_abs());
         let e = (middle as i32).wrapping_sub(1 << U);
         let section = sweep.section(facet, axes, point, e);
-        match section.slab(sweep.turn(), e, &width) {
+        match section.slab(sweep, e, &width) {
             Slab::Outside => return false,
             Slab::Unsure if depth == DEEPEST => return false,
             Slab::Unsure => {
@@ -248,8 +261,6 @@ pub(super) struct Width {
     tan: i32,
     /// Sections do not shrink with u: a cylinder's.
     is_cylinder: bool,
-    /// The same at every depth.
-    movement: Movement,
 }
 
 /// One facet at the middle of a slab, fine units.
@@ -465,7 +476,6 @@ impl Sweep {
         let sin_up = i64::from((sin.wrapping_add(4) >> 2).wrapping_add(1));
         Width {
             is_cylinder: self.radius.is_some(),
-            movement: self.movement,
             in_u: 1i32.wrapping_shl(U.wrapping_sub(depth)),
             w: w as i32,
             kappa: ONE.wrapping_sub(square >> 3) as i32,
@@ -655,7 +665,7 @@ impl Touching {
 impl Touching {
     /// Returns the pose after a movement along the normal that turns it outwards, to first order.
     fn moved(self, movement: &Movement, section: &Section) -> Self {
-        if *movement == Movement::NONE {
+        if movement.is_none() {
             return self;
         }
         let [nx, ny] = section.normal.map(i64::from);
@@ -755,7 +765,7 @@ impl Sweep {
 
 impl Section {
     /// What the slab about this section is.
-    pub fn slab(&self, turn: i64, e: i32, width: &Width) -> Slab {
+    pub fn slab(&self, sweep: &Sweep, e: i32, width: &Width) -> Slab {
         let root = if width.is_cylinder {
             Root::CYLINDER
         } else {
@@ -773,8 +783,8 @@ impl Section {
             .wrapping_sub(SLACK)
             .wrapping_sub(part(i64::from(self.s.saturating_abs()), width.rest));
         let mut more = 0;
-        if width.movement != Movement::NONE {
-            let [first, parabola] = self.movement(width);
+        if !sweep.movement.is_none() {
+            let [first, parabola] = self.movement(&sweep.movement, width);
             fixed = fixed.wrapping_sub(first);
             more = parabola.wrapping_sub(first);
         }
@@ -797,7 +807,7 @@ impl Section {
                 .wrapping_mul(i64::from(root.up))
                 .wrapping_shr(width.in_u.trailing_zeros());
         }
-        let turned = turn.wrapping_mul(i64::from(self.s)) >> 28;
+        let turned = sweep.turn().wrapping_mul(i64::from(self.s)) >> 28;
         let g = i64::from(self.g)
             .wrapping_add(turned.wrapping_mul(i64::from(width.kappa)) >> 28)
             .wrapping_add(rise);
@@ -838,13 +848,13 @@ impl Section {
     /// `d (|S| + |C| (w + d/2))`. The first bound takes C for `C cos` if C is above zero, which no turn exceeds. In robot axes the
     /// offsets of the ellipsoid turn with the robot: at most d times the longest.
     #[inline(never)]
-    fn movement(&self, width: &Width) -> [i64; 2] {
+    fn movement(&self, movement: &Movement, width: &Width) -> [i64; 2] {
         let Movement {
             length,
             turn,
             broad,
             ..
-        } = width.movement;
+        } = *movement;
         let (w, turn) = (i64::from(width.w), i64::from(turn));
         let away = w.wrapping_add(turn >> 1).wrapping_add(1).min(ONE);
         // Below 2^31 * 2^28.

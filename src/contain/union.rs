@@ -323,7 +323,7 @@ impl<'a> Search<'a> {
     ) -> Result<(), (Slab, At)> {
         let sweep = self.sweep;
         let own = bound.section(sweep, e);
-        let found = own.slab(sweep.turn(), e, width);
+        let found = own.slab(sweep, e, width);
         if found == Slab::Inside {
             return Ok(());
         }
@@ -333,7 +333,7 @@ impl<'a> Search<'a> {
         let mut first = None;
         for other in beyond {
             let other = other.section(sweep, e);
-            if other.slab(sweep.turn(), e, width) == Slab::Inside
+            if other.slab(sweep, e, width) == Slab::Inside
                 || self.excludes(&own, &other, e, width)
                 || first.is_some_and(|first| self.excludes(&first, &other, e, width))
             {
@@ -352,7 +352,7 @@ impl<'a> Search<'a> {
         let turn = self.sweep.turn();
         let weight = first.weight(second, turn, self.root(e), width.in_u);
         let sum = first.weighed(second, weight);
-        sum.slab(turn, e, width) == Slab::Inside
+        sum.slab(self.sweep, e, width) == Slab::Inside
     }
 
     /// Whether a pose of a section is beyond both facets: the farthest by their best weighed sum there.

@@ -215,7 +215,7 @@ pub(in crate::contain) fn largest_of(at: impl Fn(f64) -> f64, low: f64, high: f6
 /// The least b, fine units, at which a slab is inside.
 pub(in crate::contain) fn threshold(
     section: Section,
-    turn: i64,
+    sweep: &Sweep,
     e: i32,
     width: &Width,
 ) -> Option<i64> {
@@ -224,7 +224,7 @@ pub(in crate::contain) fn threshold(
             left: section.left.wrapping_add(b),
             ..section
         };
-        raised.slab(turn, e, width) == Slab::Inside
+        raised.slab(sweep, e, width) == Slab::Inside
     };
     let (mut low, mut high) = (-(1i64 << 32), 1i64 << 32);
     if !inside(high) {
@@ -257,7 +257,7 @@ fn no_bound_of_a_slab_is_below_the_truth() {
         let index = random.within(0.0, f64::from(1u32 << depth)) as u32;
         let e = ((2 * index + 1) * width.in_u as u32) as i32 - (1 << U);
         let section = sweep.section(facet, axes, point, e);
-        let Some(least) = threshold(section, sweep.turn(), e, &width) else {
+        let Some(least) = threshold(section, &sweep, e, &width) else {
             panic!("{number}: no b is enough: {case:?}");
         };
         let [low, high] = [e - width.in_u, e + width.in_u].map(|end| f64::from(end) / 32_768.0);

@@ -74,7 +74,7 @@ fn no_bound_of_a_weighed_sum_is_below_the_truth() {
             }
             parts.push((*other, share));
         }
-        let Some(least) = threshold(sum, sweep.turn(), e, &width) else {
+        let Some(least) = threshold(sum, &sweep, e, &width) else {
             panic!("{number}: no b is enough: {sweep:?} {parts:?}");
         };
         let [low, high] = [e - width.in_u, e + width.in_u].map(|end| f64::from(end) / 32_768.0);
@@ -134,10 +134,7 @@ fn the_weight_is_close_to_the_best() {
         let enough = |spare: f64| {
             let first = raise(first, spare);
             let weight = first.weight(&second, sweep.turn(), root, 0);
-            first
-                .weighed(&second, weight)
-                .slab(sweep.turn(), e, &narrow)
-                != Slab::Outside
+            first.weighed(&second, weight).slab(&sweep, e, &narrow) != Slab::Outside
         };
         let (mut low, mut high) = (-1e9, 1e9);
         for _ in 0..60 {
