@@ -32,6 +32,8 @@ struct Drive {
     cycle_ms: u32,
     response_ms: u32,
     permit_hold_ms: u32,
+    /// Whether the controller weighs the carried fix in every cycle, or only with news.
+    weighs_again: bool,
 }
 
 impl Drive {
@@ -69,6 +71,7 @@ impl Drive {
             response_ms: cycle_ms + 1 + rng.below(5) as u32,
             // Also one that ends before the next odometry: then all of it is used.
             permit_hold_ms: 1 + rng.below(2 * odometry_ms as usize) as u32,
+            weighs_again: rng.chance(0.3),
         }
     }
 
@@ -359,7 +362,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             }
             next_fix += 1 + rng.below(2 * drive.fix_ms as usize) as u32;
         }
-        let mut step = None;
+        let (mut step, mut is_news) = (None, drive.weighs_again);
         if now_ms - newest_ms >= drive.odometry_ms && !rng.chance(0.05) {
             let seconds = f64::from(now_ms - newest_ms) * 1e-3;
             // In whole micrometres, as a controller reads it.
@@ -381,6 +384,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             }
             at = moved(at, by);
             newest_ms = now_ms;
+            is_news = true;
             if std::mem::take(&mut with_next) {
                 fixes.push(Fix::drawn(rng, now_ms, at, &drive));
             }
@@ -403,11 +407,13 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
                 found.late += u64::from(fix.stamp_ms < newest_ms);
                 found.early += u64::from(fix.stamp_ms > newest_ms);
                 current = Some(fix);
+                is_news = true;
             }
         }
         let wrapped = start.wrapping_add(now_ms);
         let step = match (step, tracker.tracked(wrapped)) {
             (Some(step), _) => step,
+            (None, Ok(_)) if !is_news => gate.tick(wrapped),
             (None, Ok(tracked)) => {
                 let step = gate.step_on(wrapped, &tracked.evidence());
                 if step.verdict.is_ok()

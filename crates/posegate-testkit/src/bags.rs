@@ -23,6 +23,13 @@ MSG: apriltag_msgs/AprilTagDetection\nstring family\nint32 id\nint32 hamming\nfl
 ================================================================================\n\
 MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
 
+const ODOMETRY: &str = "string child_frame_id\ngeometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n\
+================================================================================\n\
+MSG: geometry_msgs/TwistWithCovariance\nTwist twist\nfloat64[36] covariance\n\
+================================================================================\n\
+MSG: geometry_msgs/Twist\nVector3 linear\nVector3 angular\n\
+================================================================================\n\
+MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
 const TRANSFORMS: &str = "geometry_msgs/TransformStamped[] transforms\n\
 ================================================================================\n\
 MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform transform\n\
@@ -218,6 +225,20 @@ impl Bag {
             Self::logged(pose),
             &data,
         );
+    }
+
+    /// Writes a pose of an odometry as `nav_msgs/msg/Odometry`, in the frame of the pose, of `base_link`.
+    pub fn odometry(&mut self, topic: &str, pose: &Pose) {
+        let mut cdr = Cdr::new(false);
+        cdr.header(pose.t_s, pose.frame);
+        cdr.text("base_link");
+        let (sin, cos) = (0.5 * pose.yaw).sin_cos();
+        cdr.floats(&[pose.x, pose.y, 0.0, 0.0, 0.0, sin, cos]);
+        // The covariance of the pose, the twist and its covariance.
+        cdr.floats(&[0.0; 78]);
+        let definition = format!("{HEADER}{ODOMETRY}{PARTS}");
+        let name = "nav_msgs/msg/Odometry";
+        self.write(topic, name, &definition, Self::logged(pose), &cdr.bytes);
     }
 
     /// Writes transforms as one `TFMessage`.
