@@ -143,13 +143,16 @@ class Peer:
             rclpy.spin_once(self.node, timeout_sec=0.002)
         return None
 
-    def call(self, name):
-        """Calls a service of the node."""
+    def call(self, name, make=None):
+        """Calls a service of the node, and publishes poses meanwhile."""
         client = self.node.create_client(Trigger, name)
-        require(client.wait_for_service(timeout_sec=10.0), f"no service {name}")
+
+        def wait(condition):
+            return self.drive(10.0, make, until=condition) if make else self.wait(10.0, condition) is not None
+
+        require(wait(client.service_is_ready), f"no service {name}")
         answer = client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(self.node, answer, timeout_sec=10.0)
-        require(answer.done(), f"{name} does not answer")
+        require(wait(answer.done), f"{name} does not answer")
         return answer.result()
 
     def close(self):
