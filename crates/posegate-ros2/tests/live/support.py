@@ -100,6 +100,7 @@ class Peer:
         self.node = rclpy.create_node(name)
         self.listener = PermitListener(self.node, "dock")
         self.poses = self.node.create_publisher(PoseWithCovarianceStamped, "/amcl_pose", qos) if qos else None
+        self.published = 0.0
         self.heartbeats = []
         self.bools = []
         self.states = {}
@@ -120,10 +121,10 @@ class Peer:
     def drive(self, seconds, make=pose, period=0.05, until=None):
         """Publishes poses for a time, or until a condition holds. Returns whether it held."""
         end_s = time.monotonic() + seconds
-        due = 0.0
         while time.monotonic() < end_s:
-            if time.monotonic() >= due:
-                due = time.monotonic() + period
+            # Also across calls: two poses of one millisecond are refused.
+            if time.monotonic() >= self.published + period:
+                self.published = time.monotonic()
                 self.poses.publish(make())
             rclpy.spin_once(self.node, timeout_sec=0.002)
             if until is not None and until():
