@@ -77,7 +77,7 @@ impl Now {
 /// than a cycle; then stamps from before and after are not of one clock.
 #[derive(Clone, Copy, Debug)]
 pub struct ClockWatch {
-    last: Option<(Now, Instant)>,
+    last: Option<(Now, [Instant; 2])>,
 }
 
 impl ClockWatch {
@@ -87,15 +87,25 @@ impl ClockWatch {
         Self { last: None }
     }
 
-    /// Takes the next moment of both clocks. Returns `true` if the system's clock was set since the one before.
-    pub fn was_set(&mut self, now: Now, monotonic: Instant) -> bool {
-        let before = self.last.replace((now, monotonic));
-        let Some((last, since)) = before else {
+    /// Reads both clocks. Returns `true` if the system's clock was set since the last time.
+    pub fn check(&mut self) -> bool {
+        let before = Instant::now();
+        let now = Now::read();
+        self.was_set(now, [before, Instant::now()])
+    }
+
+    /// Takes the next moment of the system's clock, with the monotonic clock just before and just after it. A program that was not
+    /// running in between makes the monotonic time less certain, but is no clock that was set.
+    fn was_set(&mut self, now: Now, [before, after]: [Instant; 2]) -> bool {
+        let Some((last, [last_before, last_after])) = self.last.replace((now, [before, after]))
+        else {
             return false;
         };
-        let passed = monotonic.saturating_duration_since(since);
-        let drift = now.ns - last.ns - nanoseconds(passed);
-        !(drift.abs() <= STEP_MS * 1_000_000)
+        let shortest = nanoseconds(before.saturating_duration_since(last_after));
+        let longest = nanoseconds(after.saturating_duration_since(last_before));
+        let passed = now.ns - last.ns;
+        let most = STEP_MS * 1_000_000;
+        !(passed >= shortest - most && passed <= longest + most)
     }
 }
 
@@ -160,14 +170,20 @@ mod tests {
     fn a_clock_that_is_set_is_found() {
         let start = Instant::now();
         let mut watch = ClockWatch::new();
-        assert!(!watch.was_set(Now::from_ns(0), start));
-        assert!(!watch.was_set(Now::from_ns(SECOND), start + Duration::from_secs(1)));
-        assert!(!watch.was_set(
-            Now::from_ns(SECOND + 10_000_000),
-            start + Duration::from_secs(1)
-        ));
-        assert!(watch.was_set(Now::from_ns(3 * SECOND), start + Duration::from_secs(2)));
-        assert!(watch.was_set(Now::from_ns(SECOND), start + Duration::from_secs(3)));
-        assert!(!watch.was_set(Now::from_ns(2 * SECOND), start + Duration::from_secs(4)));
+        let mut was_set = |system_ms: i128, monotonic_ms: u64, late_ms: u64| {
+            let at = |ms| start + Duration::from_millis(ms);
+            let monotonic = [at(monotonic_ms), at(monotonic_ms + late_ms)];
+            watch.was_set(Now::from_ns(system_ms * 1_000_000), monotonic)
+        };
+        assert!(!was_set(0, 0, 0));
+        assert!(!was_set(1_000, 1_000, 0));
+        assert!(!was_set(1_010, 1_000, 0));
+        // The program did not run for 300 ms between two readings, before or after that of the system's clock.
+        assert!(!was_set(2_300, 2_000, 300));
+        assert!(!was_set(3_000, 3_000, 300));
+        assert!(!was_set(4_000, 4_000, 0));
+        assert!(was_set(6_000, 5_000, 0));
+        assert!(was_set(4_000, 6_000, 0));
+        assert!(!was_set(5_000, 7_000, 0));
     }
 }

@@ -13,6 +13,8 @@ use posegate::track::{Increment, Tracker, TrackerSettings};
 
 /// How many increments of the odometry are kept for fixes that come late: 2.5 s at 50 Hz.
 const INCREMENTS: usize = 128;
+/// Bytes of the table that are compared in a cycle.
+const SCRUBBED: usize = 256;
 
 /// Where a message comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,6 +207,11 @@ impl<'a> PermitGate<'a> {
             Err(reason) => self.gate.inhibit(now_ms, reason),
         };
         answer(now, step)
+    }
+
+    /// Compares the next part of the table with its checksum from the start: all of it every few seconds.
+    pub fn scrub(&mut self) {
+        let _ = self.gate.scrub(SCRUBBED);
     }
 
     /// Ends a permit for a cause outside of the gate.

@@ -134,7 +134,7 @@ impl<'a> Runner<'a> {
 
     /// One control cycle.
     fn cycle(&mut self) {
-        if self.watch.was_set(Now::read(), Instant::now()) {
+        if self.watch.check() {
             self.clock_steps += 1;
             let _ = self.gate.inhibit(Now::read(), Reason::TimeBackwards);
         }
@@ -146,6 +146,7 @@ impl<'a> Runner<'a> {
         }
         self.take_odometry();
         self.take_poses();
+        self.gate.scrub();
         let answer = self.gate.tick(Now::read());
         self.publish(&answer, Instant::now(), false);
         self.serve();

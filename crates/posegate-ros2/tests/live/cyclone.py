@@ -85,7 +85,9 @@ def main():
                 covariance[35] = 1e-5
                 writer.write(PoseStamped(Header(Time(sec, nanosec), "map"), [x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], covariance))
             for message in reader.take(N=10):
-                watch.heartbeat(message, time.time_ns(), time.monotonic_ns())
+                # Not the news that the publisher has left.
+                if isinstance(message, Array):
+                    watch.heartbeat(message, time.time_ns(), time.monotonic_ns())
             if until(watch.permitted(time.monotonic_ns())):
                 return time.monotonic() - begin
             time.sleep(0.002)

@@ -91,7 +91,8 @@ def damaged():
     """Damaged payloads over the network: no permit, and the node stays alive."""
     from rclpy.serialization import serialize_message
 
-    node = start("stands_still:=true")
+    # One good pose is enough to open.
+    node = start("stands_still:=true", "permits_in_a_row:=1", "inhibit_hold_ms:=1")
     peer = Peer(qos=DEEP)
     peer.open()
     peer.poses.publish(pose(x=0.5))

@@ -49,8 +49,12 @@ def gives_and_ends():
     answer = peer.call("/posegate/explain")
     require(answer.success and "deny, " in answer.message, answer)
     peer.open()
-    require(peer.call("/posegate/explain").message == "permit", "explain")
+    answer = peer.call("/posegate/explain", pose)
+    require(answer.message == "permit", answer)
     # An orderly end says so, and faster than silence does.
+    peer.open()
+    peer.drive(0.2)
+    require(peer.listener.permitted(), f"no permit before SIGTERM: {peer.listener.reason()}")
     node.send_signal(signal.SIGTERM)
     took = peer.wait(1.0, lambda: not peer.listener.permitted())
     require(took is not None and node.wait(timeout=5) == 0, "SIGTERM")

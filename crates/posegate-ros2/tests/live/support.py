@@ -100,6 +100,7 @@ class Peer:
         self.node = rclpy.create_node(name)
         self.listener = PermitListener(self.node, "dock")
         self.poses = self.node.create_publisher(PoseWithCovarianceStamped, "/amcl_pose", qos) if qos else None
+        self.published = 0.0
         self.heartbeats = []
         self.bools = []
         self.states = {}
@@ -120,10 +121,10 @@ class Peer:
     def drive(self, seconds, make=pose, period=0.05, until=None):
         """Publishes poses for a time, or until a condition holds. Returns whether it held."""
         end_s = time.monotonic() + seconds
-        due = 0.0
         while time.monotonic() < end_s:
-            if time.monotonic() >= due:
-                due = time.monotonic() + period
+            # Also across calls: two poses of one millisecond are refused.
+            if time.monotonic() >= self.published + period:
+                self.published = time.monotonic()
                 self.poses.publish(make())
             rclpy.spin_once(self.node, timeout_sec=0.002)
             if until is not None and until():
@@ -143,13 +144,16 @@ class Peer:
             rclpy.spin_once(self.node, timeout_sec=0.002)
         return None
 
-    def call(self, name):
-        """Calls a service of the node."""
+    def call(self, name, make=None):
+        """Calls a service of the node, and publishes poses meanwhile."""
         client = self.node.create_client(Trigger, name)
-        require(client.wait_for_service(timeout_sec=10.0), f"no service {name}")
+
+        def wait(condition):
+            return self.drive(10.0, make, until=condition) if make else self.wait(10.0, condition) is not None
+
+        require(wait(client.service_is_ready), f"no service {name}")
         answer = client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(self.node, answer, timeout_sec=10.0)
-        require(answer.done(), f"{name} does not answer")
+        require(wait(answer.done), f"{name} does not answer")
         return answer.result()
 
     def close(self):
