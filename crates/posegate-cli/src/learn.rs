@@ -10,6 +10,7 @@ use posegate_host::learn::{
 use serde_json::{Value, json};
 
 mod check;
+mod taken_with;
 
 /// Learns models for the gate and the planner from recordings
 #[derive(clap::Subcommand)]
@@ -47,6 +48,8 @@ pub struct Bounds {
     /// The seed with which the rows are split
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    taken_with: taken_with::Arguments,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -167,6 +170,7 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         quantile: arguments.quantile,
         confidence: arguments.confidence,
         seed: arguments.seed,
+        taken_with: arguments.taken_with.described(files)?,
     };
     cut(&detections.runs, &name);
     let bar = indicatif::ProgressBar::new_spinner().with_message("fitting");
@@ -210,6 +214,7 @@ fn told(model: &ErrorModel) -> Value {
     let [d, phi, psi] = model.reach();
     let (rows, independent) = model.independent();
     json!({
+        "taken_with": model.taken_with(),
         "rows": rows, "independent_rows": independent, "runs": model.runs(),
         "quantile": model.quantile(), "views": views, "detections": detections, "flip_share": flip_share,
         "reach": {"d_m": d, "phi_deg": phi, "psi_deg": psi},

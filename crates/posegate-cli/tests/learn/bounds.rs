@@ -173,7 +173,7 @@ fn too_few_data_are_refused() {
     for bad in [0.0, 1.0, f64::NAN, -0.5] {
         let settings = BoundsSettings {
             quantile: bad,
-            ..settings
+            ..settings.clone()
         };
         assert!(learn_bounds(&few, &settings).is_err());
     }

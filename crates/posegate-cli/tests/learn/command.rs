@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::process::Command;
 
-fn run(folder: &tempfile::TempDir, line: &str) -> (i32, String, String) {
+pub fn run(folder: &tempfile::TempDir, line: &str) -> (i32, String, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
         .args(line.split_whitespace())
         .current_dir(folder.path())
@@ -19,11 +19,11 @@ fn run(folder: &tempfile::TempDir, line: &str) -> (i32, String, String) {
     )
 }
 
-fn write(folder: &tempfile::TempDir, name: &str, text: &str) {
+pub fn write(folder: &tempfile::TempDir, name: &str, text: &str) {
     std::fs::write(folder.path().join(name), text).unwrap();
 }
 
-fn lines(text: &str) -> Vec<Value> {
+pub fn lines(text: &str) -> Vec<Value> {
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect()

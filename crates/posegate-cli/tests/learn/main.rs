@@ -8,6 +8,7 @@ mod drift;
 mod fleets;
 mod inflation;
 mod law;
+mod provenance;
 mod recorded;
 mod site;
 

@@ -10,9 +10,10 @@ use super::error_model::ErrorModel;
 use super::runs::{self, Tally};
 use super::smooth::{Lattice, Target, fit, floored, share_of};
 use super::split::{Drawn, FITTED, split};
+use super::taken_with::TakenWith;
 
 /// The settings for learning bounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BoundsSettings {
     /// The share of the detections for which each of the two bounds shall hold, above 0 and below 1.
     pub quantile: f64,
@@ -21,6 +22,8 @@ pub struct BoundsSettings {
     pub confidence: f64,
     /// The seed for splitting the detections.
     pub seed: u64,
+    /// What the detections were taken with, if it is known.
+    pub taken_with: Option<TakenWith>,
 }
 
 impl Default for BoundsSettings {
@@ -29,6 +32,7 @@ impl Default for BoundsSettings {
             quantile: 0.95,
             confidence: 0.95,
             seed: 1,
+            taken_with: None,
         }
     }
 }
@@ -78,7 +82,11 @@ pub fn learn_bounds(
         quantile,
         confidence,
         seed,
+        ref taken_with,
     } = *settings;
+    if let Some(what) = taken_with.as_ref().and_then(TakenWith::fault) {
+        return Err(LearnError::TakenWith { what });
+    }
     for (name, value) in [("quantile", quantile), ("confidence", confidence)] {
         if !(value > 0.0 && value < 1.0) {
             return Err(LearnError::Share { name, value });
@@ -154,6 +162,7 @@ pub fn learn_bounds(
         quantile,
         confidence,
         seed,
+        taken_with: taken_with.clone(),
         data: document::Data {
             sha256: hexadecimal(&detections.sha256),
             views: rows.len() as u64,

@@ -22,6 +22,9 @@ pub(super) struct Document {
     pub confidence: f64,
     /// The seed for splitting the detections.
     pub seed: u64,
+    /// What the detections were taken with; `None` if it was not stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken_with: Option<super::TakenWith>,
     pub data: Data,
     /// The ends of the cells.
     pub edges: Edges,

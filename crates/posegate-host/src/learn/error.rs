@@ -16,6 +16,12 @@ pub enum LearnError {
         /// The fault and the expected value.
         what: String,
     },
+    /// What the detections were taken with is impossible.
+    #[error("what the detections were taken with: {what}")]
+    TakenWith {
+        /// The fault.
+        what: &'static str,
+    },
     /// A file with only a header.
     #[error("{file}: there is a header and no row")]
     Empty {

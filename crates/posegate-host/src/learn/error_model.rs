@@ -60,6 +60,12 @@ impl ErrorModel {
         Self::new(document, file)
     }
 
+    /// Returns what the detections were taken with, if the model states it.
+    #[must_use]
+    pub const fn taken_with(&self) -> Option<&super::TakenWith> {
+        self.document.taken_with.as_ref()
+    }
+
     /// Returns the text of its file.
     ///
     /// # Errors
@@ -75,6 +81,13 @@ impl ErrorModel {
         };
         if document.posegate_model != document::VERSION || document.kind != "bounds" {
             return Err(wrong("it is no error model of version 1"));
+        }
+        if let Some(what) = document
+            .taken_with
+            .as_ref()
+            .and_then(super::TakenWith::fault)
+        {
+            return Err(wrong(what));
         }
         for share in [document.quantile, document.confidence] {
             if !(share > 0.0 && share < 1.0) {

@@ -14,6 +14,7 @@ pub use self::inflation::{InflationModel, InflationReport, InflationSettings, le
 pub use self::kind::Model;
 pub use self::outcomes::{OutcomesReport, outcomes, test_outcomes};
 pub use self::runs::{RunSource, Runs};
+pub use self::taken_with::TakenWith;
 pub use self::views::ViewBox;
 
 mod axis;
@@ -36,4 +37,5 @@ mod sheet;
 mod smooth;
 mod split;
 mod student;
+mod taken_with;
 mod views;

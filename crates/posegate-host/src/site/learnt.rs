@@ -4,9 +4,50 @@ use super::error::SiteError;
 use super::places::SiteModel;
 use super::reader::{Node, Table};
 use super::success::{self, Names};
-use super::{ErrorBound, keys};
-use crate::learn::ErrorModel;
+use super::{ErrorBound, SiteCamera, SiteTag, keys};
+use crate::learn::{ErrorModel, TakenWith};
 use posegate::shape::{Exclusion, Shape, Visibility};
+
+/// Refuses a model whose detections were taken with another camera or other tags, as far as both are known.
+pub(super) fn same(
+    node: &Node<'_>,
+    model: &ErrorModel,
+    camera: &SiteCamera,
+    tag: &SiteTag,
+) -> Result<(), SiteError> {
+    let here = TakenWith {
+        tag_size: Some(tag.tag.size),
+        family: Some(tag.family.clone()),
+        ..camera.taken_with()
+    };
+    let Some(difference) = model.taken_with().and_then(|taken| taken.difference(&here)) else {
+        return Ok(());
+    };
+    Err(node
+        .error(format!(
+            "the error model of `{}` was learnt with {difference} as here",
+            node.path()
+        ))
+        .expected("the camera and the tags with which its detections were taken")
+        .help("take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`"))
+}
+
+impl SiteCamera {
+    /// Returns what a model records of the camera with which its detections were taken.
+    #[must_use]
+    pub fn taken_with(&self) -> TakenWith {
+        let [fx, fy] = self.calibration.focal_px;
+        TakenWith {
+            camera: None,
+            fx: Some(fx),
+            fy: Some(fy),
+            image: Some(self.calibration.size_px),
+            lens: Some(self.calibration.lens.name().to_owned()),
+            tag_size: None,
+            family: None,
+        }
+    }
+}
 
 /// Returns the poses of a visibility set at which a learnt model's bounds, plus the errors from the tolerances of tag
 /// and camera, are within `[m, deg]`.

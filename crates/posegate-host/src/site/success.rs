@@ -266,6 +266,7 @@ fn view(
                     },
                 },
                 SiteModel::Learnt(model) => {
+                    learnt::same(&node, model, camera, tag)?;
                     learnt::set(&limit, &view, model, [translation, yaw_deg])?
                 }
             }

@@ -1,0 +1,127 @@
+//! A learnt model records what its detections were taken with, and a site with another camera or tag refuses it by name.
+
+use crate::command::{lines, run, write};
+use crate::law::SQUARES;
+use posegate_host::site::SAMPLE;
+use std::fmt::Write;
+
+const LOOK: &str = "
+[error_model.learnt]
+file = \"m.toml\"
+
+[task.look]
+kind = \"localization\"
+goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
+success = { shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 8.0, phi_max_deg = 25.0, psi_max_deg = 60.0, error_model = \"learnt\", r = { translation = 0.04, yaw_deg = 1.0 } }
+";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n";
+    let mut text = header.to_owned();
+    for row in SQUARES.views(3000, 7, |_| true).rows {
+        let [d, phi, psi] = row.at;
+        match row.errors {
+            Some([t, yaw]) => writeln!(text, "{d},{phi},{psi},1,{t},{yaw}").unwrap(),
+            None => writeln!(text, "{d},{phi},{psi},0,,").unwrap(),
+        }
+    }
+    write(&folder, "d.csv", &text);
+    write(&folder, "site.toml", SAMPLE);
+    folder
+}
+
+/// An error on one line.
+fn joined(err: &str) -> String {
+    let words = err.split_whitespace().filter(|word| *word != "│");
+    words.collect::<Vec<_>>().join(" ")
+}
+
+fn changed(key: &str, from: &str, to: &str) -> String {
+    let changed = SAMPLE.replacen(from, to, 1);
+    assert_ne!(changed, SAMPLE, "{key}: the sample has no {from}");
+    changed + LOOK
+}
+
+#[test]
+fn a_site_with_another_camera_or_tag_is_refused() {
+    let folder = folder();
+    let (code, out, err) = run(
+        &folder,
+        "learn bounds d.csv --quantile 0.9 -o m.toml --camera front --site site.toml --json",
+    );
+    assert_eq!(code, 0, "{err}");
+    let taken = &lines(&out)[0]["taken_with"];
+    assert_eq!(taken["camera"], "front", "{out}");
+    assert_eq!(taken["family"], "tag36h11", "{out}");
+    let number = |key: &str| taken[key].as_f64().unwrap();
+    let (fx, size) = (number("fx"), number("tag_size"));
+    // The same site, and one whose calibration differs as much as another calibration of the same camera.
+    write(&folder, "here.toml", &format!("{SAMPLE}{LOOK}"));
+    let (code, _, err) = run(&folder, "check here.toml");
+    assert_eq!(code, 0, "{err}");
+    let key = |name: &str, value: f64| {
+        let text = [format!("{name} = {value:?}"), format!("{name} = {value}")];
+        let found = text.into_iter().find(|text| SAMPLE.contains(text));
+        found.unwrap_or_else(|| panic!("{name} = {value}"))
+    };
+    for (name, from, factor, refused) in [
+        ("fx", fx, 1.004, false),
+        ("fx", fx, 1.02, true),
+        ("size", size, 1.05, true),
+    ] {
+        let to = format!("{name} = {:?}", from * factor);
+        write(&folder, "there.toml", &changed(name, &key(name, from), &to));
+        let (code, _, err) = run(&folder, "check there.toml");
+        assert_eq!(code, if refused { 2 } else { 0 }, "{name} {factor}: {err}");
+        assert_eq!(joined(&err).contains("was learnt with"), refused, "{err}");
+        assert!(!refused || err.contains("there.toml"), "{err}");
+    }
+    let other = changed("family", "tag36h11", "tag25h9");
+    write(&folder, "there.toml", &other);
+    let (code, _, err) = run(&folder, "check there.toml");
+    assert_eq!(code, 2, "{err}");
+    assert!(
+        joined(&err).contains("tags of the family tag36h11, not tag25h9"),
+        "{err}"
+    );
+}
+
+#[test]
+fn what_data_were_taken_with_is_stated_without_a_site() {
+    let folder = folder();
+    let (code, out, err) = run(
+        &folder,
+        "learn bounds d.csv --quantile 0.9 -o m.toml --fx 1234.5 --tag-size 0.31 --family tag36h11 --json",
+    );
+    assert_eq!(code, 0, "{err}");
+    let taken = &lines(&out)[0]["taken_with"];
+    assert_eq!(taken["fx"], 1234.5);
+    assert_eq!(taken["tag_size"], 0.31);
+    write(&folder, "here.toml", &format!("{SAMPLE}{LOOK}"));
+    let (code, _, err) = run(&folder, "check here.toml");
+    assert_eq!(code, 2);
+    assert!(joined(&err).contains("fx 1234.5 px"), "{err}");
+    // Nothing stated is nothing compared.
+    let (code, out, err) = run(
+        &folder,
+        "learn bounds d.csv --quantile 0.9 -o m.toml --json",
+    );
+    assert_eq!(code, 0, "{err}");
+    assert!(lines(&out)[0]["taken_with"].is_null());
+    assert_eq!(run(&folder, "check here.toml").0, 0);
+    for (options, words) in [
+        ("--camera front", "--site"),
+        ("--camera side --site site.toml", "no camera `side`"),
+        ("--fx -3", "above 0"),
+        ("--fx nan", "above 0"),
+        ("--fx 3 --tag-size 0", "above 0"),
+        ("--fx 3 --camera front --site site.toml", "--camera"),
+    ] {
+        let line = format!("learn bounds d.csv --quantile 0.9 -o other.toml {options}");
+        let (code, _, err) = run(&folder, &line);
+        assert_eq!(code, 2, "{options}: {err}");
+        assert!(joined(&err).contains(words), "{options}: {err}");
+        assert!(!folder.path().join("other.toml").exists());
+    }
+}

@@ -1,0 +1,74 @@
+//! What detections were taken with: a bound holds for this camera and these tags only.
+
+use serde::{Deserialize, Serialize};
+
+/// The camera and the tags of the detections from which bounds were learnt. What is not known is not compared.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TakenWith {
+    /// The camera's name, for people. Not compared: another site may give it another name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// The focal length along a row, pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fx: Option<f64>,
+    /// The focal length along a column, pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fy: Option<f64>,
+    /// Width and height of the image, pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image: Option<[f64; 2]>,
+    /// The model of the lens, as ROS names it; `none` without distortion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<String>,
+    /// The width of the tags, metres: of the border that detectors measure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag_size: Option<f64>,
+    /// The family of the tags, as detectors name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub family: Option<String>,
+}
+
+/// The share by which two calibrations of one camera, or two measurements of one tag, may differ.
+const ALIKE: f64 = 0.01;
+
+impl TakenWith {
+    /// Returns what is wrong with the description itself.
+    #[must_use]
+    pub fn fault(&self) -> Option<&'static str> {
+        let numbers = [self.fx, self.fy, self.tag_size];
+        let sides = self.image.into_iter().flatten();
+        let mut all = numbers.into_iter().flatten().chain(sides);
+        all.any(|value| !(value > 0.0 && value.is_finite()))
+            .then_some("focal lengths, image and tag size are numbers above 0")
+    }
+
+    /// Returns in what another camera or tag differs, in words, or `None` if nothing that is known of both does.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let number = |name: &str, a: Option<f64>, b: Option<f64>, unit: &str| {
+            let (a, b) = (a?, b?);
+            ((a - b).abs() > ALIKE * a.abs().max(b.abs()))
+                .then(|| format!("{name} {a} {unit}, not {b} {unit}"))
+        };
+        let text = |name: &str, a: &Option<String>, b: &Option<String>| {
+            let (a, b) = (a.as_ref()?, b.as_ref()?);
+            (a != b).then(|| format!("{name} {a}, not {b}"))
+        };
+        let image = || {
+            let (a, b) = (self.image?, other.image?);
+            (a != b).then(|| {
+                format!(
+                    "images of {} x {} px, not {} x {} px",
+                    a[0], a[1], b[0], b[1]
+                )
+            })
+        };
+        number("fx", self.fx, other.fx, "px")
+            .or_else(|| number("fy", self.fy, other.fy, "px"))
+            .or_else(image)
+            .or_else(|| text("a lens of the model", &self.lens, &other.lens))
+            .or_else(|| number("tags of", self.tag_size, other.tag_size, "m"))
+            .or_else(|| text("tags of the family", &self.family, &other.family))
+    }
+}
