@@ -71,9 +71,9 @@ mod controller {
             maximum_gap_ms: 1,
             maximum_fix_age_ms: 1,
         }))?;
-        for stamp_ms in black_box([0, 1]) {
+        for span_ms in black_box([[0, 0], [0, 1]]) {
             let ahead_m = black_box(0.0);
-            let increment = Increment::of(ahead_m, ahead_m, ahead_m, stamp_ms)?;
+            let increment = Increment::of(ahead_m, ahead_m, ahead_m, span_ms)?;
             let body = increment_body(&increment);
             let received = increment_from_body(black_box(&body)).ok()?;
             black_box(tracker.odometry(received).is_ok());

@@ -121,12 +121,12 @@ pub enum InvalidParameter {
     InterlockTime,
     /// The report period is zero, or at least half of the range of the millisecond clock.
     ReportPeriod,
-    /// A permit ends before the next report comes, so permits in a row are never counted.
+    /// A permit ends before the next report comes: permits in a row are never counted, or the inhibit hold time is not over then.
     PermitHoldTooShort {
         /// The least permit hold time that would do, in milliseconds.
         least_ms: u32,
     },
-    /// An estimate is too old before the next report comes, so permits in a row are never counted.
+    /// An estimate is too old before the next report comes, with the same result.
     MaximumAgeTooShort {
         /// The least maximum age that would do, in milliseconds.
         least_ms: u32,
@@ -193,7 +193,8 @@ impl Settings<'static> {
     ///
     /// Two reports arrive at most `period_ms + jitter_ms` apart, and the older one is at most that old when the next one arrives:
     /// - `report_period_ms` is this time.
-    /// - `response_ms` is 20: set it to that of your controller, and add the difference to the two times that follow.
+    /// - `response_ms` is 20: set it to that of your controller, and add the difference to the permit hold time and twice the difference to
+    ///   the maximum age.
     /// - `permit_hold_ms` adds one response, since a report may wait for the next cycle.
     /// - `maximum_age_ms` adds two, since the age counts up to the end of the permission.
     /// - `inhibit_hold_ms` is this time: after a denial at least one further report is evaluated before the gate opens.
@@ -248,6 +249,20 @@ impl Settings<'_> {
             if self.oldest_ms() < period {
                 let least_ms = period.saturating_add(self.response_ms);
                 return Err(InvalidParameter::MaximumAgeTooShort { least_ms });
+            }
+        } else {
+            // A permit that ends by itself restarts the inhibit hold time, which must be over when the next report comes.
+            let lasts = self.permit_hold_ms.min(self.oldest_ms());
+            let again = lasts
+                .saturating_add(self.inhibit_hold_ms)
+                .saturating_add(self.response_ms);
+            if lasts < period && again > period {
+                return Err(if self.permit_hold_ms < period {
+                    InvalidParameter::PermitHoldTooShort { least_ms: period }
+                } else {
+                    let least_ms = period.saturating_add(self.response_ms);
+                    InvalidParameter::MaximumAgeTooShort { least_ms }
+                });
             }
         }
         if self.task.is_empty() {

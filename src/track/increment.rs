@@ -4,18 +4,26 @@ use crate::motion::MotionBounds;
 use crate::num::{BinaryAngle, Float, Rounding, sqrt_ceil};
 use crate::set::Q24_PER_RADIAN_Q52;
 
-/// A movement since the increment before, in the robot's axes at its start.
+/// A movement since the increment before, in the robot's axes at its start. It states when it began, so that a lost one is noticed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Increment {
+    pub(super) step: Step,
+    pub(super) begins_ms: u32,
+}
+
+/// A movement up to a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Step {
     /// Along the robot's axis, micrometres: at most 4 m either way.
-    pub(super) x_um: i32,
+    pub x_um: i32,
     /// To the robot's left, micrometres.
-    pub(super) y_um: i32,
+    pub y_um: i32,
     /// Counter-clockwise, 2^-32 turn.
-    pub(super) turn: i32,
+    pub turn: i32,
     /// The time at its end, milliseconds of the controller's clock.
-    pub(super) stamp_ms: u32,
+    pub stamp_ms: u32,
 }
 
 /// Half a turn, 2^-24 turn.
@@ -24,10 +32,11 @@ const HALF_TURN_Q24: u64 = 1 << 23;
 const LONGEST: i32 = 1 << 22;
 
 impl Increment {
-    /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit. `None` if a
-    /// number is not finite, a way is longer than 4 m, or the turn is half a turn or more.
+    /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit, and the times of
+    /// its beginning and its end: the end of one is the beginning of the next. `None` if a number is not finite, a way is longer than
+    /// 4 m, or the turn is half a turn or more.
     #[must_use]
-    pub fn of(ahead_m: f64, left_m: f64, turn_rad: f64, stamp_ms: u32) -> Option<Self> {
+    pub fn of(ahead_m: f64, left_m: f64, turn_rad: f64, span_ms: [u32; 2]) -> Option<Self> {
         let length = |value: f64| {
             let um = Float::of(value)?.scaled(1_000_000, 0, Rounding::Nearest)?;
             i32::try_from(um).ok()
@@ -35,39 +44,50 @@ impl Increment {
         let q24 = Float::of(turn_rad)?.scaled(Q24_PER_RADIAN_Q52, 52, Rounding::AwayFromZero)?;
         let is_turn = q24.unsigned_abs() < HALF_TURN_Q24;
         let turn = BinaryAngle::from_radians(turn_rad).filter(|_| is_turn)?;
-        Self::new(length(ahead_m)?, length(left_m)?, turn.signed(), stamp_ms)
+        Self::new(length(ahead_m)?, length(left_m)?, turn.signed(), span_ms)
     }
 
-    /// Returns an increment from micrometres and units of 2^-32 turn. `None` if a way is longer than 4 m.
+    /// Returns an increment from micrometres and units of 2^-32 turn, and the times of its beginning and its end. `None` if a way is longer
+    /// than 4 m.
     #[must_use]
-    pub const fn new(ahead_um: i32, left_um: i32, turn: i32, stamp_ms: u32) -> Option<Self> {
+    pub const fn new(
+        ahead_um: i32,
+        left_um: i32,
+        turn: i32,
+        [begins_ms, stamp_ms]: [u32; 2],
+    ) -> Option<Self> {
         let is_short = ahead_um.unsigned_abs() <= LONGEST.unsigned_abs()
             && left_um.unsigned_abs() <= LONGEST.unsigned_abs();
         if !is_short {
             return None;
         }
         Some(Self {
-            x_um: ahead_um,
-            y_um: left_um,
-            turn,
-            stamp_ms,
+            step: Step {
+                x_um: ahead_um,
+                y_um: left_um,
+                turn,
+                stamp_ms,
+            },
+            begins_ms,
         })
     }
 
-    /// Returns the time at its end, milliseconds of the controller's clock.
+    /// Returns the times of its beginning and its end, milliseconds of the controller's clock.
     #[must_use]
-    pub const fn stamp_ms(&self) -> u32 {
-        self.stamp_ms
+    pub const fn span_ms(&self) -> [u32; 2] {
+        [self.begins_ms, self.step.stamp_ms]
     }
 
     /// Returns the ways ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn.
     #[must_use]
     pub const fn entries(&self) -> [i32; 3] {
-        [self.x_um, self.y_um, self.turn]
+        [self.step.x_um, self.step.y_um, self.step.turn]
     }
+}
 
+impl Step {
     /// The length of the way, micrometres, rounded up.
-    pub(super) fn length_um(&self) -> u32 {
+    pub fn length_um(&self) -> u32 {
         if self.y_um == 0 {
             return self.x_um.unsigned_abs();
         }
@@ -81,20 +101,20 @@ impl Increment {
     }
 
     /// The size of the turn, 2^-24 turn, rounded up.
-    pub(super) fn turn_q24(&self) -> u32 {
+    pub fn turn_q24(&self) -> u32 {
         self.turn.unsigned_abs().wrapping_add(0xff) >> 8
     }
 
     /// Whether a robot can move like this within a time, with a millisecond for the rounding of both stamps.
-    pub(super) fn is_within(&self, bounds: MotionBounds, ms: u32) -> bool {
+    pub fn is_within(&self, bounds: MotionBounds, ms: u32) -> bool {
         let most = bounds.within(ms.saturating_add(1));
         let length_um = u64::from(most.translation_um().unsigned_abs().saturating_add(2));
         self.length_squared() <= length_um.wrapping_mul(length_um)
             && self.turn_q24() <= most.yaw_q24().unsigned_abs().saturating_add(2)
     }
 
-    /// Returns the first `after` of `whole` parts of the increment, from its end.
-    pub(super) fn part(&self, [after, whole]: [u32; 2]) -> Self {
+    /// Returns the first `after` of `whole` parts of the movement, from its end.
+    pub fn part(&self, [after, whole]: [u32; 2]) -> Self {
         let share = |value: i32| {
             let product = i64::from(value).wrapping_mul(i64::from(after));
             product.checked_div(i64::from(whole)).unwrap_or(0) as i32

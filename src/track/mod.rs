@@ -30,7 +30,7 @@
 //! };
 //! // The odometry at 50 Hz, 5 mm ahead each time. The fix arrives late.
 //! for cycle in 0..10u32 {
-//!     let increment = Increment::of(0.005, 0.0, 0.0, 960 + 20 * cycle).expect("a short way");
+//!     let increment = Increment::of(0.005, 0.0, 0.0, [940 + 20 * cycle, 960 + 20 * cycle]).expect("a short way");
 //!     tracker.odometry(increment)?;
 //! }
 //! tracker.fix(&fix)?;
@@ -162,31 +162,41 @@ impl<const N: usize> Tracker<N> {
     pub fn odometry(&mut self, increment: Increment) -> Result<(), Reason> {
         let Some(before) = self.newest_ms else {
             // Where it began is not known, so it only marks the time.
-            self.restart(increment.stamp_ms);
+            self.restart(increment.step.stamp_ms);
             return Ok(());
         };
-        let passed = increment.stamp_ms.wrapping_sub(before);
+        let Increment { step, begins_ms } = increment;
+        let passed = step.stamp_ms.wrapping_sub(before);
         let broken = if !(1..1 << 31).contains(&passed) {
             Some(Reason::OdometryBackwards)
-        } else if !(passed <= self.settings.maximum_gap_ms) {
+        } else if begins_ms != before || !(passed <= self.settings.maximum_gap_ms) {
+            // One that began elsewhere: another was lost in between.
             Some(Reason::OdometryGap)
-        } else if !increment.is_within(self.settings.bounds, passed) {
+        } else if !step.is_within(self.settings.bounds, passed) {
             Some(Reason::OdometryJump)
         } else {
             None
         };
         if let Some(reason) = broken {
-            self.restart(increment.stamp_ms);
+            self.restart(step.stamp_ms);
             return Err(reason);
         }
-        if let Some(oldest) = self.ring.push(increment) {
+        if let Some(oldest) = self.ring.push(step) {
             self.begins_ms = oldest.stamp_ms;
         }
-        self.newest_ms = Some(increment.stamp_ms);
+        self.newest_ms = Some(step.stamp_ms);
+        let most = self.settings.maximum_fix_age_ms;
+        self.fix
+            .take_if(|fix| step.stamp_ms.wrapping_sub(fix.report.stamp_ms) as i32 > most as i32);
         if let Some(fix) = &mut self.fix {
-            fix.way.add(&increment, passed, &self.noise);
+            fix.way.add(&step, passed, &self.noise);
         }
         Ok(())
+    }
+
+    /// Forgets the fix: for one that came and cannot be carried, such as one of several hypotheses.
+    pub fn drop_fix(&mut self) {
+        self.fix = None;
     }
 
     /// Forgets the way and the fix, as after a jump: for odometry that is not a number. The next increment marks only the time.
@@ -202,19 +212,37 @@ impl<const N: usize> Tracker<N> {
         self.fix = None;
     }
 
-    /// Takes a fix, also one that comes late: it is carried along the increments since its stamp. A fix that is not newer than the one
-    /// that is carried changes nothing.
+    /// Takes a fix, also one that comes late: it is carried along the increments since its stamp.
+    ///
+    /// All fixes come from one source, each with another sequence number: a source that sends an old estimate with a new stamp would
+    /// place the robot where it was. After such a fix, and after one of another source, nothing is carried until the next.
     ///
     /// # Errors
     /// [`Reason::Silent`] if there was no odometry yet; [`Reason::OdometryTooShort`] if the kept increments do not reach back to the
     /// stamp; [`Reason::TimeBackwards`] if the fix is not newer than the one that is carried, or newer than the odometry by more than
-    /// its longest gap. The tracker then carries what it carried before.
+    /// its longest gap. The tracker then carries what it carried before. [`Reason::SequenceStuck`], [`Reason::SourceChanged`] or
+    /// [`Reason::FrameMismatch`]: the tracker then carries nothing.
     pub fn fix(&mut self, report: &Report) -> Result<(), Reason> {
         let newest = self.newest_ms.ok_or(Reason::Silent)?;
         if let Some(fix) = &self.fix
             && !(1..1 << 31).contains(&report.stamp_ms.wrapping_sub(fix.report.stamp_ms))
         {
             return Err(Reason::TimeBackwards);
+        }
+        if let Some(Fix { report: last, .. }) = &self.fix {
+            let wrong = if report.source != last.source {
+                Some(Reason::SourceChanged)
+            } else if report.frame != last.frame {
+                Some(Reason::FrameMismatch)
+            } else if report.sequence == last.sequence {
+                Some(Reason::SequenceStuck)
+            } else {
+                None
+            };
+            if let Some(reason) = wrong {
+                self.fix = None;
+                return Err(reason);
+            }
         }
         let mut way = Way::START;
         let ahead = report.stamp_ms.wrapping_sub(newest);
@@ -224,7 +252,7 @@ impl<const N: usize> Tracker<N> {
             if !(ahead <= self.settings.maximum_gap_ms) {
                 return Err(Reason::TimeBackwards);
             }
-            way.leave_out(self.settings.bounds.within(ahead));
+            way.leave_out(self.settings.bounds.within(ahead.wrapping_add(1)));
         } else {
             let from_ms = self.begins_ms;
             if !(report.stamp_ms.wrapping_sub(from_ms) < 1 << 31) {
@@ -237,13 +265,17 @@ impl<const N: usize> Tracker<N> {
                 let after = increment.stamp_ms.wrapping_sub(report.stamp_ms);
                 if (1..1 << 31).contains(&after) {
                     if after < passed {
-                        way.add_part(increment, [after, passed], &self.noise);
+                        // The robot may have moved unevenly: back and forth within its bounds.
+                        way.add(&increment.part([after, passed]), after, &self.noise);
+                        way.leave_out(self.settings.bounds.within(unevenness([after, passed])));
                     } else {
                         way.add(increment, passed, &self.noise);
                     }
                 }
                 since = increment.stamp_ms;
             }
+            // A millisecond for the rounding of the stamps.
+            way.leave_out(self.settings.bounds.within(1));
         }
         self.fix = Some(Fix {
             report: *report,
@@ -327,6 +359,18 @@ impl<const N: usize> Tracker<N> {
         };
         Ok((belief, beside))
     }
+}
+
+/// Returns for how long a robot at its bounds moves as far as it can be from an even movement, milliseconds, when a time of an increment
+/// of `whole` is left: with a known end, at most `2 after (whole - after) / whole`. Rounded up, with a millisecond for the stamps of the
+/// increment.
+fn unevenness([after, whole]: [u32; 2]) -> u32 {
+    let before = whole.wrapping_sub(after);
+    let product = u64::from(after)
+        .wrapping_mul(u64::from(before))
+        .wrapping_mul(2);
+    let ms = product.checked_div(u64::from(whole)).unwrap_or(0);
+    (ms as u32).saturating_add(2)
 }
 
 /// What a way adds to a covariance, in the robot's axes at its start, turned into world axes.

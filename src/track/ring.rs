@@ -1,18 +1,19 @@
-//! The newest increments, in memory of fixed size.
+//! The newest movements, in memory of fixed size.
 
-use super::Increment;
+use super::increment::Step;
 use heapless::Vec;
 
-/// The newest N increments. An array whose oldest entry is overwritten: `heapless::Deque` has arithmetic that may panic.
+/// The newest N movements. An array whose oldest entry is overwritten: `heapless::Deque` has arithmetic that may panic.
 #[derive(Debug)]
 pub(super) struct Ring<const N: usize> {
     /// From `oldest` to the end, then from the start.
-    items: Vec<Increment, N>,
+    items: Vec<Step, N>,
     oldest: usize,
 }
 
 impl<const N: usize> Ring<N> {
     pub const fn new() -> Self {
+        const { assert!(N > 0, "a tracker keeps one increment at least") };
         Self {
             items: Vec::new(),
             oldest: 0,
@@ -24,7 +25,7 @@ impl<const N: usize> Ring<N> {
     }
 
     /// Adds the newest increment. Returns the oldest one if it had to leave.
-    pub fn push(&mut self, newest: Increment) -> Option<Increment> {
+    pub fn push(&mut self, newest: Step) -> Option<Step> {
         let Err(newest) = self.items.push(newest) else {
             return None;
         };
@@ -35,8 +36,8 @@ impl<const N: usize> Ring<N> {
         Some(left)
     }
 
-    /// Returns the increments from the oldest to the newest.
-    pub fn iter(&self) -> impl Iterator<Item = &Increment> {
+    /// Returns the movements from the oldest to the newest.
+    pub fn iter(&self) -> impl Iterator<Item = &Step> {
         let later = self.items.get(..self.oldest).unwrap_or_default();
         let first = self.items.get(self.oldest..).unwrap_or_default();
         first.iter().chain(later)
@@ -51,7 +52,12 @@ mod tests {
 
     #[test]
     fn it_keeps_the_newest_in_order() {
-        let of = |stamp_ms| Increment::new(1, 2, 3, stamp_ms).unwrap();
+        let of = |stamp_ms| Step {
+            x_um: 1,
+            y_um: 2,
+            turn: 3,
+            stamp_ms,
+        };
         let mut ring = Ring::<5>::new();
         let mut expected = VecDeque::new();
         for stamp in 0..23 {
@@ -62,7 +68,7 @@ mod tests {
                 None
             };
             assert_eq!(ring.push(of(stamp)), left);
-            let kept: List<Increment> = ring.iter().copied().collect();
+            let kept: List<Step> = ring.iter().copied().collect();
             assert_eq!(kept, expected.iter().copied().collect::<List<_>>());
         }
         ring.clear();

@@ -47,7 +47,7 @@ fn fix(pose: [f64; 3], covariance: [[f64; 3]; 3], stamp_ms: u32) -> Report {
     Report {
         source: 3,
         frame: FrameId::of("map"),
-        sequence: 77,
+        sequence: stamp_ms,
         stamp_ms,
         belief: PoseEstimate::new(
             Estimate { x_m, y_m, yaw_rad },
@@ -128,7 +128,7 @@ fn carried_sets_hold_the_truth_and_are_not_much_larger_than_exact_ones() {
         let estimate: [f64; 3] = core::array::from_fn(|i| start[i] + error[i]);
         let (speed, rate) = (random.within(-0.5, 1.5), random.within(-1.5, 1.5));
         tracker
-            .odometry(Increment::of(0.0, 0.0, 0.0, 1_000).unwrap())
+            .odometry(Increment::of(0.0, 0.0, 0.0, [980, 1_000]).unwrap())
             .unwrap();
         tracker.fix(&fix(estimate, p, 1_000)).unwrap();
         let (mut truth, mut mean, mut exact) = (start, estimate, p);
@@ -140,7 +140,12 @@ fn carried_sets_hold_the_truth_and_are_not_much_larger_than_exact_ones() {
             let heading = 9e-4 * turn + 4e-4 * way + 4e-6 * 0.02;
             let deviation = [plane.sqrt(), plane.sqrt(), heading.sqrt()];
             let read: [f64; 3] = core::array::from_fn(|i| done[i] + deviation[i] * random.normal());
-            let increment = Increment::of(read[0], read[1], read[2], 1_000 + 20 * cycle);
+            let increment = Increment::of(
+                read[0],
+                read[1],
+                read[2],
+                [980 + 20 * cycle, 1_000 + 20 * cycle],
+            );
             tracker.odometry(increment.unwrap()).unwrap();
             let after = moved(mean, read);
             let g = [
@@ -209,7 +214,7 @@ fn slip_at_its_bound_is_told_beside() {
         let start = [1.0, -2.0, random.within(-3.0, 3.0)];
         let tiny = [[1e-10, 0.0, 0.0], [0.0, 1e-10, 0.0], [0.0, 0.0, 1e-10]];
         tracker
-            .odometry(Increment::of(0.0, 0.0, 0.0, 1_000).unwrap())
+            .odometry(Increment::of(0.0, 0.0, 0.0, [980, 1_000]).unwrap())
             .unwrap();
         tracker.fix(&fix(start, tiny, 1_000)).unwrap();
         let (speed, rate) = (random.within(0.1, 1.0), random.within(-1.0, 1.0));
@@ -226,7 +231,15 @@ fn slip_at_its_bound_is_told_beside() {
         for cycle in 1..=80u32 {
             let read = [speed * 0.02, 0.0, rate * 0.02];
             tracker
-                .odometry(Increment::of(read[0], read[1], read[2], 1_000 + 20 * cycle).unwrap())
+                .odometry(
+                    Increment::of(
+                        read[0],
+                        read[1],
+                        read[2],
+                        [980 + 20 * cycle, 1_000 + 20 * cycle],
+                    )
+                    .unwrap(),
+                )
                 .unwrap();
             let slipped = 0.0499 * read[0];
             let turned = side * (0.0999 * read[2].abs() + 0.01999 * read[0]);
@@ -255,7 +268,7 @@ fn a_late_fix_is_carried_along_the_increments_since_its_stamp() {
     let report = fix([0.5, 0.25, 1.0], p, 1_100);
     let way = |cycle: u32| {
         let side = f64::from(cycle % 7) * 0.0005;
-        Increment::of(0.008, side, 0.01, 1_000 + 20 * cycle).unwrap()
+        Increment::of(0.008, side, 0.01, [980 + 20 * cycle, 1_000 + 20 * cycle]).unwrap()
     };
     let (mut late, mut timely) = (
         Tracker::<64>::new(settings(ERRORS)).unwrap(),
@@ -281,13 +294,14 @@ fn a_late_fix_is_carried_along_the_increments_since_its_stamp() {
 #[test]
 fn what_breaks_the_way_is_named() {
     let p = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
-    let at = |stamp_ms: u32| Increment::of(0.004, 0.0, 0.0, stamp_ms).unwrap();
+    let span = |span_ms: [u32; 2]| Increment::of(0.004, 0.0, 0.0, span_ms).unwrap();
     let ready = || {
         let mut tracker = Tracker::<8>::new(settings(ERRORS)).unwrap();
         // Near the wrap of the clock.
         for cycle in 0..20u32 {
+            let ends = cycle.wrapping_mul(20).wrapping_sub(200);
             tracker
-                .odometry(at(cycle.wrapping_mul(20).wrapping_sub(200)))
+                .odometry(span([ends.wrapping_sub(20), ends]))
                 .unwrap();
         }
         tracker
@@ -313,15 +327,18 @@ fn what_breaks_the_way_is_named() {
         Err(Reason::TimeBackwards)
     );
     for (increment, reason) in [
-        (at(newest), Reason::OdometryBackwards),
-        (at(newest - 1), Reason::OdometryBackwards),
-        (at(newest + 61), Reason::OdometryGap),
+        (span([newest - 20, newest]), Reason::OdometryBackwards),
+        (span([newest, newest - 1]), Reason::OdometryBackwards),
+        (span([newest, newest + 61]), Reason::OdometryGap),
+        // The one from 180 to 200 ms was lost.
+        (span([newest + 20, newest + 40]), Reason::OdometryGap),
+        (span([newest - 1, newest + 20]), Reason::OdometryGap),
         (
-            Increment::of(0.05, 0.0, 0.0, newest + 20).unwrap(),
+            Increment::of(0.05, 0.0, 0.0, [newest, newest + 20]).unwrap(),
             Reason::OdometryJump,
         ),
         (
-            Increment::of(0.0, 0.0, 0.2, newest + 20).unwrap(),
+            Increment::of(0.0, 0.0, 0.2, [newest, newest + 20]).unwrap(),
             Reason::OdometryJump,
         ),
     ] {
@@ -331,17 +348,41 @@ fn what_breaks_the_way_is_named() {
         // The way is broken: the old fix is of no use.
         assert_eq!(tracker.tracked(newest + 20), Err(Reason::Silent));
     }
+    // A source that is stuck, another one, and another frame: nothing is carried any more.
+    type Change = fn(&mut Report);
+    let changes: [(Change, Reason); 3] = [
+        (|fix| fix.sequence = 150, Reason::SequenceStuck),
+        (|fix| fix.source += 1, Reason::SourceChanged),
+        (|fix| fix.frame = FrameId::of("odom"), Reason::FrameMismatch),
+    ];
+    for (change, reason) in changes {
+        let mut tracker = ready();
+        tracker.fix(&good).unwrap();
+        let mut next = fix([0.0; 3], p, 170);
+        assert_eq!(tracker.fix(&next), Ok(()));
+        next.stamp_ms = 180;
+        next.sequence = 171;
+        change(&mut next);
+        if next.sequence == 150 {
+            next.sequence = 170;
+        }
+        assert_eq!(tracker.fix(&next), Err(reason));
+        assert_eq!(tracker.tracked(newest), Err(Reason::Silent));
+    }
     // A fix grows old where the odometry goes on.
     let mut tracker = ready();
     tracker.fix(&good).unwrap();
     let mut now = newest;
     while now < 5_130 {
+        tracker.odometry(span([now, now + 50])).unwrap();
         now += 50;
-        tracker.odometry(at(now)).unwrap();
     }
     assert!(tracker.tracked(5_150).is_ok());
-    tracker.odometry(at(now + 1)).unwrap();
+    tracker.odometry(span([now, now + 1])).unwrap();
     assert_eq!(tracker.tracked(5_151), Err(Reason::Stale));
+    // It is dropped, so that it does not seem new when the clock wraps.
+    tracker.odometry(span([now + 1, now + 41])).unwrap();
+    assert_eq!(tracker.tracked(now + 41), Err(Reason::Silent));
 }
 
 /// Every report is new to a gate if the odometry is, and a repeated one is the same.
@@ -350,13 +391,13 @@ fn sequence_numbers_count_the_stamps() {
     let p = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
     let mut tracker = Tracker::<8>::new(settings(ERRORS)).unwrap();
     tracker
-        .odometry(Increment::of(0.0, 0.0, 0.0, 0).unwrap())
+        .odometry(Increment::of(0.0, 0.0, 0.0, [0, 0]).unwrap())
         .unwrap();
     tracker.fix(&fix([0.0; 3], p, 0)).unwrap();
     let first = tracker.tracked(1).unwrap();
     assert_eq!(tracker.tracked(5), Ok(first));
     tracker
-        .odometry(Increment::of(0.0, 0.0, 0.0, 20).unwrap())
+        .odometry(Increment::of(0.0, 0.0, 0.0, [0, 20]).unwrap())
         .unwrap();
     let second = tracker.tracked(21).unwrap();
     assert_eq!(second.report.sequence, first.report.sequence + 1);
@@ -368,7 +409,7 @@ fn sequence_numbers_count_the_stamps() {
 fn a_bounded_fix_is_carried_as_a_cylinder() {
     let mut tracker = Tracker::<8>::new(settings(ERRORS)).unwrap();
     tracker
-        .odometry(Increment::of(0.0, 0.0, 0.0, 0).unwrap())
+        .odometry(Increment::of(0.0, 0.0, 0.0, [0, 0]).unwrap())
         .unwrap();
     let mut report = fix([0.0; 3], [[0.0; 3]; 3], 0);
     report.belief.spread = Some(Uncertainty::Bounded {
@@ -378,13 +419,14 @@ fn a_bounded_fix_is_carried_as_a_cylinder() {
     tracker.fix(&report).unwrap();
     for cycle in 1..=50u32 {
         tracker
-            .odometry(Increment::of(0.02, 0.0, 0.0, 20 * cycle).unwrap())
+            .odometry(Increment::of(0.02, 0.0, 0.0, [20 * cycle - 20, 20 * cycle]).unwrap())
             .unwrap();
     }
     let tracked = tracker.tracked(1_000).unwrap();
-    // 1 m ahead: 0.02 rad at the start are 2 cm there.
+    // 1 m ahead: 0.02 rad at the start are 2 cm there. What a robot of 2 m/s and 3 rad/s moves in a millisecond, by which stamps are
+    // rounded, is 2 mm and 3 mrad.
     let beside = f64::from(tracked.beside.translation_um()) * 1e-6;
-    assert!((0.07..0.075).contains(&beside), "{beside}");
+    assert!((0.075..0.08).contains(&beside), "{beside}");
     let set = tracked
         .report
         .belief

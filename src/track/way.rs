@@ -3,7 +3,7 @@
 //! Everything is in the robot's axes at the fix. An increment `w` (turned to these axes) moves the error of the place by `J w` times the
 //! error of the heading, so the covariance N of both grows by `G N G'` and the increment's own noise.
 
-use super::increment::Increment;
+use super::increment::Step;
 use super::model::Noise;
 use super::turned;
 use crate::num::{BinaryAngle, Float, Rounding, wide};
@@ -91,7 +91,7 @@ impl Way {
 
     /// Adds an increment that lasted for a time, milliseconds.
     #[inline(never)]
-    pub fn add(&mut self, increment: &Increment, ms: u32, noise: &Noise) {
+    pub fn add(&mut self, increment: &Step, ms: u32, noise: &Noise) {
         let [c, s] = BinaryAngle(self.turn).cos_sin_q30().map(i64::from);
         let (dx, dy) = (i64::from(increment.x_um), i64::from(increment.y_um));
         let fine = |sum: i64| sum.wrapping_add(1 << (29 - FINER)) >> (30 - FINER);
@@ -133,18 +133,6 @@ impl Way {
         n.xt = n.xt.saturating_add(att);
         n.yt = n.yt.saturating_add(btt);
         n.tt = n.tt.saturating_add(turn).saturating_add(ROUNDED);
-    }
-
-    /// Adds the last `after` of `whole` milliseconds of an increment. How the robot moved within it is not known, so the larger part
-    /// may be wrong.
-    pub fn add_part(&mut self, increment: &Increment, [after, whole]: [u32; 2], noise: &Noise) {
-        self.add(&increment.part([after, whole]), after, noise);
-        let larger = after.max(whole.wrapping_sub(after));
-        let rest = increment.part([larger, whole]);
-        self.leave_out(Growth::new(
-            rest.length_um().saturating_add(2),
-            rest.turn_q24().saturating_add(2),
-        ));
     }
 
     /// States what the first increment may have of the time before the fix.
@@ -264,7 +252,7 @@ mod tests {
             };
             let mut way = Way { turn, noise: start, ..Way::START };
             let noise = Noise::of(&OdometryErrors { m_per_sqrt_m: 0.01, rad_per_sqrt_m: 0.02, ..OdometryErrors::NONE }).unwrap();
-            let increment = Increment::new(ahead >> shorter, left >> shorter, 12_345_678, 0).unwrap();
+            let increment = Step { x_um: ahead >> shorter, y_um: left >> shorter, turn: 12_345_678, stamp_ms: 0 };
             way.add(&increment, ms, &noise);
             // 2^-8 um, times a 2^-24 turn in radians.
             let lever = |v: i64| v as f64 / 256.0 * TAU / 16_777_216.0;
@@ -296,7 +284,12 @@ mod tests {
     #[test]
     fn noise_without_use_is_not_carried() {
         let noise = Noise::of(&OdometryErrors::NONE).unwrap();
-        let increment = Increment::new(1 << 22, 1 << 22, 0, 0).unwrap();
+        let increment = Step {
+            x_um: 1 << 22,
+            y_um: 1 << 22,
+            turn: 0,
+            stamp_ms: 0,
+        };
         for (xx, tt) in [(0, WIDEST_TURN), (WIDEST_PLANE, 0), (i64::MAX, i64::MAX)] {
             let noise_before = PathNoise {
                 xx,

@@ -48,7 +48,7 @@
 //! |---|---|
 //! | version, 2 | u8 |
 //! | message, 3 | u8 |
-//! | stamp of its end, ms of the controller's clock | u32 |
+//! | stamps of its beginning and its end, ms of the controller's clock | 2 u32 |
 //! | ahead, to the left (um) | 2 i32 |
 //! | turn, counter-clockwise (2^-32 turn) | i32 |
 //!

@@ -12,7 +12,9 @@ const ODOMETRY: u8 = 3;
 pub fn increment_body(increment: &Increment) -> Vec<u8, LONGEST_BODY> {
     let mut body = Body(Vec::new());
     body.put([VERSION_2, ODOMETRY]);
-    body.put(increment.stamp_ms().to_le_bytes());
+    for stamp in increment.span_ms() {
+        body.put(stamp.to_le_bytes());
+    }
     for entry in increment.entries() {
         body.put(entry.to_le_bytes());
     }
@@ -32,12 +34,13 @@ fn read(body: &[u8]) -> Option<Increment> {
     if rest.take()? != [VERSION_2, ODOMETRY] {
         return None;
     }
-    let stamp_ms = u32::from_le_bytes(rest.take()?);
+    let mut stamp = || Some(u32::from_le_bytes(rest.take()?));
+    let span_ms = [stamp()?, stamp()?];
     let mut entry = || Some(i32::from_le_bytes(rest.take()?));
     let [ahead_um, left_um, turn] = [entry()?, entry()?, entry()?];
     rest.0
         .is_empty()
-        .then(|| Increment::new(ahead_um, left_um, turn, stamp_ms))?
+        .then(|| Increment::new(ahead_um, left_um, turn, span_ms))?
 }
 
 #[cfg(test)]
@@ -47,8 +50,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn increments_come_back_bit_for_bit(ahead in -4_194_304i32..=4_194_304, left in -4_194_304i32..=4_194_304, turn: i32, stamp: u32) {
-            let sent = Increment::new(ahead, left, turn, stamp).unwrap();
+        fn increments_come_back_bit_for_bit(ahead in -4_194_304i32..=4_194_304, left in -4_194_304i32..=4_194_304, turn: i32, span: [u32; 2]) {
+            let sent = Increment::new(ahead, left, turn, span).unwrap();
             let body = increment_body(&sent);
             prop_assert_eq!(increment_from_body(&body), Ok(sent));
             for length in 0..body.len() {
@@ -67,13 +70,13 @@ mod tests {
     /// Checks the table of the module's documentation, byte by byte.
     #[test]
     fn an_increment_is_as_documented() {
-        let sent = Increment::new(5_000, -2, 0x0403_0201, 0x0807_0605).unwrap();
+        let sent = Increment::new(5_000, -2, 0x0403_0201, [0x0807_0605, 0x0c0b_0a09]).unwrap();
         let expected = [
-            2, 3, 5, 6, 7, 8, 0x88, 0x13, 0, 0, 0xfe, 0xff, 0xff, 0xff, 1, 2, 3, 4,
+            2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 0x88, 0x13, 0, 0, 0xfe, 0xff, 0xff, 0xff, 1, 2, 3, 4,
         ];
         assert_eq!(increment_body(&sent)[..], expected);
         let mut long = increment_body(&sent);
-        long[8] = 0x41;
+        long[12] = 0x41;
         assert_eq!(increment_from_body(&long), Err(WireError::Content));
     }
 }

@@ -120,6 +120,8 @@ fn odometry_keeps_the_gate_open_between_fixes() {
     let mut controller = start();
     let drive = |controller: &mut Controller, cycles: u32, fixes: bool, ahead_um: i32| {
         let mut open = 0;
+        // As if the last increment was one period ago.
+        let mut newest_ms = controller.last().now_ms.wrapping_sub(PERIOD_MS);
         for cycle in 0..cycles {
             let now_ms = controller.last().now_ms;
             if fixes && cycle % 40 == 0 {
@@ -134,7 +136,8 @@ fn odometry_keeps_the_gate_open_between_fixes() {
             }
             // Back and forth, so that the robot stays at the goal.
             let ahead_um = if cycle % 2 == 0 { ahead_um } else { -ahead_um };
-            controller.odometry(&Increment::new(ahead_um, 0, 0, now_ms).unwrap());
+            controller.odometry(&Increment::new(ahead_um, 0, 0, [newest_ms, now_ms]).unwrap());
+            newest_ms = now_ms;
             let last = controller.last().cycle;
             let told = controller.until("the next cycle", |told| told.cycle != last);
             open += u32::from(told.permitted);
@@ -148,7 +151,8 @@ fn odometry_keeps_the_gate_open_between_fixes() {
     assert!(drive(&mut controller, 30, false, 500) == 30);
     // A jump of 30 cm.
     let now_ms = controller.last().now_ms;
-    controller.odometry(&Increment::new(300_000, 0, 0, now_ms).unwrap());
+    let before_ms = now_ms.wrapping_sub(PERIOD_MS);
+    controller.odometry(&Increment::new(300_000, 0, 0, [before_ms, now_ms]).unwrap());
     let last = controller.last().cycle;
     let told = controller.until("the next cycle", |told| told.cycle != last);
     assert_eq!(told.state, State::Inhibited(Reason::OdometryJump));

@@ -148,8 +148,8 @@ impl posegate_settings {
 /// `permits_in_a_row` 3, and the restart is automatic.
 ///
 /// Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
-/// response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, add the difference to all
-/// three. One lost report closes the gate; to bear one, give twice the period. A robot that moves is granted what it can move in these
+/// response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, set `response_ms`, and add the
+/// difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to bear one, give twice the period. A robot that moves is granted what it can move in these
 /// times, so short ones give more room: odometry makes them short (`posegate_tracker`), and the period is then the odometry's.
 ///
 /// # Safety
@@ -207,7 +207,9 @@ impl posegate_source {
         let frame = core::str::from_utf8(frame).map_err(|_| posegate_status::Frame)?;
         let motion = match self.motion {
             STANDS_STILL => Some(MotionBounds::STANDS_STILL),
-            MOVES => MotionBounds::new(self.along_m_s, self.across_m_s, self.turn_rad_s),
+            // A robot that moves has a speed: zeros were forgotten.
+            MOVES => MotionBounds::new(self.along_m_s, self.across_m_s, self.turn_rad_s)
+                .filter(|bounds| *bounds != MotionBounds::STANDS_STILL),
             _ => None,
         };
         let motion = motion.ok_or(posegate_status::Motion)?;

@@ -78,10 +78,10 @@ pub struct posegate_increment {
     pub left_m: f64,
     /// Counter-clockwise, radians: less than half a turn.
     pub turn_rad: f64,
-    /// The time at its end, milliseconds of the controller's clock.
+    /// The time at its beginning, milliseconds of the controller's clock: the end of the one before. Otherwise one was lost.
+    pub begins_ms: u32,
+    /// The time at its end.
     pub stamp_ms: u32,
-    /// Reserved: 0.
-    pub reserved: u32,
 }
 
 /// The report for now, or why there is none.
@@ -150,7 +150,7 @@ fn code(outcome: Result<(), Reason>) -> u32 {
 
 /// Initialises storage for a tracker without odometry and without a fix, whose reports are for a gate on this table.
 ///
-/// Errors: `POSEGATE_STATUS_ODOMETRY`; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
+/// Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
@@ -176,6 +176,10 @@ pub unsafe extern "C" fn posegate_tracker_init(
         let table =
             Table::parse(bytes(table, length)?).map_err(|_| posegate_status::TableInvalid)?;
         let source = given.source.source()?;
+        // Odometry without any error does not exist: the errors were forgotten.
+        if given.errors.errors() == OdometryErrors::NONE {
+            return Err(posegate_status::Odometry);
+        }
         let made = Tracker::new(TrackerSettings {
             errors: given.errors.errors(),
             bounds: source.motion,
@@ -214,7 +218,12 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
         apart?;
         let held = &mut *open(tracker)?;
         let of = |given: posegate_increment| {
-            Increment::of(given.ahead_m, given.left_m, given.turn_rad, given.stamp_ms)
+            Increment::of(
+                given.ahead_m,
+                given.left_m,
+                given.turn_rad,
+                [given.begins_ms, given.stamp_ms],
+            )
                 .ok_or(posegate_status::BadValue)
         };
         let taken = match given.and_then(of) {
@@ -229,10 +238,11 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     })
 }
 
-/// Takes a fix, also one that comes late: it is carried along the increments since its stamp. Writes 0, or the `posegate_reason` for
-/// which it is not used: the tracker then carries what it carried before.
+/// Takes a fix, also one that comes late: it is carried along the increments since its stamp. All fixes come from one source, each with
+/// another sequence number. Writes 0, or the `posegate_reason` for which it is not used. After `POSEGATE_REASON_SEQUENCE_STUCK`,
+/// `_SOURCE_CHANGED` and `_FRAME_MISMATCH` nothing is carried until the next fix; otherwise what was carried before.
 ///
-/// Errors: those of a report. The tracker then carries what it carried before.
+/// Errors: those of a report. Nothing is carried until the next fix.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.
@@ -249,12 +259,20 @@ pub unsafe extern "C" fn posegate_tracker_fix(
         write(reason, u32::from(Reason::Silent.code()))?;
         apart?;
         let held = &mut *open(tracker)?;
-        write(reason, code(held.fix(&report?)))
+        let taken = match &report {
+            Ok(report) => code(held.fix(report)),
+            Err(_) => {
+                held.drop_fix();
+                u32::from(Reason::Silent.code())
+            }
+        };
+        write(reason, taken)?;
+        report.map(|_| ())
     })
 }
 
-/// Writes the report for now: the newest fix at the place of the newest odometry. Without one, close the gate with the reason
-/// (`posegate_gate_inhibit`).
+/// Writes the report for now: the newest fix at the place of the newest odometry. Without one, a permit ends by itself in
+/// `posegate_gate_tick`; `posegate_gate_inhibit` with the reason ends it at once.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

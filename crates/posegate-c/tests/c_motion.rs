@@ -197,7 +197,7 @@ fn a_tracker_in_c_is_that_in_rust() {
     let (gate_c, mut gate) = (gate_of_c(SEE_T7), gate_of_rust(SEE_T7));
     let (tracker_c, mut tracker) = (tracker_of_c(), tracker_of_rust());
     let mut seen = BTreeSet::new();
-    let (mut opened, mut sequence) = (0, 0);
+    let (mut opened, mut sequence, mut newest) = (0, 0, 0);
     for cycle in 1..2_000u32 {
         let now = 20 * cycle;
         // A stop of the odometry, and a jump, each once in a while.
@@ -209,10 +209,10 @@ fn a_tracker_in_c_is_that_in_rust() {
                 ahead_m: ahead,
                 left_m: 0.0002,
                 turn_rad: turn,
+                begins_ms: newest,
                 stamp_ms: now,
-                reserved: 0,
             };
-            let expected = tracker.odometry(Increment::of(ahead, 0.0002, turn, now).unwrap());
+            let expected = tracker.odometry(Increment::of(ahead, 0.0002, turn, [newest, now]).unwrap());
             let mut reason = 77;
             // SAFETY: valid pointers.
             let status = unsafe { posegate_tracker_odometry(tracker_c, &increment, &mut reason) };
@@ -220,6 +220,7 @@ fn a_tracker_in_c_is_that_in_rust() {
             let expected = expected.map_or_else(|reason| u32::from(reason.code()), |()| 0);
             assert_eq!(reason, expected, "{cycle}");
             seen.insert(reason);
+            newest = now;
         }
         if cycle % 23 == 0 {
             sequence += 1;
@@ -384,8 +385,8 @@ fn bad_pointers_are_errors_and_close() {
         ahead_m: 0.0,
         left_m: 0.0,
         turn_rad: 0.0,
+        begins_ms: 0,
         stamp_ms: 0,
-        reserved: 0,
     };
     let settings = tracker_settings_of_c();
     let (table, length) = (DOCK.as_ptr(), DOCK.len());
@@ -449,8 +450,8 @@ fn odometry_that_is_no_number_ends_the_way() {
         ahead_m,
         left_m: 0.0,
         turn_rad: 0.0,
+        begins_ms: stamp_ms.saturating_sub(20),
         stamp_ms,
-        reserved: 0,
     };
     // SAFETY: valid pointers.
     unsafe {
@@ -485,7 +486,18 @@ fn odometry_that_is_no_number_ends_the_way() {
 #[test]
 fn no_setting_of_a_tracker_is_missing() {
     type Change = fn(&mut posegate_tracker_settings);
-    let wrong: [(Change, posegate_status); 7] = [
+    let wrong: [(Change, posegate_status); 9] = [
+        (
+            |s| {
+                // SAFETY: numbers.
+                s.errors = unsafe { core::mem::zeroed() };
+            },
+            posegate_status::Odometry,
+        ),
+        (
+            |s| (s.source.along_m_s, s.source.turn_rad_s) = (0.0, 0.0),
+            posegate_status::Motion,
+        ),
         (|s| s.errors.slip = -1.0, posegate_status::Odometry),
         (
             |s| s.errors.m_per_sqrt_m = f64::NAN,

@@ -217,8 +217,8 @@ fn increment(stamp_ms: u32) -> posegate_increment {
         ahead_m: 0.004,
         left_m: 0.0,
         turn_rad: 0.001,
+        begins_ms: stamp_ms.saturating_sub(20),
         stamp_ms,
-        reserved: 0,
     }
 }
 

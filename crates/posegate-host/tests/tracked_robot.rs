@@ -344,7 +344,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
     let mut newest_ms = 0;
     // A fix with the very stamp of the next odometry.
     let mut with_next = false;
-    let _ = tracker.odometry(Increment::of(0.0, 0.0, 0.0, start).expect("no movement"));
+    let _ = tracker.odometry(Increment::of(0.0, 0.0, 0.0, [start; 2]).expect("no movement"));
     let mut current: Option<Fix> = None;
     // The newest permitted evidence: the fix, how many increments, and the stamp.
     let mut permitted: Option<(Fix, usize, u32)> = None;
@@ -369,7 +369,8 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             let um = |metres: f64| (metres * 1e6).round() * 1e-6;
             let by = [um(ahead * seconds), 0.0, rate * seconds];
             let stamp = start.wrapping_add(now_ms);
-            let increment = Increment::of(by[0], by[1], by[2], stamp).expect("a short way");
+            let span = [start.wrapping_add(newest_ms), stamp];
+            let increment = Increment::of(by[0], by[1], by[2], span).expect("a short way");
             if let Err(reason) = tracker.odometry(increment) {
                 step = Some(gate.inhibit(start.wrapping_add(now_ms), reason));
                 current = None;
@@ -396,7 +397,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             let report = Report {
                 source: 0,
                 frame: FrameId::of("map"),
-                sequence: 0,
+                sequence: fix.stamp_ms,
                 stamp_ms: start.wrapping_add(fix.stamp_ms),
                 belief: PoseEstimate::new(
                     Estimate { x_m, y_m, yaw_rad },

@@ -157,8 +157,9 @@ impl Odometry {
         let turn = pose[2] - yaw;
         let turn = libm::atan2(libm::sin(turn), libm::cos(turn));
         let (ahead, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
-        let stamp_ms = clock_ms(t_s)?;
-        Some((t_s, Increment::of(ahead, left, turn, stamp_ms)))
+        let begins_s = before.map_or(t_s, |(before_s, _)| *before_s);
+        let span_ms = [clock_ms(begins_s)?, clock_ms(t_s)?];
+        Some((t_s, Increment::of(ahead, left, turn, span_ms)))
     }
 }
 
@@ -176,9 +177,9 @@ mod tests {
             (1.06, [9.9, 5.01, quarter]),
         ]);
         assert_eq!(odometry.len(), 3);
-        let still = Increment::of(0.0, 0.0, 0.0, 1_000);
+        let still = Increment::of(0.0, 0.0, 0.0, [1_000; 2]);
         assert_eq!(odometry.next_until(1.03), Some((1.0, still)));
-        let ahead = Increment::of(0.01, 0.0, 0.1, 1_020);
+        let ahead = Increment::of(0.01, 0.0, 0.1, [1_000, 1_020]);
         assert_eq!(odometry.next_until(1.03), Some((1.02, ahead)));
         assert_eq!(odometry.next_until(1.03), None);
         // A reset of almost five metres.
