@@ -54,7 +54,8 @@ mod firmware {
     /// An increment along an arc, of 6 mm and 10 mrad, at the end of period k.
     fn increment(k: u32) -> Result<Increment, Failure> {
         let ends_ms = k * PERIOD_MS;
-        Increment::of(0.006, 0.0001, 0.01, [ends_ms - PERIOD_MS, ends_ms]).ok_or("an increment was refused")
+        Increment::of(0.006, 0.0001, 0.01, [ends_ms - PERIOD_MS, ends_ms])
+            .ok_or("an increment was refused")
     }
 
     fn fix_at(sequence: u32, stamp_ms: u32) -> Report {

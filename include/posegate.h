@@ -196,8 +196,8 @@ enum posegate_status
      */
     POSEGATE_STATUS_RESPONSE_TIME = -21,
     /**
-     * `motion` is not a `posegate_motion`, or a speed of a source that moves is below zero, not a number, or beyond 1,000 m/s or 24
-     * rad/s.
+     * `motion` is not a `posegate_motion`; or a source moves and all its speeds are zero, or one is below zero, not a number, or beyond
+     * 1,000 m/s or 24 rad/s.
      */
     POSEGATE_STATUS_MOTION = -22,
     /**
@@ -1314,13 +1314,13 @@ typedef struct posegate_increment {
      */
     double turn_rad;
     /**
-     * The time at its end, milliseconds of the controller's clock.
+     * The time at its beginning, milliseconds of the controller's clock: the end of the one before. Otherwise one was lost.
+     */
+    uint32_t begins_ms;
+    /**
+     * The time at its end.
      */
     uint32_t stamp_ms;
-    /**
-     * Reserved: 0.
-     */
-    uint32_t reserved;
 } posegate_increment;
 
 /**
@@ -1728,9 +1728,10 @@ posegate_status posegate_frame_id(const char *name,
  * `permits_in_a_row` 3, and the restart is automatic.
  *
  * Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
- * response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, add the difference to all
- * three. One lost report closes the gate; to bear one, give twice the period. A robot that moves is granted what it can move in these
- * times, so short ones give more room: odometry makes them short (`posegate_tracker`), and the period is then the odometry's.
+ * response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, set `response_ms`, and add the
+ * difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to bear one, give twice
+ * the period. A robot that moves is granted what it can move in these times, so short ones give more room: odometry makes them short
+ * (`posegate_tracker`), and the period is then the odometry's.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1774,7 +1775,7 @@ posegate_status posegate_checksum(uint32_t so_far,
 /**
  * Initialises storage for a tracker without odometry and without a fix, whose reports are for a gate on this table.
  *
- * Errors: `POSEGATE_STATUS_ODOMETRY`; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
+ * Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
@@ -1800,10 +1801,11 @@ posegate_status posegate_tracker_odometry(struct posegate_tracker *tracker,
                                           uint32_t *reason);
 
 /**
- * Takes a fix, also one that comes late: it is carried along the increments since its stamp. Writes 0, or the `posegate_reason` for
- * which it is not used: the tracker then carries what it carried before.
+ * Takes a fix, also one that comes late: it is carried along the increments since its stamp. All fixes come from one source, each with
+ * another sequence number. Writes 0, or the `posegate_reason` for which it is not used. After `POSEGATE_REASON_SEQUENCE_STUCK`,
+ * `_SOURCE_CHANGED` and `_FRAME_MISMATCH` nothing is carried until the next fix; otherwise what was carried before.
  *
- * Errors: those of a report. The tracker then carries what it carried before.
+ * Errors: those of a report. Nothing is carried until the next fix.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.
@@ -1813,8 +1815,8 @@ posegate_status posegate_tracker_fix(struct posegate_tracker *tracker,
                                      uint32_t *reason);
 
 /**
- * Writes the report for now: the newest fix at the place of the newest odometry. Without one, close the gate with the reason
- * (`posegate_gate_inhibit`).
+ * Writes the report for now: the newest fix at the place of the newest odometry. Without one, a permit ends by itself in
+ * `posegate_gate_tick`; `posegate_gate_inhibit` with the reason ends it at once.
  *
  * # Safety
  * Each pointer is null, misaligned, or points to what its type says.

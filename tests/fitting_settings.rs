@@ -146,6 +146,29 @@ fn a_single_permit_needs_no_next_report() {
     );
 }
 
+/// A permit that ends by itself restarts the inhibit hold time: if that is not over with the next report, the gate
+/// does not open again.
+#[test]
+fn a_single_permit_needs_the_hold_time_to_be_over() {
+    let (table, sources) = (Table::parse(SEE_T7).unwrap(), sources());
+    let mut settings = with_source(Settings::for_source(500, 0), &table, &sources);
+    settings.permits_in_a_row = 1;
+    settings.permit_hold_ms = 100;
+    settings.inhibit_hold_ms = 450;
+    assert_eq!(
+        settings.check(),
+        Err(InvalidParameter::PermitHoldTooShort { least_ms: 500 })
+    );
+    let unstated = Settings {
+        report_period_ms: 1,
+        ..settings
+    };
+    // Once after the start, and never again.
+    assert_eq!(open_ms(&unstated, 500, &[0; 12]), Ok(120));
+    settings.inhibit_hold_ms = 380;
+    assert!(open_ms(&settings, 500, &[0; 12]).unwrap() > 1000);
+}
+
 #[test]
 fn the_numbers_of_refusals_are_exact() {
     let (table, sources) = (Table::parse(SEE_T7).unwrap(), sources());

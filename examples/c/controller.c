@@ -19,9 +19,10 @@ static const posegate_settings SETTINGS = {
     .site_digest = SITE_DIGEST,
     .sources =
         {
+            /* One robot has one speed, whatever the source: 0.1 m/s ahead, 0.1 rad/s. */
             {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
-             .motion = POSEGATE_MOTION_STANDS_STILL},
-            /* Carried: the tracker applies the trust. 0.1 m/s ahead, 0.1 rad/s. */
+             .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
+            /* Carried: the tracker applies the trust. */
             {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
              .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
         },
@@ -188,6 +189,7 @@ static uint32_t drive(uint32_t cycles, bool with_fixes, posegate_step *step)
     uint32_t high = 0U;
     for (uint32_t count = 0U; count < cycles; count++) {
         posegate_increment increment = {.ahead_m = ((count / 4U) % 2U == 0U) ? 0.0005 : -0.0005,
+                                        .begins_ms = now_ms - 20U,
                                         .stamp_ms = now_ms};
         /* A fix every half second; it is 80 ms old, when the robot was where it is now. */
         if (with_fixes && (count % 24U == 8U)) {
@@ -216,6 +218,7 @@ static void moving_script(void)
         fail("odometry does not keep the gate open");
     }
     expect("fixes twice a second, with odometry", &step, POSEGATE_STATE_KIND_PERMITTED, 0U);
+    jump.begins_ms = now_ms - 20U;
     jump.stamp_ms = now_ms;
     step = moving_cycle(&jump);
     expect("the odometry jumps", &step, POSEGATE_STATE_KIND_INHIBITED,

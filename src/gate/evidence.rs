@@ -1,7 +1,7 @@
 //! What a gate weighs in a step: a report, its other hypotheses, and what the robot can have moved beside them.
 
 use crate::report::{PoseEstimate, Report};
-use crate::set::Growth;
+use crate::set::{Growth, Uncertainty};
 use crate::task::Risk;
 
 /// Largest number of hypotheses of one report, the report's own estimate included.
@@ -12,7 +12,7 @@ pub const MOST_HYPOTHESES: usize = 8;
 /// A source may believe in several places at once: the clusters of a particle filter, the two solutions of a tag that is seen
 /// squarely. The robot is at one of them. A gate permits only if the pose-set of *every* hypothesis is inside. What the listed
 /// hypotheses leave out (clusters of little weight) counts against the confidence of the site: the sets grow accordingly, or the
-/// report is denied.
+/// report is denied. Sets with a bound, and fixes that were carried, cannot make up for it.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Evidence<'r> {
@@ -36,6 +36,15 @@ impl<'r> Evidence<'r> {
             beside: Growth::NONE,
             elsewhere: Risk::NONE,
         }
+    }
+
+    /// Returns `true` if larger sets can make up for what is left out: of normal errors only. A bound states no distribution, and what
+    /// odometry leaves open is beside the sets.
+    pub(super) fn can_make_up(&self) -> bool {
+        self.beside == Growth::NONE
+            && self
+                .hypotheses()
+                .all(|(_, estimate)| !matches!(estimate.spread, Some(Uncertainty::Bounded { .. })))
     }
 
     /// Returns the estimates with their numbers.

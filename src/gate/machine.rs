@@ -309,8 +309,9 @@ impl<'a> Gate<'a> {
             Err(reason) => return Verdict::deny(reason),
         };
         let radius = table.radius_squared();
-        let Some(trust) = allowed_for(evidence.elsewhere, radius, source.trust) else {
-            return Verdict::deny(Reason::ElsewhereTooLikely);
+        let trust = match allowed_for(evidence.elsewhere, radius, source.trust) {
+            Some(trust) if evidence.elsewhere == Risk::NONE || evidence.can_make_up() => trust,
+            _ => return Verdict::deny(Reason::ElsewhereTooLikely),
         };
         match belief.pose_set(radius, trust) {
             Ok(set) => {
@@ -521,8 +522,8 @@ impl<'a> Gate<'a> {
             &source.trust
         } else {
             match allowed_for(evidence.elsewhere, radius, source.trust) {
-                Some(trust) => allowed = trust,
-                None => return Ok(Err(Reason::ElsewhereTooLikely)),
+                Some(trust) if evidence.can_make_up() => allowed = trust,
+                _ => return Ok(Err(Reason::ElsewhereTooLikely)),
             }
             &allowed
         };

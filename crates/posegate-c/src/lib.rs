@@ -42,6 +42,8 @@
         clippy::unwrap_used
     )
 )]
+// What only a gate uses.
+#![cfg_attr(target_arch = "wasm32", allow(dead_code))]
 // The names are those of the header.
 #![allow(non_camel_case_types)]
 
@@ -49,21 +51,28 @@
 #[cfg(not(any(target_os = "none", target_arch = "wasm32")))]
 extern crate std;
 
+// A page in a browser evaluates single estimates and drives nothing: it has no gate.
 pub use self::belief::*;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::evidence::*;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::gate::*;
 pub use self::judge::*;
 pub use self::permission::*;
 pub use self::reason::*;
 pub use self::report::*;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::settings::*;
 pub use self::status::*;
 pub use self::table::*;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::tracker::*;
 pub use self::wire::*;
 
 mod belief;
+#[cfg(not(target_arch = "wasm32"))]
 mod evidence;
+#[cfg(not(target_arch = "wasm32"))]
 mod gate;
 mod judge;
 mod memory;
@@ -72,8 +81,10 @@ mod panic;
 mod permission;
 mod reason;
 mod report;
+#[cfg(not(target_arch = "wasm32"))]
 mod settings;
 mod status;
 mod table;
+#[cfg(not(target_arch = "wasm32"))]
 mod tracker;
 mod wire;

@@ -149,8 +149,9 @@ impl posegate_settings {
 ///
 /// Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
 /// response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, set `response_ms`, and add the
-/// difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to bear one, give twice the period. A robot that moves is granted what it can move in these
-/// times, so short ones give more room: odometry makes them short (`posegate_tracker`), and the period is then the odometry's.
+/// difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to bear one, give twice
+/// the period. A robot that moves is granted what it can move in these times, so short ones give more room: odometry makes them short
+/// (`posegate_tracker`), and the period is then the odometry's.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or points to what its type says.

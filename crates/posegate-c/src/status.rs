@@ -56,8 +56,8 @@ pub enum posegate_status {
     Restart = -20,
     /// `response_ms` is 0, or not less than `maximum_age_ms`.
     ResponseTime = -21,
-    /// `motion` is not a `posegate_motion`, or all speeds of a source that moves are zero, or one is below zero, not a number, or beyond 1,000 m/s or 24
-    /// rad/s.
+    /// `motion` is not a `posegate_motion`; or a source moves and all its speeds are zero, or one is below zero, not a number, or beyond
+    /// 1,000 m/s or 24 rad/s.
     Motion = -22,
     /// `report_period_ms` is not from 1 to 2^31 - 1.
     ReportPeriod = -23,

@@ -224,7 +224,7 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
                 given.turn_rad,
                 [given.begins_ms, given.stamp_ms],
             )
-                .ok_or(posegate_status::BadValue)
+            .ok_or(posegate_status::BadValue)
         };
         let taken = match given.and_then(of) {
             Ok(increment) => held.odometry(increment),

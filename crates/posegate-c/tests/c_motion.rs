@@ -212,7 +212,8 @@ fn a_tracker_in_c_is_that_in_rust() {
                 begins_ms: newest,
                 stamp_ms: now,
             };
-            let expected = tracker.odometry(Increment::of(ahead, 0.0002, turn, [newest, now]).unwrap());
+            let expected =
+                tracker.odometry(Increment::of(ahead, 0.0002, turn, [newest, now]).unwrap());
             let mut reason = 77;
             // SAFETY: valid pointers.
             let status = unsafe { posegate_tracker_odometry(tracker_c, &increment, &mut reason) };
@@ -446,7 +447,7 @@ fn bad_pointers_are_errors_and_close() {
 fn odometry_that_is_no_number_ends_the_way() {
     let tracker = tracker_of_c();
     let mut reason = 0;
-    let increment = |stamp_ms, ahead_m| posegate_increment {
+    let increment = |stamp_ms: u32, ahead_m| posegate_increment {
         ahead_m,
         left_m: 0.0,
         turn_rad: 0.0,

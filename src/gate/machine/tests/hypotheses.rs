@@ -165,6 +165,36 @@ fn what_is_left_out_counts() {
     assert_eq!(step(SEE_T7, Risk::NONE), Ok(()));
     assert_eq!(step(SEE_T7, risk(0.995)), Err(Reason::NotContained));
     assert_eq!(step(SEE_T7, risk(0.98)), Err(Reason::ElsewhereTooLikely));
+    // A bound has no distribution, and slip is beside the sets.
+    let mut bounded = at(0.0);
+    bounded.spread = Some(Uncertainty::Bounded {
+        translation_m: 0.01,
+        yaw_rad: 0.01,
+    });
+    let little = report(1, 0.0);
+    let slip = Growth::new(1, 0);
+    for (others, beside, elsewhere, expected) in [
+        (&[bounded][..], Growth::NONE, Risk::NONE, Ok(())),
+        (&[], slip, Risk::NONE, Ok(())),
+        (&[at(0.0)], Growth::NONE, risk(0.999), Ok(())),
+        (
+            &[bounded],
+            Growth::NONE,
+            risk(0.999),
+            Err(Reason::ElsewhereTooLikely),
+        ),
+        (&[], slip, risk(0.999), Err(Reason::ElsewhereTooLikely)),
+    ] {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        let evidence = Evidence {
+            elsewhere,
+            ..evidence(&little, others, beside)
+        };
+        let examined = gate.examine_on(&evidence).1;
+        let is_denied = examined == Verdict::deny(Reason::ElsewhereTooLikely);
+        assert_eq!(is_denied, expected.is_err(), "{examined:?}");
+        assert_eq!(gate.step_on(1010, &evidence).verdict, expected);
+    }
     let larger = wider();
     assert_eq!(step(&larger, Risk::NONE), Ok(()));
     let disagree = Err(Reason::EvaluationsDisagree);
