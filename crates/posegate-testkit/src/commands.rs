@@ -42,7 +42,7 @@ pub const LINES: [(&str, &str); 32] = [
     ),
     (
         "learn bounds",
-        "learn bounds {detections} --quantile 0.9 -o {output}",
+        "learn bounds {detections} --quantile 0.9 --camera rear --site {site} --tag-size 0.2 --family tag36h11 -o {output}",
     ),
     (
         "learn inflation",
