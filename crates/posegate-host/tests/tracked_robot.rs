@@ -142,10 +142,14 @@ impl Evidence<'_> {
         let moment = |read: &Read| {
             let passed = f64::from(read.to_ms - read.from_ms) * 1e-3;
             let before = f64::from(self.fix.stamp_ms.saturating_sub(read.from_ms)) * 1e-3;
-            // Before the fix it drove no farther than it could, and no farther than was read.
+            // Within the increment it may have driven unevenly, also back and forth: before the fix and after it as far as its speed
+            // allows, and in sum what was read.
             let share = |length: f64, fastest: f64| {
                 if before > 0.0 && length > 0.0 {
-                    1.0 - (1.0 - part) * (fastest * before / length).min(1.0)
+                    let [first, second] = [before, passed - before].map(|s| fastest * s / length);
+                    let most = second.min(1.0 + first);
+                    let least = (1.0 - first).max(-second);
+                    least + part * (most - least).max(0.0)
                 } else {
                     1.0
                 }
