@@ -8,7 +8,7 @@
 //! 1. `s >= |X| + |lever| + E` (no extent along any normal is larger), where `E = f |X|` is an upper bound of the bend
 //!    `-f u1 (h.u)`. This takes one comparison per facet; the rest is common to the frame.
 //! 2. `s >= E` and `(s - E)^2 >= |g|^2`.
-//!    An ellipsoid that has moved is tested in the same steps; what the movement adds along the normal is taken off `s` first.
+//!    An ellipsoid that has moved is tested in these two steps; what the movement adds along the normal is taken off `s` first.
 //! 3. The maximum of `g.u - f u1 (h.u)` over `|u| <= 1`, bounded by weak duality. For any lambda above |Q|, with `Q`
 //!    the symmetric matrix of the bend, the maximum is at most `lambda + g' (lambda - Q)^-1 g / 4`. With lambda = r / 2
 //!    and r >= |g| this gives `r - f g1 (h.g) / r^2 + 2 |Q|^2 / (r - 2 |Q|)`, and `|Q| = f (|h| + |h1|) / 2`. This
@@ -222,11 +222,11 @@ fn holds_sharply(
             )
 }
 
-/// Returns `true` if step 2 or step 3 accepts an ellipsoid that has moved. `turns` are the largest turns of the ellipsoid and of
+/// Returns `true` if step 2 accepts an ellipsoid that has moved; what it does not accept goes to step 4. `turns` are the largest turns of the ellipsoid and of
 /// the movement; `moved` is the length of the movement, micrometres.
 ///
-/// The extents along the normal add up: `|F'a| + rho |a| + omega |lever|`, with the ellipsoid's own turn in F'a. The product of
-/// turn and offset, `(t + t') a.J (D + D')`, has the ellipsoid's own bend in it, and at most `omega |D| + (f + omega) rho` beside that.
+/// The extents along the normal add up: `|F'a| + rho |a| + omega |lever|`, with the ellipsoid's own turn in F'a. The bend is the whole
+/// set's.
 #[inline(never)]
 fn holds_grown(
     facet: Facet,
@@ -256,21 +256,7 @@ fn holds_grown(
     let parts = parts(normal, columns, lever(own));
     let reach = reach_square(parts);
     let left = spare.wrapping_sub(seen.bend);
-    if left >= 0 && square(left) >= reach {
-        return true;
-    }
-    // |D| and rho with the length of a normal: 2^14.1, times half a radian.
-    let broad = ready.broad.wrapping_sub(moved).wrapping_add(4).max(0);
-    let beside = broad
-        .wrapping_mul(swing.radians_q15)
-        .wrapping_add(moved.wrapping_mul(set.common.turn.radians_q15))
-        .wrapping_shr(15)
-        .wrapping_add(2);
-    let spare = spare.wrapping_sub(beside);
-    seen.bend > 0
-        && spare >= 0
-        && square(spare) >= reach >> 1
-        && bends(normal, columns, parts, own.radians_q15, reach, spare)
+    left >= 0 && square(left) >= reach
 }
 
 /// Returns a facet's normal in world axes, times 2^14.
