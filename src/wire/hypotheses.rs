@@ -57,6 +57,14 @@ pub struct HypothesisCollector {
     report: Option<Report>,
 }
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for HypothesisCollector {
+    /// Writes the number of hypotheses only.
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "HypothesisCollector {{ others: {} }}", self.others.len());
+    }
+}
+
 impl HypothesisCollector {
     /// Returns a collector without hypotheses.
     #[must_use]
