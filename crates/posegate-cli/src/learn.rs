@@ -4,8 +4,8 @@ use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, GroupReport, InflationModel, InflationReport,
-    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, learn_bounds, learn_inflation,
-    outcomes, test_outcomes,
+    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, learn_bounds,
+    learn_inflation, outcomes, test_outcomes,
 };
 use serde_json::{Value, json};
 
@@ -91,7 +91,9 @@ pub struct Inflation {
 
 /// Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
 ///
-/// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha.
+/// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha, whatever the results of
+/// earlier dockings. `lower` and `upper` limit the probability of success with confidence 1 - alpha at all of these looks together
+/// (a confidence sequence), if every docking succeeds with the same probability, independently of the others.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s if the rows are not in the order of time."
@@ -319,7 +321,9 @@ fn groups(model: &InflationModel) -> Result<(), Failure> {
             "the factors hold for a new {column} with confidence {}",
             model.confidence()
         )),
-        None if model.groups().is_empty() => Ok(()),
+        None if model.groups().is_empty() => {
+            print(&"the factors hold for the robot of these rows, not for another one")
+        }
         None => print(&"the factors hold for these alone, not for a new one"),
     }
 }
@@ -373,7 +377,7 @@ fn look(arguments: &Outcomes, files: &Files) -> Outcome {
         }))?;
     } else {
         print(&format_args!(
-            "{} of {} succeeded: {:.4} to {:.4} with confidence {}",
+            "{} of {} succeeded: {:.4} to {:.4} with confidence {}, however often one looks",
             found.successes,
             found.count,
             found.limits[0],

@@ -14,6 +14,7 @@ pub use self::inflation::{InflationModel, InflationReport, InflationSettings, le
 pub use self::kind::Model;
 pub use self::outcomes::{OutcomesReport, outcomes, test_outcomes};
 pub use self::runs::{RunSource, Runs};
+pub use self::sequence::confidence_sequence;
 pub use self::taken_with::TakenWith;
 pub use self::views::ViewBox;
 
@@ -33,6 +34,7 @@ mod inflation;
 mod kind;
 mod outcomes;
 mod runs;
+mod sequence;
 mod sheet;
 mod smooth;
 mod split;
