@@ -4,7 +4,7 @@ use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, GroupReport, InflationModel, InflationReport,
-    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, learn_bounds,
+    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, by_age_json, learn_bounds,
     learn_inflation, outcomes, test_outcomes,
 };
 use serde_json::{Value, json};
@@ -299,6 +299,7 @@ fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
             ))?;
         }
         groups(&model)?;
+        source(&model)?;
     }
     Ok(answer(true))
 }
@@ -326,6 +327,24 @@ fn groups(model: &InflationModel) -> Result<(), Failure> {
         }
         None => print(&"the factors hold for these alone, not for a new one"),
     }
+}
+
+/// Prints the settings of the controller's source.
+fn source(model: &InflationModel) -> Result<(), Failure> {
+    let Some(by_age) = model.by_age() else {
+        return print(&"no settings for a controller: a condition has no factor");
+    };
+    let own = f64::from(by_age.inflation.q16()) / 65_536.0;
+    let ages: Vec<String> = by_age
+        .steps()
+        .map(|(until_ms, inflation)| {
+            format!(", {inflation} up to {until_ms} ms since the last fix")
+        })
+        .collect();
+    print(&format_args!(
+        "on the controller: inflation {own:.6}{}",
+        ages.concat()
+    ))
 }
 
 fn parts(model: &InflationModel) -> Vec<(String, &InflationReport)> {
@@ -359,6 +378,9 @@ fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
         "new_group": model.new_group(),
         "groups": model.groups().iter().map(group).collect::<Vec<_>>(),
         "condition": model.condition(), "overall": of(model.overall()),
+        "source": model.by_age().map(|by_age| json!({
+            "inflation": f64::from(by_age.inflation.q16()) / 65_536.0, "ages": by_age_json(&by_age),
+        })),
         "conditions": model.parts().iter().map(of).collect::<Vec<_>>(),
     })
 }

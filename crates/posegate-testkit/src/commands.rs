@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 32] = [
+pub const LINES: [(&str, &str); 33] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
@@ -54,6 +54,10 @@ pub const LINES: [(&str, &str); 32] = [
     (
         "replay",
         "replay {site} {log} --task dock --truth {truth} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --mcap {mcap} -o {output}",
+    ),
+    (
+        "replay",
+        "replay {site} {log} --task dock --inflation-model {inflation_model}",
     ),
     ("seal", "seal {firmware} -o {output}"),
     ("family", "family {site} --tag t7 --r 0.02"),
@@ -141,6 +145,7 @@ pub fn file_of(leaf: &str, argument: &str) -> &'static str {
         ("predict" | "learn check", "model") => "model.toml",
         ("learn inflation", "estimates") => "scored.csv",
         ("metrics", "estimate") => "estimate.tum",
+        ("replay", "inflation_model") => "filter.toml",
         (_, "site") => "site.toml",
         (_, "table") => "dock.posegate",
         (_, "poses" | "estimates" | "log") => "estimates.csv",
@@ -358,6 +363,7 @@ fn fixture() -> Folder {
     folder.write("firmware", firmware());
     for line in [
         "learn bounds detections.csv --quantile 0.9 -o model.toml",
+        "learn inflation scored.csv --epsilon 0.99 --confidence 0.5 -o filter.toml",
         "table build site.toml --task dock -o dock.posegate",
         "chain site.toml --name back-to-dock -o picture.svg",
         "site build site.toml --tables-only -o built",

@@ -2,6 +2,7 @@
 
 pub use self::binomial::{acceptance, at_most, clopper_pearson, conformal_rank, rank};
 pub use self::bounds::{BoundsSettings, learn_bounds};
+pub use self::by_age::{ByAge, by_age_json};
 pub use self::check::{
     BoundCheck, Change, CheckReport, CheckSettings, DetectionCheck, RegionCheck, check_bounds,
 };
@@ -21,6 +22,7 @@ pub use self::views::ViewBox;
 mod axis;
 mod binomial;
 mod bounds;
+mod by_age;
 mod calibration;
 mod cells;
 mod check;

@@ -21,7 +21,7 @@ const BAY: &str = "--task bay --max-age-ms 3000 --permit-hold-ms 3000 --json";
 /// the worst first. Every split that leaves fewer than four robots to learn from must be refused. Fails if the gate permits falsely on any
 /// robot, or if fewer robots are covered than stated.
 pub fn robots(folder: &Path) -> Result {
-    let estimates = files::read(&folder.join("mrclam/ekf_estimates.csv"))?;
+    let estimates = files::read(folder.join("mrclam/ekf_estimates.csv"))?;
     let scratch = Scratch::new()?;
     let (all, held, model) = (
         scratch.join("learn.csv"),
@@ -42,7 +42,7 @@ pub fn robots(folder: &Path) -> Result {
         if robots.len() - left_out.len() < ENOUGH {
             report.require(
                 learnt.code == 2,
-                &format!("a refusal to learn without the robots {left_out:?}"),
+                format!("a refusal to learn without the robots {left_out:?}"),
             );
             continue;
         }
@@ -69,11 +69,11 @@ pub fn robots(folder: &Path) -> Result {
         let gate = &told["rules"]["gate"];
         report.require(
             gate["false_permits"].as_u64() == Some(0),
-            &format!("no false permit of the gate on robot {robot}"),
+            format!("no false permit of the gate on robot {robot}"),
         );
         report.require(
             gate["permits"].as_u64() > Some(0),
-            &format!("permits of the gate on robot {robot}"),
+            format!("permits of the gate on robot {robot}"),
         );
         report.note(
             &format!("mrclam, robot {robot}: truth in the pose-sets, {EPSILON} stated"),
