@@ -10,6 +10,7 @@ use posegate_host::learn::{
 use serde_json::{Value, json};
 
 mod check;
+mod survey;
 mod taken_with;
 
 /// Learns models for the gate and the planner from recordings
@@ -19,6 +20,7 @@ pub enum Command {
     Inflation(Inflation),
     Outcomes(Outcomes),
     Check(check::Check),
+    Survey(survey::Survey),
 }
 
 /// Learns error bounds of detections by distance and angles, and the share of views that are detected
@@ -118,6 +120,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
         Command::Inflation(arguments) => inflation(arguments, files),
         Command::Outcomes(arguments) => look(arguments, files),
         Command::Check(arguments) => check::run(arguments, files),
+        Command::Survey(arguments) => survey::run(arguments, files),
     }
 }
 

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 33] = [
+pub const LINES: [(&str, &str); 34] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
@@ -50,6 +50,7 @@ pub const LINES: [(&str, &str); 33] = [
     ),
     ("learn outcomes", "learn outcomes {outcomes} --epsilon 0.9"),
     ("learn check", "learn check {model} {detections}"),
+    ("learn survey", "learn survey {site} {dockings}"),
     ("predict", "predict {model} --at {at}"),
     (
         "replay",
@@ -153,6 +154,7 @@ pub fn file_of(leaf: &str, argument: &str) -> &'static str {
         (_, "costs") => "costs.csv",
         (_, "detections") => "detections.csv",
         (_, "outcomes") => "outcomes.csv",
+        (_, "dockings") => "dockings.csv",
         (_, "at") => "at.csv",
         (_, "firmware") => "firmware",
         (_, "covariance_file") => "covariance.csv",
@@ -356,6 +358,20 @@ fn fixture() -> Folder {
         }
         scored += &format!("{row},1.5,0.2,0\n");
     }
+    let dockings = (0..8).map(|docking| {
+        let [x, y, yaw] = [0; 3].map(|_| 0.01 * random());
+        format!(
+            "{docking},dock,t7,{:.5},{:.5},{:.5}\n",
+            1.5 + x,
+            0.2 + y,
+            yaw
+        )
+    });
+    let dockings: String = dockings.collect();
+    folder.write(
+        "dockings.csv",
+        format!("run,dock,tag,x_m,y_m,yaw_rad\n{dockings}"),
+    );
     folder.write("estimates.csv", estimates);
     folder.write("scored.csv", scored);
     folder.write("truth.tum", &tum);

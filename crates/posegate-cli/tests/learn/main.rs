@@ -12,6 +12,7 @@ mod law;
 mod provenance;
 mod recorded;
 mod site;
+mod survey;
 
 use posegate_host::learn::acceptance;
 
