@@ -518,16 +518,19 @@ impl<'a> Gate<'a> {
         let movement = self.settings.movement(source.motion, age_ms);
         let movement = movement.plus(evidence.beside);
         let radius = table.radius_squared();
-        let aged = source.trust_after(evidence.since_fix_ms);
-        let allowed;
-        let trust = if evidence.elsewhere == Risk::NONE {
-            &aged
+        // Most reports state neither: nothing is copied for them.
+        let changed;
+        let trust = if evidence.since_fix_ms.is_none() && evidence.elsewhere == Risk::NONE {
+            &source.trust
         } else {
+            let aged = source.trust_after(evidence.since_fix_ms);
             match allowed_for(evidence.elsewhere, radius, aged) {
-                Some(trust) if evidence.can_make_up() => allowed = trust,
+                Some(trust) if evidence.elsewhere == Risk::NONE || evidence.can_make_up() => {
+                    changed = trust;
+                }
                 _ => return Ok(Err(Reason::ElsewhereTooLikely)),
             }
-            &allowed
+            &changed
         };
         if let Err(reason) = first_opinion(table, &report.belief, trust, movement) {
             return Ok(Err(reason));
@@ -546,20 +549,25 @@ impl<'a> Gate<'a> {
             return Err(CorruptWord);
         };
         let movement = self.movement_by_complement(report, source);
-        let movement = movement.plus(black_box(evidence).beside);
-        let elsewhere = black_box(evidence).elsewhere;
-        let aged = source.trust_again(black_box(evidence).since_fix_ms);
-        let allowed;
-        let trust = if elsewhere == Risk::NONE {
-            &aged
+        let Evidence {
+            beside,
+            elsewhere,
+            since_fix_ms,
+            ..
+        } = *black_box(evidence);
+        let movement = movement.plus(beside);
+        let changed;
+        let trust = if since_fix_ms.is_none() && elsewhere == Risk::NONE {
+            &source.trust
         } else {
             // The radius from flash, as for the evaluation itself.
             let radius = table::stored_radius_squared(self.bytes);
+            let aged = source.trust_again(since_fix_ms);
             match radius.and_then(|radius| allowed_for(elsewhere, radius, aged)) {
-                Some(trust) => allowed = trust,
+                Some(trust) => changed = trust,
                 None => return Ok(Err(Reason::EvaluationsDisagree)),
             }
-            &allowed
+            &changed
         };
         let confirms = |belief: &PoseEstimate| {
             let word = second::opinion_after(self.bytes, belief, *trust, movement);

@@ -352,12 +352,10 @@ impl Settings<'_> {
                 CrossTerms::AllUnknown(share) => 0x200 | u32::from(share.q8()),
             };
             let [speed, turn] = source.motion.words();
-            let sum = source.aging.words().into_iter().fold(sum, mixed);
             [
-                frame as u32,
-                (frame >> 32) as u32,
-                source.trust.inflation.q16(),
-                terms,
+                // A flipped bit of one part changes the word.
+                frame as u32 ^ (frame >> 32) as u32,
+                source.trust.inflation.q16() ^ terms ^ source.aging.digest(),
                 speed,
                 turn,
             ]

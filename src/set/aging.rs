@@ -19,11 +19,22 @@ const FACTOR_POWER: u32 = 10;
 /// known, the source's own inflation applies, which no step exceeds ([`Aging::is_within`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Aging([u32; MOST_AGES]);
+pub struct Aging {
+    words: [u32; MOST_AGES],
+    /// The digest of the words, compared at every use, so that a gate need not read the words if it does not use them.
+    digest: u32,
+}
 
 impl Aging {
     /// No steps: the source's own inflation at every age.
-    pub const NONE: Self = Self([0; MOST_AGES]);
+    pub const NONE: Self = Self::of([0; MOST_AGES]);
+
+    const fn of(words: [u32; MOST_AGES]) -> Self {
+        Self {
+            words,
+            digest: digest(words),
+        }
+    }
 
     /// Returns factors by age, from the youngest: up to `age_ms` milliseconds, ends included, the factor. Ages are rounded down to 64 ms,
     /// factors up to 2^-6. `None` if there are more than [`MOST_AGES`] steps, an age is below 64 ms or above 4194 s, ages do not
@@ -42,7 +53,7 @@ impl Aging {
             let factor = u16::try_from(factor).ok()?;
             *word = u32::from(factor) << 16 | u32::from(age);
         }
-        let aging = Self(words);
+        let aging = Self::of(words);
         let used = words.iter().filter(|word| **word != 0).count();
         (used == steps.len() && aging.is_valid()).then_some(aging)
     }
@@ -50,14 +61,24 @@ impl Aging {
     /// Returns factors by age from words, as [`Aging::words`] returns them. `None` if they are not valid.
     #[must_use]
     pub fn from_words(words: [u32; MOST_AGES]) -> Option<Self> {
-        let aging = Self(words);
+        let aging = Self::of(words);
         aging.is_valid().then_some(aging)
     }
 
     /// Returns the words: of each step its age and its factor.
     #[must_use]
     pub const fn words(self) -> [u32; MOST_AGES] {
-        self.0
+        self.words
+    }
+
+    /// Returns the digest of the words.
+    pub(crate) const fn digest(self) -> u32 {
+        self.digest
+    }
+
+    /// Returns `true` if the words are those of the digest. No single flipped bit leaves it so.
+    const fn is_whole(self) -> bool {
+        self.digest == digest(self.words)
     }
 
     /// Returns `true` if ages rise, factors are at least 1 and do not fall, and unused words come last. A bit flip in memory can make it
@@ -66,7 +87,10 @@ impl Aging {
     pub fn is_valid(self) -> bool {
         let mut before = (0u32, 0u32);
         let mut is_over = false;
-        for word in self.0 {
+        if !self.is_whole() {
+            return false;
+        }
+        for word in self.words {
             let (age, factor) = (word & 0xffff, word >> 16);
             if word == 0 {
                 is_over = true;
@@ -82,17 +106,20 @@ impl Aging {
     /// Returns `true` if no step has a larger factor than `inflation`.
     #[must_use]
     pub fn is_within(self, inflation: Inflation) -> bool {
-        self.0
+        self.words
             .iter()
             .all(|word| u64::from(word >> 16) << FACTOR_POWER <= u64::from(inflation.q16()))
     }
 
-    /// Returns the factor of an age, or `inflation` beyond the last step.
+    /// Returns the factor of an age, or `inflation` beyond the last step and if the words are damaged.
     #[must_use]
     pub(crate) fn at(self, since_fix_ms: u32, inflation: Inflation) -> Inflation {
         // Rounded up: an age between two units is beyond the lower one.
         let age = (u64::from(since_fix_ms).wrapping_add(63) >> AGE_POWER) as u32;
-        for word in self.0 {
+        if !self.is_whole() {
+            return inflation;
+        }
+        for word in self.words {
             if word != 0 && age <= word & 0xffff {
                 return stepped(word).unwrap_or(inflation);
             }
@@ -104,7 +131,10 @@ impl Aging {
     #[must_use]
     pub(crate) fn at_from_oldest(self, since_fix_ms: u32, inflation: Inflation) -> Inflation {
         let mut factor = inflation;
-        for word in self.0.iter().rev() {
+        if !self.is_whole() {
+            return inflation;
+        }
+        for word in self.words.iter().rev() {
             let ends_ms = (word & 0xffff) << AGE_POWER;
             if *word != 0 && !(since_fix_ms > ends_ms) {
                 factor = stepped(*word).unwrap_or(inflation);
@@ -112,6 +142,11 @@ impl Aging {
         }
         factor
     }
+}
+
+/// Returns a digest in which every bit of every word counts.
+const fn digest([a, b, c, d]: [u32; MOST_AGES]) -> u32 {
+    a ^ b.rotate_left(8) ^ c.rotate_left(16) ^ d.rotate_left(24) ^ 0x5eed_a9e5
 }
 
 /// Returns the factor of a step; `None` if it is damaged.
@@ -244,12 +279,31 @@ mod tests {
         /// Any words, as a fault in memory leaves them: a factor of the table or the source's, without a panic.
         #[test]
         fn any_words_have_a_factor(words in any::<[u32; MOST_AGES]>(), age: u32) {
-            let aging = Aging(words);
+            let aging = Aging::of(words);
             let largest = factor(4 << 16);
             for used in [aging.at(age, largest), aging.at_from_oldest(age, largest)] {
                 prop_assert!(Inflation::from_q16(used.q16()).is_some());
             }
             let _ = (aging.is_valid(), aging.is_within(largest));
+        }
+
+        /// After a flipped bit of words or digest the source's own inflation applies.
+        #[test]
+        fn a_flipped_bit_leaves_no_smaller_factor(
+            ages in proptest::array::uniform4(1u32..2000), bit in 0u32..160, age in 0u32..600_000,
+        ) {
+            let mut steps: Vec<(u32, Inflation)> = ages.iter().map(|age| (age << 6, Inflation::NONE)).collect();
+            steps.sort_unstable();
+            if let Some(mut aging) = Aging::new(&steps) {
+                match aging.words.get_mut(bit as usize / 32) {
+                    Some(word) => *word ^= 1 << (bit % 32),
+                    None => aging.digest ^= 1 << (bit % 32),
+                }
+                let largest = factor(4 << 16);
+                prop_assert!(!aging.is_valid());
+                prop_assert_eq!(aging.at(age, largest), largest);
+                prop_assert_eq!(aging.at_from_oldest(age, largest), largest);
+            }
         }
     }
 }
