@@ -284,6 +284,12 @@ const JOBS: &[Job] = &[
         jobs::package::package,
     ),
     job(
+        "dist",
+        "[FOLDER [BUILDS]]",
+        "the files of a release: built twice alike, installed into empty roots, and run there",
+        jobs::dist::dist,
+    ),
+    job(
         "slurm",
         "[ENDPOINTS]",
         "a site on four nodes of Slurm, one of which is killed",
