@@ -214,6 +214,19 @@ mod tests {
         assert!(compared(&folders[0], &folders[1]).is_err());
     }
 
+    /// The wheel contains the files of its own folder.
+    #[test]
+    fn licences_of_the_wheel_are_those_of_the_repository() {
+        for name in archives::LICENCES {
+            let own = files::root().join("crates/posegate-python").join(name);
+            let top = files::root().join(name);
+            assert!(
+                files::bytes(&own).unwrap() == files::bytes(top).unwrap(),
+                "copy {name} into crates/posegate-python"
+            );
+        }
+    }
+
     #[test]
     fn a_folder_with_other_files_is_not_emptied() {
         let folder = Scratch::new().unwrap();

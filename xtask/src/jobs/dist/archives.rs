@@ -12,7 +12,7 @@ pub const CORES: [&str; 4] = [
     "thumbv7em-none-eabihf",
     "thumbv8m.main-none-eabihf",
 ];
-const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
+pub const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 /// What a robot's integrator copies: files of the repository.
 const FOR_ROS: [&str; 3] = [
     "crates/posegate-ros2/launch/posegate.launch.py",

@@ -44,8 +44,8 @@ pub fn install(release: &Path, version: &str, report: &mut Report) -> Result {
     say("commands of the README");
     let lines = commands(&files::read("README.md")?)?;
     for line in &lines {
-        // Into an empty root instead of this machine.
-        let there = format!("dpkg --root='{}'", debian.display());
+        // Into an empty root instead of this machine, and without an administrator.
+        let there = format!("unshare --map-root-user dpkg --root='{}'", debian.display());
         let line = line.replacen("sudo dpkg", &there, 1);
         cmd("bash -c")
             .arg(line)
@@ -182,7 +182,7 @@ fn run_programs(root: &Path, folder: &str, version: &str) -> Result {
 
 /// Checks what dpkg installed, and that it removes all of it.
 fn remove_package(root: &Path) -> Result {
-    let dpkg = || cmd("dpkg").arg(format!("--root={}", root.display()));
+    let dpkg = || cmd("unshare --map-root-user dpkg").arg(format!("--root={}", root.display()));
     let changed = dpkg().words("--verify posegate").read()?;
     if !changed.trim().is_empty() {
         return Err(format!("dpkg --verify: {changed}").into());
