@@ -2,6 +2,7 @@
 //! `integrations/behaviortree` with BehaviorTree.CPP.
 
 use crate::arguments::Arguments;
+use crate::board;
 use crate::files::{self, Scratch, target_folder};
 use crate::jobs::docs::release_program;
 use crate::need;
@@ -11,6 +12,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const CRATE: &str = "crates/posegate-ros2";
+/// The core of the controller that is emulated.
+const CORE: &str = "thumbv7em-none-eabihf";
 /// How often each cause that ends a permit is tried.
 const RUNS: u64 = 5;
 /// ROS 2 Jazzy as wheels of Python 3.11. There is no installation of ROS in this job.
@@ -24,6 +27,8 @@ const TREES: &str = "behaviortreepy==0.1.4";
 /// permit is tried; 50 is the deep variant.
 pub fn ros2(given: &Arguments) -> Result {
     let runs = given.number(0, RUNS)?;
+    need::targets(&[CORE])?;
+    need::qemu()?;
     let python = python()?;
     let manifest = format!("{CRATE}/Cargo.toml");
     say("lints");
@@ -59,6 +64,9 @@ pub fn ros2(given: &Arguments) -> Result {
     live("failsafe").arg(runs.to_string()).json()?;
     live("rows").arg(&bag).json()?;
     live("cyclone").json()?;
+    say("a controller on a serial line");
+    let firmware = board::build(CORE, "interrupt_gate")?;
+    live("serial").arg(firmware).arg(runs.to_string()).json()?;
     Ok(())
 }
 
