@@ -20,9 +20,10 @@
 //! |---|---|
 //! | `S sin(T x)` | `kappa S T x + abs(S) (w^3/24 + w^5/3000)`, `kappa = 1 - w^2/8` |
 //! | `C cos(T x)` | C if C > 0, else `C cos w`; in the parabola, if C > 0: `C - C (1 - cos w) (x/h)^2` |
-//! | robot axes, `G = n.f`: `G x cos(T x)` | `G x + abs(G) h (1 - cos w)` |
+//! | robot axes, `G = n.f`: `G x cos(T x)` | `G x (1 - 3 w^2/8) + abs(G) h (w^2/8 + w^4/24)` |
 //! | robot axes, `H = (J n).f`: `H x sin(T x)` | `H h w (x/h)^2` if H > 0, else 0 |
-//! | robot axes: `abs(F23' n_t)` | convex in tan(T x): below its chord over the slab, `n + tilt tan(T x) / tan(w)`, and `tan(T x) / tan(w)` is off x/h by 0.17 w^2 at most |
+//! | robot axes: `abs(F23' n_t)`, a = F23' n, b = F23' J n | its square is `a.a + (b.b - a.a) sin^2 + a.b sin(2 T x)`, so with `p^2 = a.a + max(b.b - a.a, 0) sin^2 w` it is at most `p + (a.b / p) sin(2 T x) / 2` |
+//! | its `sin(2 T x) / 2` | `(1 - w^2/2) T x`, off by at most `w^3/6 + 2 w^5/15` |
 //! | its product with r(u) | `n r(u) + tilt r(e) x/h + abs(tilt) max abs(r(u) - r(e))` |
 //! | what a movement adds ([`Movement`]) | `rho abs(n) + d (abs(S) + abs(C) (w + d/2))`, and in robot axes d times the longest offset |
 //! | first bound: `g x + N r(e + x)` | its largest value on the slab: at an end, or `hypot(g, N) - g e` |
@@ -39,8 +40,8 @@
 //! | the middle's heading, 1 of 2^-32 turn: 1.5e-9 rad, times 2^29.5 | 1.2 in C and, times w, in S |
 //! | the columns of F, C, S, G, H and the products `G e`, `H e` to fine units | 4 |
 //! | T to 2^-28 rad, 0.5 and 1.5e-9 of it, times h, times S: at most `(0.5 + 0.4 T) h 2^1.5` | 3 |
-//! | kappa and its products | 4 |
-//! | **sum** | **20.6** |
+//! | kappa and its products; the product of G with `3 w^2/8` | 5 |
+//! | **sum** | **21.6** |
 //!
 //! In robot axes C and S hold `G e` and `H e` and may reach 2^29.9: 3.4 more. What a scale rounds (margins only) is paid by
 //! [`SCALED_UM_Q14`] and [`SCALED_YAW`].
@@ -253,14 +254,30 @@ pub(super) struct Width {
     kappa: i32,
     /// `w^3/24 + w^5/3000`, 2^-28, up.
     rest: i32,
+    /// `w^2/8 + w^4/24`, 2^-28, up, and what `3 (1 - kappa)` is off `3 w^2 / 8`.
+    shortening_rest: i32,
     /// `cos w`, 2^-28, down.
     cos: i32,
-    /// `1 - cos w`, 2^-28, down.
-    versine: i32,
-    /// `tan w`, 2^-28, up.
-    tan: i32,
-    /// Sections do not shrink with u: a cylinder's.
-    is_cylinder: bool,
+    /// `sin^2 w`, 2^-28, up.
+    sine_square: i32,
+    /// `w - w^3/2`, 2^-28, to within 12 units.
+    leaning: i32,
+    /// `w^3/6 + 2 w^5/15`, 2^-28, up, and what `leaning` and [`slope`] are off.
+    leaning_rest: i32,
+}
+
+impl Width {
+    /// Returns `3 w^2 / 8`, 2^-28, to within 5 units.
+    #[inline(always)]
+    const fn shortening(&self) -> i32 {
+        (ONE as i32).wrapping_sub(self.kappa).wrapping_mul(3)
+    }
+
+    /// Returns `1 - cos w`, 2^-28, down: `cos` is at most 6 units too small.
+    #[inline(always)]
+    fn versine(&self) -> i32 {
+        (ONE as i32).wrapping_sub(self.cos).wrapping_sub(7).max(0)
+    }
 }
 
 /// One facet at the middle of a slab, fine units.
@@ -471,11 +488,11 @@ impl Sweep {
         let up = |a: i64, b: i64| (a.wrapping_mul(b) >> 28).wrapping_add(1);
         let square = up(w, w);
         let cube = up(square, w);
-        let fifth = up(cube, square);
+        let fourth = up(cube, w);
+        let fifth = up(fourth, w);
         let cos_down = cos.wrapping_sub(4) >> 2;
         let sin_up = i64::from((sin.wrapping_add(4) >> 2).wrapping_add(1));
         Width {
-            is_cylinder: self.radius.is_some(),
             in_u: 1i32.wrapping_shl(U.wrapping_sub(depth)),
             w: w as i32,
             kappa: ONE.wrapping_sub(square >> 3) as i32,
@@ -483,16 +500,17 @@ impl Sweep {
             rest: (cube.wrapping_mul(10_923) >> 18)
                 .wrapping_add(fifth.wrapping_mul(1_399) >> 22)
                 .wrapping_add(2) as i32,
+            // By 24, up, without a quotient.
+            shortening_rest: (square >> 3)
+                .wrapping_add(fourth.wrapping_mul(10_923) >> 18)
+                .wrapping_add(8) as i32,
             cos: cos_down,
-            versine: (ONE as i32)
-                .wrapping_sub(cos.wrapping_add(16) >> 2)
-                .wrapping_sub(1)
-                .max(0),
-            tan: sin_up
-                .wrapping_shl(28)
-                .checked_div(i64::from(cos_down.max(1)))
-                .unwrap_or(i64::from(i32::MAX))
-                .wrapping_add(1) as i32,
+            sine_square: up(sin_up, sin_up) as i32,
+            leaning: w.wrapping_sub(cube >> 1) as i32,
+            // Two fifteenths, up, without a quotient; the slope times at most a half.
+            leaning_rest: (cube.wrapping_mul(43_691) >> 18)
+                .wrapping_add(fifth.wrapping_mul(34_953) >> 18)
+                .wrapping_add(16 + (1 << 13)) as i32,
         }
     }
 
@@ -766,7 +784,9 @@ impl Sweep {
 impl Section {
     /// What the slab about this section is.
     pub fn slab(&self, sweep: &Sweep, e: i32, width: &Width) -> Slab {
-        let root = if width.is_cylinder {
+        // Sections of a cylinder do not shrink with u.
+        let is_cylinder = sweep.radius.is_some();
+        let root = if is_cylinder {
             Root::CYLINDER
         } else {
             Root::of(e)
@@ -790,22 +810,22 @@ impl Section {
         }
         let (mut bend, mut rise) = (0, 0);
         if self.turns {
-            let versine = (ONE as i32).wrapping_sub(width.cos);
             let g = over(i64::from(self.g_turning.saturating_abs())).wrapping_add(1);
-            let change = if width.is_cylinder {
+            let change = if is_cylinder {
                 0
             } else {
                 root.change(width.in_u)
             };
             let changes = tilt.saturating_abs().wrapping_mul(i64::from(change)) >> U;
             fixed = fixed
-                .wrapping_sub(part(g, versine))
+                .wrapping_sub(part(g, width.shortening_rest))
                 .wrapping_sub(changes)
                 .wrapping_sub(2);
             bend = part(over(i64::from(self.h.max(0))).wrapping_add(1), width.w);
             rise = tilt
                 .wrapping_mul(i64::from(root.up))
-                .wrapping_shr(width.in_u.trailing_zeros());
+                .wrapping_shr(width.in_u.trailing_zeros())
+                .wrapping_sub(product(self.g_turning, width.shortening()) >> 28);
         }
         let turned = sweep.turn().wrapping_mul(i64::from(self.s)) >> 28;
         let g = i64::from(self.g)
@@ -818,17 +838,17 @@ impl Section {
             i64::from(self.c)
         };
         let spare = fixed.wrapping_sub(c);
-        if !width.is_cylinder && at_most(spare.wrapping_sub(bend), g, n, e, width.in_u) {
+        if !is_cylinder && at_most(spare.wrapping_sub(bend), g, n, e, width.in_u) {
             return Slab::Inside;
         }
         let curve = if self.c > 0 {
-            product(self.c, width.versine) >> 28
+            product(self.c, width.versine()) >> 28
         } else {
             0
         };
         let curve = curve.wrapping_sub(bend);
         let spare = spare.wrapping_sub(more);
-        let is_inside = if width.is_cylinder {
+        let is_inside = if is_cylinder {
             let slope = over(g.saturating_abs()).wrapping_add(3);
             peak_at_most(spare.wrapping_sub(n).wrapping_sub(4), slope, curve)
         } else {
@@ -918,11 +938,19 @@ impl Section {
                 tilt: 0,
             };
         }
-        let by = |b: i64| b.wrapping_mul(i64::from(width.tan)) >> 28;
-        let (b2, b3) = (by(b2), by(b3));
-        let plus = root(a2.wrapping_add(b2), a3.wrapping_add(b3));
-        let minus = root(a2.wrapping_sub(b2), a3.wrapping_sub(b3));
-        let (sum, tilt) = (plus.wrapping_add(minus), plus.wrapping_sub(minus));
+        // Squares of lengths below 2^29.2.
+        let (still_square, turned_square) = (squares(a2, a3), squares(b2, b3));
+        let grown = turned_square.saturating_sub(still_square);
+        let grown = (grown >> 28)
+            .wrapping_add(1)
+            .wrapping_mul(width.sine_square.unsigned_abs().into());
+        let p = sqrt_ceil(still_square.wrapping_add(grown)).max(16);
+        let slope = slope(a2.wrapping_mul(b2).wrapping_add(a3.wrapping_mul(b3)), p);
+        let of_slope = |part: i32| slope.wrapping_mul(i64::from(part)) >> 28;
+        let off = (slope
+            .saturating_abs()
+            .wrapping_mul(i64::from(width.leaning_rest)))
+            >> 28;
         // Of world axes, `cos(T x)` times the whole and the rest of what is still.
         let versine = i64::from((ONE as i32).wrapping_sub(width.cos));
         let still = if self.still > 0 {
@@ -930,16 +958,30 @@ impl Section {
         } else {
             0
         };
-        // The tangent's share of the slab is off its linear share by at most 0.17 w^2.
-        let square = i64::from(width.w).wrapping_mul(i64::from(width.w)) >> 28;
-        let off = (tilt.saturating_abs().wrapping_mul(square) >> 28).wrapping_mul(44) >> 9;
+        // Two coordinates within 1.6 of a and of b, the quotient, and two products.
         Reach {
-            n: (sum >> 1)
-                .wrapping_add(off)
-                .wrapping_add(still)
-                .wrapping_add(2),
-            tilt: tilt >> 1,
+            n: p.wrapping_add(off).wrapping_add(still).wrapping_add(9),
+            tilt: of_slope(width.leaning),
         }
+    }
+}
+
+/// Returns `product / p` to within 2^-14 of itself and 2, by a quotient of 32 bits: a longer one takes more stack. p is below 2^31, above
+/// zero.
+#[inline(always)]
+fn slope(product: i64, p: i64) -> i64 {
+    let magnitude = product.unsigned_abs();
+    let above = |bits: u32, zeros: u32| 64u32.wrapping_sub(zeros).saturating_sub(bits);
+    let down = above(32, magnitude.leading_zeros());
+    let less = above(16, p.leading_zeros());
+    let quotient = (magnitude.wrapping_shr(down) as u32)
+        .checked_div(p.wrapping_shr(less) as u32)
+        .unwrap_or(0);
+    let quotient = i64::from(quotient).wrapping_shl(down).wrapping_shr(less);
+    if product < 0 {
+        quotient.wrapping_neg()
+    } else {
+        quotient
     }
 }
 

@@ -414,3 +414,20 @@ fn what_holds_broadly_is_inside() {
     std::println!("{accepted} accepted, {far} far ones are not");
     assert!(accepted > 1_000 && far == 0, "{accepted} {far}");
 }
+
+#[test]
+fn slopes_are_within_their_error() {
+    let mut random = Random(5);
+    for round in 0..200_000 {
+        let p = random.size(16.0, 2_147_483_000.0) as i64;
+        let most = p as f64 * random.size(0.1, 2_000_000_000.0);
+        let product = random.within(-1.0, 1.0) * most.min(1.1e18);
+        let product = if round % 100 == 0 { 0 } else { product as i64 };
+        let exact = product as f64 / p as f64;
+        let off = (slope(product, p) as f64 - exact).abs();
+        assert!(
+            off <= exact.abs() / 16_384.0 + 2.0,
+            "{product} / {p}: {off} of {exact}"
+        );
+    }
+}

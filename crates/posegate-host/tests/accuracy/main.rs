@@ -128,16 +128,21 @@ fn q16(margin: posegate::contain::Margin) -> f64 {
 }
 
 fn main() -> ExitCode {
-    let alone = std::env::args().any(|word| word == "unions");
+    let alone = std::env::args().find(|word| ["unions", "turning"].contains(&word.as_str()));
     let arguments: Vec<u64> = std::env::args()
         .skip(1)
-        .filter(|a| !a.starts_with("--") && a != "unions")
-        .map(|a| a.parse().expect("accuracy [N [SEED]] [unions]"))
+        .filter(|a| !a.starts_with("--") && alone.as_ref() != Some(a))
+        .map(|a| a.parse().expect("accuracy [N [SEED]] [unions|turning]"))
         .collect();
     let count = arguments.first().copied().unwrap_or(200);
     let seed = arguments.get(1).copied().unwrap_or(1);
-    if alone {
-        return ExitCode::from(u8::from(unions::unions(count, seed)));
+    if let Some(part) = alone {
+        let run = if part == "unions" {
+            unions::unions
+        } else {
+            turning::turning
+        };
+        return ExitCode::from(u8::from(run(count, seed)));
     }
     let extent = SetDeg::Box {
         x: [-2.0, 2.0],
