@@ -2,7 +2,7 @@
 
 use crate::files;
 use crate::need;
-use crate::shell::{Cmd, Result, cmd, program_at, say};
+use crate::shell::{Cmd, Result, cmd, say};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -14,6 +14,13 @@ pub const STATIC: &str = "x86_64-unknown-linux-musl";
 pub const WHEEL: &str = "x86_64-unknown-linux-gnu";
 /// The oldest systems on which the wheel must run: glibc 2.17.
 const WHEEL_TAG: &str = "manylinux2014";
+
+/// Where every build finds the sources. Cargo puts the path of a package outside of its workspace into the names of symbols, and the
+/// node and the wheel are such workspaces: so each build sees the sources at this path, by a mount of its own.
+const PLACE: &str = "/tmp/posegate-dist";
+/// Runs a command where the folder that is the first argument is mounted at [`PLACE`]. No administrator is needed.
+const MOUNTED: &str =
+    "mkdir -p \"$0\" && mount --bind \"$1\" \"$0\" && cd \"$0\" && shift && exec \"$@\"";
 
 /// Where a build reads and writes.
 pub struct Sources {
@@ -46,8 +53,8 @@ impl Sources {
         })
     }
 
-    /// Returns a command of cargo or of maturin whose output does not depend on the folders.
-    fn reproducible(&self, command: Cmd) -> Result<Cmd> {
+    /// Returns a command of cargo or of maturin whose output does not depend on the folders. Its words follow.
+    fn reproducible(&self, program: &Path) -> Result<Cmd> {
         let home = std::env::var_os("CARGO_HOME")
             .map(PathBuf::from)
             .or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")));
@@ -56,21 +63,26 @@ impl Sources {
         let flags = [
             format!("--remap-path-prefix={}=cargo", home.display()),
             format!("--remap-path-prefix={}=target", self.target.display()),
-            format!("--remap-path-prefix={}=posegate", self.folder.display()),
+            format!("--remap-path-prefix={PLACE}=posegate"),
         ];
-        Ok(command
+        Ok(cmd("unshare --map-root-user --mount sh -c")
+            .arg(MOUNTED)
+            .arg(PLACE)
+            .arg(&self.folder)
+            .arg(program)
             .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))
             .env("CARGO_TARGET_DIR", &self.target)
             .env("CARGO_INCREMENTAL", "0")
             .env("CARGO_PROFILE_RELEASE_STRIP", "symbols")
-            .env("SOURCE_DATE_EPOCH", &self.epoch)
-            .dir(&self.folder))
+            .env("SOURCE_DATE_EPOCH", &self.epoch))
     }
 
     fn cargo(&self, words: &str) -> Result<BTreeSet<Crate>> {
-        let command =
-            cmd("cargo build --locked --message-format json-render-diagnostics").words(words);
-        let lines = self.reproducible(command)?.read()?;
+        let lines = self
+            .reproducible(Path::new("cargo"))?
+            .words("build --locked --message-format json-render-diagnostics")
+            .words(words)
+            .read()?;
         lines
             .lines()
             .filter_map(|line| compiled(line).transpose())
@@ -166,13 +178,15 @@ pub fn wheel(sources: &Sources, folder: &Path) -> Result {
     let bin = tools.parent().ok_or("no folder of Python")?.to_owned();
     let path = std::env::var_os("PATH").unwrap_or_default();
     let path = std::env::join_paths(std::iter::once(bin).chain(std::env::split_paths(&path)))?;
-    let command = program_at(&tools)
+    sources
+        .reproducible(&tools)?
         .words("-m maturin build --release --locked --zig --target")
         .words(&format!(
             "{WHEEL} --compatibility {WHEEL_TAG} -m crates/posegate-python/Cargo.toml -o"
         ))
-        .arg(folder);
-    sources.reproducible(command)?.env("PATH", path).run()
+        .arg(folder)
+        .env("PATH", path)
+        .run()
 }
 
 /// Copies the files of the repository into a new folder.
