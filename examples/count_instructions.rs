@@ -254,8 +254,8 @@ mod firmware {
             let limits = match (is_union, M4F) {
                 (false, true) => [20_000, 29_000],
                 (false, false) => [60_000, 112_000],
-                (true, true) => [20_000, 456_000],
-                (true, false) => [60_000, 1_350_000],
+                (true, true) => [20_000, 303_000],
+                (true, false) => [60_000, 1_210_000],
             };
             counter.short_of(cost, search.cost(), "instructions", limits);
             let most = if is_union { 2_176 } else { 1_024 };

@@ -2,14 +2,15 @@
 
 use crate::door::{Failure, Outcome, answer, print, print_json, site_and_text};
 use posegate::bake::{BakeInput, check};
-use posegate_host::doctor::{Warning, examine};
+use posegate_host::doctor::{Warning, decision_costs, examine};
 use posegate_host::files::{Files, Input};
 use serde_json::{Value, json};
 
 /// Checks a site file: everything is validated, nothing is built
 ///
 /// Ends with the warnings of `posegate doctor`: likely mistakes in tags, candidates, cameras and tasks, with the line of
-/// the file. Warnings do not change the exit code.
+/// the file. If the site has a `[controller]`, they name each task whose table may take more cycles for a decision than
+/// the controller has. Warnings do not change the exit code.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate check site.toml")]
 pub struct Arguments {
@@ -42,7 +43,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             (name, shape, site.chosen_table(task))
         })
         .collect();
-    let warnings = examine(&site).warnings;
+    let mut warnings = examine(&site).warnings;
+    let costs = decision_costs(&site);
+    warnings.extend(costs.map_err(|(name, error)| Failure::table(&arguments.site, &name, error))?);
     if arguments.json {
         let tasks: Vec<_> = tasks
             .iter()

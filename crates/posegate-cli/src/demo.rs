@@ -3,7 +3,7 @@
 use crate::door::{Failure, Outcome, answer, print, progress};
 use posegate_host::draw::report::{numbers, summary};
 use posegate_host::draw::study::{CaseStudy, SITE, StudyError};
-use posegate_host::draw::{fig1_parking, fig3_plan, fig3_sections, fig4_placement};
+use posegate_host::draw::{fig1_parking, fig2_chain, fig3_plan, fig3_sections, fig4_placement};
 use posegate_host::files::{Files, OutputFolder};
 
 /// Writes the paper's case study: pictures, tables and numbers
@@ -30,6 +30,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     for (name, text) in [
         ("fig1-parking.svg", fig1_parking(&study)),
+        ("fig2-chain.svg", fig2_chain(&study)),
         ("fig3-sections.svg", fig3_sections(&study)),
         ("fig3-plan.svg", fig3_plan(&study)),
         ("fig4-placement.svg", Ok(fig4_placement(&study))),

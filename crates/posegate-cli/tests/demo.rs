@@ -6,8 +6,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 const TASKS: [&str; 3] = ["park", "dock", "see-t7"];
-const PICTURES: [&str; 4] = [
+const PICTURES: [&str; 5] = [
     "fig1-parking.svg",
+    "fig2-chain.svg",
     "fig3-sections.svg",
     "fig3-plan.svg",
     "fig4-placement.svg",

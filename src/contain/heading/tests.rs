@@ -431,3 +431,51 @@ fn slopes_are_within_their_error() {
         );
     }
 }
+
+/// The bounds of a slab's width, each over its slab: sine and cosine of the heading, and the width of a normal that turns.
+#[test]
+fn no_bound_of_a_width_is_below_the_truth() {
+    let one = ONE as f64;
+    let mut random = Random(6);
+    for _ in 0..400 {
+        let (mut sweep, ..) = case(&mut random);
+        sweep.yaw = (random.size(1e-4, WHOLE) / WHOLE * f64::from(ONE_TURN)) as u32 + 1;
+        sweep.turn = (i64::from(sweep.yaw).wrapping_mul(TAU).wrapping_add(1 << 19) >> 20) as i32;
+        let turn = f64::from(sweep.yaw) / f64::from(ONE_TURN) * WHOLE;
+        let depth = sweep.first_depth() + random.within(0.0, 3.0) as u32;
+        let width = sweep.width(depth);
+        let w = turn / f64::from(1u32 << depth);
+        let [kappa, rest, cos, shortening_rest] =
+            [width.kappa, width.rest, width.cos, width.shortening_rest].map(|v| f64::from(v) / one);
+        let [sine_square, leaning, leaning_rest] =
+            [width.sine_square, width.leaning, width.leaning_rest].map(|v| f64::from(v) / one);
+        let [shortening, versine] =
+            [width.shortening(), width.versine()].map(|v| f64::from(v) / one);
+        for step in -200..=200 {
+            let y = f64::from(step) / 200.0;
+            let t = w * y;
+            // What kappa rounds is paid by the slack.
+            assert!((t.sin() - kappa * t).abs() <= rest + 2e-8, "S: {w} {y}");
+            assert!(
+                (y * t.cos() - y * (1.0 - shortening)).abs() <= shortening_rest,
+                "G: {w} {y}"
+            );
+            assert!(
+                ((2.0 * t).sin() / 2.0 - leaning * y).abs() <= leaning_rest,
+                "sin 2t: {w} {y}"
+            );
+            assert!(t.sin().powi(2) <= sine_square && cos <= t.cos(), "{w} {y}");
+        }
+        assert!(versine <= 1.0 - w.cos(), "{w}");
+        // No bound is more than twice what it has to be.
+        let most = |f: &dyn Fn(f64) -> f64| {
+            let at = (-200..=200).map(|step| f(f64::from(step) / 200.0).abs());
+            at.fold(0.0, f64::max)
+        };
+        let short = most(&|y| y * (w * y).cos() - y * (1.0 - shortening));
+        assert!(
+            shortening_rest <= 2.0 * short + 1e-7,
+            "{w}: {shortening_rest} of {short}"
+        );
+    }
+}

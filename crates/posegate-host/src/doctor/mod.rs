@@ -14,10 +14,12 @@
 //! # Ok::<(), posegate_host::site::SiteError>(())
 //! ```
 
+pub use self::cost::decision_costs;
 pub use self::deepest::{Deepest, deepest};
 pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_errors};
 
 mod collisions;
+mod cost;
 mod deepest;
 mod faults;
 mod mounting;

@@ -153,7 +153,7 @@ fn panel(
     });
     let [m, rad] = shown.enclosing();
     let known = format!(
-        "{:.1} cm, {:.1}° about the estimate",
+        "{:.1} cm, yaw {:.1}° about the estimate",
         100.0 * m,
         rad.to_degrees()
     );

@@ -1,7 +1,7 @@
 //! Pictures of success sets and pose-sets.
 //!
 //! Pictures are SVG: self-contained, with the same bytes on every host. The
-//! paper's case study ([`study`]) is drawn as its Figs. 1, 3 and 4, and reported in numbers
+//! paper's case study ([`study`]) is drawn as its Figs. 1 to 4, and reported in numbers
 //! ([`report`]).
 //!
 //! ```
@@ -18,6 +18,7 @@ pub use self::belief::PoseSetF64;
 pub(crate) use self::borders::borders_picture;
 pub use self::chain::chain_picture;
 pub use self::depth::{MinSlack, SlackEvaluator};
+pub use self::fig2::fig2_chain;
 pub use self::fig4::fig4_placement;
 pub use self::growth::logarithmic;
 pub use self::localization::fig3_sections;
@@ -38,6 +39,7 @@ mod belief;
 mod borders;
 mod chain;
 mod depth;
+mod fig2;
 mod fig4;
 mod floor;
 mod growth;

@@ -33,6 +33,8 @@ pub const PARK: &str = "park";
 pub const DOCK: &str = "dock";
 /// Seeing the tag: its success set is S_l.
 pub const SEE: &str = "see-t7";
+/// The chain of Fig. 2: a look, then docking.
+pub const CHAIN: &str = "look-then-dock";
 
 /// The uncertainty of the robot's pose, about the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -246,6 +248,9 @@ pub enum StudyError {
     /// A pose-set is not valid.
     #[error("the pose-set {0} is not valid: {1}")]
     PoseSet(PoseSetSpec, InputError),
+    /// The chain of Fig. 2 cannot be evaluated.
+    #[error("the chain of Fig. 2: {0}")]
+    Chain(String),
     /// The tag has no best place.
     #[error("no place for the tag: {0}")]
     Place(String),

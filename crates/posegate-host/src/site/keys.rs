@@ -25,6 +25,29 @@ pub(super) const EPSILON: Key = Key::number(
     |number| number > 0.0 && number < 1.0,
 );
 
+// The controller.
+pub(super) const SITE_CONTROLLER: Key = Key::new(
+    "controller",
+    "a table with `core` and `cycles_per_decision`",
+    "{ core = \"cortex-m4f\", cycles_per_decision = 84000 }",
+);
+pub(super) const CORE: Key = Key::new(
+    "core",
+    "\"cortex-m4f\" (also for M7 and M33) or \"cortex-m0plus\"",
+    "\"cortex-m4f\"",
+);
+pub(super) const CYCLES_PER_DECISION: Key = Key::new(
+    "cycles_per_decision",
+    "the processor cycles that a decision may take: a whole number from 1 to 4294967295",
+    "84000",
+);
+pub(super) const CYCLES_PER_INSTRUCTION: Key = Key::number(
+    "cycles_per_instruction",
+    "the cycles of an instruction on average, with the wait states of the flash: from 1 to 100",
+    "2.0",
+    |number| (1.0..=100.0).contains(&number),
+);
+
 // Poses.
 const POSE3: &str =
     "{ x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }";

@@ -29,6 +29,7 @@ pub use self::chain::{
     ChainStart, ChainStep, DriveModel, Navigation, SiteChain, StartFrame, StartUncertainty,
 };
 pub use self::contents::SiteIndex;
+pub use self::controller::{Controller, Core};
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub(crate) use self::learnt::stated_views;
@@ -42,6 +43,7 @@ mod camera;
 mod candidate;
 mod chain;
 mod contents;
+mod controller;
 #[doc = include_str!("language.md")]
 pub mod language {}
 
@@ -91,6 +93,8 @@ pub struct Site {
     pub table: Option<TableSpec>,
     /// The probability with which the true pose lies in a Gaussian pose-set, in (0, 1).
     pub epsilon: f64,
+    /// The motion controller, if the file names one: `posegate check` compares the cost of decisions with it.
+    pub controller: Option<Controller>,
     /// SHA-256 of the file's bytes. If the site names calibration files, imports or learnt error models: SHA-256 of
     /// that digest and of the SHA-256 of each of these files, in the order of the cameras' names, then the imports'
     /// names, then the models' names.

@@ -12,7 +12,7 @@ use super::named::NamedFile;
 use super::reader::{Node, Table};
 use super::{
     Extent, Layout, Navigation, Planner, Site, SiteTag, Step, TableOverrides, TableSpec, Task,
-    TaskKind, camera, candidate, chain, import, keys, learnt, places, planner, success,
+    TaskKind, camera, candidate, chain, controller, import, keys, learnt, places, planner, success,
 };
 use crate::input::{self, Limit};
 use posegate::shape::{Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, is_arc};
@@ -52,6 +52,7 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         &keys::TASKS,
         &keys::TABLE,
         &keys::CONFIDENCE,
+        &keys::SITE_CONTROLLER,
         &keys::CHAINS,
         &keys::NAVIGATION,
         &keys::PLANNER,
@@ -124,6 +125,10 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         Some(node) => node.table(&[&keys::EPSILON])?.number(&keys::EPSILON)?,
         None => Site::DEFAULT_EPSILON,
     };
+    let controller = match root.optional(&keys::SITE_CONTROLLER) {
+        Some(node) => Some(controller::controller(&node)?),
+        None => None,
+    };
     let navigation = match root.optional(&keys::NAVIGATION) {
         Some(node) => chain::navigation(&node)?,
         None => Navigation::default(),
@@ -160,6 +165,7 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         planner,
         table: defaults.complete(),
         epsilon,
+        controller,
         digest: digest(sha256, files.iter().map(|file| &file.digest)),
         files: files.into_iter().map(|file| file.path).collect(),
         error_models: error_models

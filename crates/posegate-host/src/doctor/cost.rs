@@ -1,0 +1,65 @@
+//! Whether the controller has the time for each task's table.
+
+use super::Warning;
+use super::faults::warn;
+use crate::site::{Core, Site};
+use posegate::bake::{self, BakeError, BakeInput};
+use posegate::table::Table;
+
+/// Returns a warning for each task whose table may take more cycles for a decision than the site's controller has; none if the
+/// site names no controller. Bakes each table, without the proof.
+///
+/// The proof may leave out pieces of a table, which makes it cheaper: the bound here is that of the whole table.
+///
+/// # Errors
+/// The name of the first task whose table cannot be baked, and why.
+pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> {
+    let Some(controller) = &site.controller else {
+        return Ok(Vec::new());
+    };
+    let mut all = Vec::new();
+    for (name, task) in &site.tasks {
+        let Some(spec) = site.chosen_table(task) else {
+            continue;
+        };
+        let input = BakeInput {
+            task: name,
+            success: &task.success,
+            spec,
+            epsilon: site.epsilon,
+            site_digest: site.digest,
+        };
+        let bytes = match bake::table(&input, &|| ()) {
+            // `table build` falls back to cells.
+            Err(BakeError::NoPieces(_) | BakeError::TooLarge { .. }) => bake::grid(&input, &|| ()),
+            other => other,
+        };
+        let bytes = match bytes {
+            Ok(bytes) => bytes,
+            // `doctor` warns of it.
+            Err(BakeError::Empty { .. }) => continue,
+            Err(error) => return Err((name.clone(), error)),
+        };
+        let Ok(table) = Table::parse(&bytes) else {
+            continue;
+        };
+        let cycles = controller.cycles(&table.worst_case());
+        let core = match controller.core {
+            Core::CortexM4F => "Cortex-M4F",
+            Core::CortexM0Plus => "Cortex-M0+",
+        };
+        if cycles > f64::from(controller.cycles_per_decision) {
+            all.push(warn(
+                "decision_too_long",
+                ["task", name],
+                format!(
+                    "a decision on its table may take {cycles:.0} cycles of a {core}; the controller has {} for it",
+                    controller.cycles_per_decision
+                ),
+                "use `layout = \"facets\"` instead of cells, make the success set simpler, lengthen the control cycle, or state \
+                 `cycles_per_instruction` as measured",
+            ));
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,64 @@
+//! The motion controller that decides on the site's tables.
+
+use super::error::SiteError;
+use super::keys;
+use super::reader::Node;
+use posegate::table::WorstCase;
+
+/// A processor core for which the cost of a decision is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Core {
+    /// Armv7E-M with single-precision floats; M7 and M33 take no more instructions.
+    CortexM4F,
+    /// Armv6-M: products of 32 bits, no divider.
+    CortexM0Plus,
+}
+
+/// What the motion controller can spend on a decision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Controller {
+    /// Its core.
+    pub core: Core,
+    /// The processor cycles of one control cycle that a decision may take.
+    pub cycles_per_decision: u32,
+    /// The cycles of an instruction on average, wait states of the flash included: at least 1.
+    pub cycles_per_instruction: f64,
+}
+
+impl Controller {
+    /// The cycles of an instruction if a site file states none.
+    pub const DEFAULT_CYCLES_PER_INSTRUCTION: f64 = 2.0;
+
+    /// Returns an upper bound on the cycles of one decision on a table, if instructions take as many cycles as stated.
+    #[must_use]
+    pub fn cycles(&self, worst: &WorstCase) -> f64 {
+        let instructions = match self.core {
+            Core::CortexM4F => worst.instructions_m4f(),
+            Core::CortexM0Plus => worst.instructions_m0_plus(),
+        };
+        f64::from(instructions) * self.cycles_per_instruction
+    }
+}
+
+pub(super) fn controller(node: &Node<'_>) -> Result<Controller, SiteError> {
+    let table = node.table(&[
+        &keys::CORE,
+        &keys::CYCLES_PER_DECISION,
+        &keys::CYCLES_PER_INSTRUCTION,
+    ])?;
+    let core = table.required(&keys::CORE)?;
+    let core = match core.text()? {
+        "cortex-m4f" => Core::CortexM4F,
+        "cortex-m0plus" => Core::CortexM0Plus,
+        _ => return Err(core.unknown_word(["cortex-m4f", "cortex-m0plus"])),
+    };
+    let cycles = table.required(&keys::CYCLES_PER_DECISION)?;
+    Ok(Controller {
+        core,
+        cycles_per_decision: cycles.whole(1..=u32::MAX)?,
+        cycles_per_instruction: match table.optional(&keys::CYCLES_PER_INSTRUCTION) {
+            Some(node) => node.number()?,
+            None => Controller::DEFAULT_CYCLES_PER_INSTRUCTION,
+        },
+    })
+}
