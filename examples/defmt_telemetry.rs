@@ -24,7 +24,7 @@ mod firmware {
     use posegate::motion::MotionBounds;
     use posegate::recordings::Evaluator;
     use posegate::report::{FrameId, Heading, PoseEstimate, Report};
-    use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
+    use posegate::set::{Aging, Estimate, PoseSet, Trust, Uncertainty};
     use posegate::table::Table;
     use posegate::wire::{LinkCounters, ReportOutcome, Telemetry};
 
@@ -32,6 +32,7 @@ mod firmware {
     static SOURCES: [Source; 1] = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: MotionBounds::STANDS_STILL,
     }];
 

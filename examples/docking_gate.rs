@@ -24,7 +24,7 @@ mod firmware {
     use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
     use posegate::motion::MotionBounds;
     use posegate::report::FrameId;
-    use posegate::set::Trust;
+    use posegate::set::{Aging, Trust};
 
     /// Made by `posegate table build`.
     static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
@@ -39,6 +39,7 @@ mod firmware {
         sources: &[Source {
             frame: FrameId::of("map"),
             trust: Trust::FULL,
+            aging: Aging::NONE,
             motion: MotionBounds::STANDS_STILL,
         }],
         maximum_age_ms: 200,

@@ -45,7 +45,7 @@ mod firmware {
     use posegate::gate::{Settings, Source, State, Step};
     use posegate::motion::MotionBounds;
     use posegate::report::{FrameId, Report};
-    use posegate::set::Trust;
+    use posegate::set::{Aging, Trust};
     use posegate::table::Table;
     use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
     use posegate::wire::{
@@ -59,12 +59,14 @@ mod firmware {
         Source {
             frame: FrameId::of("map"),
             trust: Trust::FULL,
+            aging: Aging::NONE,
             motion: SPEEDS,
         },
         // Carried by the tracker, which applies the trust.
         Source {
             frame: FrameId::of("map"),
             trust: Trust::FULL,
+            aging: Aging::NONE,
             motion: SPEEDS,
         },
     ];

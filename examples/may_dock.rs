@@ -6,7 +6,7 @@ use embedded_hal::digital::OutputPin;
 use posegate::gate::{Gate, Interlock, Reason, Settings, Source, site_digest};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Report};
-use posegate::set::Trust;
+use posegate::set::{Aging, Trust};
 
 /// Made by `posegate table build`, kept in flash.
 static TABLE: &[u8] = include_bytes!("../examples/tables/dock.posegate");
@@ -19,6 +19,7 @@ static SETTINGS: Settings<'static> = Settings {
     sources: &[Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: MotionBounds::of_mm_mrad(50, 0, 100), // at most 0.05 m/s and 0.1 rad/s
     }],
     look_at: Some(7),

@@ -27,7 +27,7 @@ mod controller {
     use posegate::report::{FrameId, Heading, PoseEstimate, Report};
     use posegate::sequencer::{Rules, Sequencer};
     use posegate::set::{
-        CrossTerms, Estimate, Growth, Inflation, PoseSet, RadiusSquared, SplitWeight, Trust,
+        Aging, CrossTerms, Estimate, Growth, Inflation, PoseSet, RadiusSquared, SplitWeight, Trust,
         Uncertainty,
     };
     use posegate::sight::Scene;
@@ -58,6 +58,7 @@ mod controller {
     static SOURCES: [Source; 1] = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: MotionBounds::STANDS_STILL,
     }];
 
@@ -129,10 +130,22 @@ mod controller {
             let others = black_box([report.belief; 2]);
             let evidence = Evidence {
                 others: &others,
+                since_fix_ms: black_box(Some(700)),
                 ..tracked.evidence()
             };
             let _ = black_box(gate.step_on(black_box(1), &evidence));
             let _ = black_box(gate.examine_on(&evidence));
+        }
+        black_box(Aging::new(&black_box([(64, Inflation::NONE); 2])).is_some());
+        if let Some(aging) = Aging::from_words(black_box([0; 4])) {
+            let source = Source {
+                frame: FrameId::of("map"),
+                trust: Trust::FULL,
+                aging,
+                motion: MotionBounds::STANDS_STILL,
+            };
+            black_box(source.trust_after(black_box(Some(1))));
+            black_box(aging.is_within(black_box(Inflation::NONE)));
         }
         black_box((gate.state(), gate.advice()));
         let _ = black_box(gate.inhibit(black_box(2), black_box(Reason::InterlockFault)));

@@ -31,7 +31,7 @@
 /**
  * Words of a `posegate_gate`.
  */
-#define POSEGATE_GATE_WORDS 52U
+#define POSEGATE_GATE_WORDS 60U
 
 /**
  * Pointers of a `posegate_gate`.
@@ -74,9 +74,14 @@
 #define POSEGATE_NO_TAG 4294967295U
 
 /**
+ * Largest number of inflations by age of a source.
+ */
+#define POSEGATE_MOST_AGES 4U
+
+/**
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
-#define POSEGATE_ABI_VERSION 3U
+#define POSEGATE_ABI_VERSION 4U
 
 /**
  * Words of a `posegate_tracker`.
@@ -217,6 +222,11 @@ enum posegate_status
      * An error of the odometry is below zero, not a number or too large, or a time of a tracker is not from 1 to 2^31 - 1.
      */
     POSEGATE_STATUS_ODOMETRY = -26,
+    /**
+     * The `ages` of a source do not rise by 64 ms, are below 64 ms or above 4194 s; or their factors fall, are not from 1 to 1023, or are,
+     * rounded up to 2^-6, larger than the source's own inflation; or one follows an unused one.
+     */
+    POSEGATE_STATUS_AGING = -27,
     /**
      * A frame longer than any message, or not COBS.
      */
@@ -832,6 +842,22 @@ typedef struct posegate_gate {
 } posegate_gate;
 
 /**
+ * The inflation of estimates up to a time since the last fix.
+ */
+typedef struct posegate_age {
+    /**
+     * The largest time since the last fix, milliseconds, rounded down to 64 ms: at least 64, and more than that of the age before. 0 if
+     * this age and those after it are not used.
+     */
+    uint32_t until_ms;
+    /**
+     * The factor by which covariances are multiplied, unit 2^-16: at least 1, not less than that of the age before, not more than the
+     * source's own. It is rounded up to 2^-6.
+     */
+    uint32_t inflation_q16;
+} posegate_age;
+
+/**
  * A localization source as the controller knows it.
  */
 typedef struct posegate_source {
@@ -872,6 +898,11 @@ typedef struct posegate_source {
      * The largest turn rate, rad/s.
      */
     double turn_rad_s;
+    /**
+     * Smaller inflations for estimates soon after a fix (`posegate_evidence.since_fix_ms`), the youngest first; all zero if one factor is
+     * used. A tracker does not use them.
+     */
+    struct posegate_age ages[POSEGATE_MOST_AGES];
 } posegate_source;
 
 /**
@@ -1062,6 +1093,15 @@ typedef struct posegate_evidence {
      * The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of those that are left out.
      */
     uint32_t elsewhere_q32;
+    /**
+     * The time from the source's last fix until the stamp, milliseconds, rounded up, at least 1; 0 if it is not known. It chooses the
+     * factor of `posegate_source.ages`; without it the source's own inflation applies.
+     */
+    uint32_t since_fix_ms;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t reserved;
 } posegate_evidence;
 
 /**

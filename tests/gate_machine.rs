@@ -8,7 +8,7 @@ mod support;
 use posegate::gate::{Advice, Gate, InvalidParameter, Reason, Restart, Settings, Source, State};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{CrossTerms, Estimate, Inflation, Trust, Uncertainty};
+use posegate::set::{Aging, CrossTerms, Estimate, Inflation, Trust, Uncertainty};
 use support::{
     DOCK, MAXIMUM_AGE_MS, OLDEST_MS, PERMIT_HOLD_MS, SOURCE, belief, permitted, report, settings,
 };
@@ -524,6 +524,7 @@ fn no_parameter_switches_a_check_off() {
                 s.sources = &[Source {
                     frame: FrameId::UNNAMED,
                     trust: Trust::FULL,
+                    aging: Aging::NONE,
                     motion: MotionBounds::STANDS_STILL,
                 }]
             },

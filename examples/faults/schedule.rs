@@ -4,13 +4,14 @@
 use posegate::gate::{Restart, Settings, Source, site_digest};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
-use posegate::set::{Trust, Uncertainty};
+use posegate::set::{Aging, Trust, Uncertainty};
 
 pub static TABLE: &[u8] = include_bytes!("../tables/dock.posegate");
 
 static SOURCES: [Source; 2] = [Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
+    aging: Aging::NONE,
     motion: MotionBounds::STANDS_STILL,
 }; 2];
 

@@ -24,6 +24,9 @@ pub struct Evidence<'r> {
     pub beside: Growth,
     /// The probability that the robot is at none of the hypotheses: the weight of the clusters that are left out.
     pub elsewhere: Risk,
+    /// The time from the source's last fix (a tag, a scan that matched) until the stamp, milliseconds, rounded up; `None` if it is not
+    /// known. It chooses the factor of [`super::Source::aging`]; without it the source's own inflation applies.
+    pub since_fix_ms: Option<u32>,
 }
 
 impl<'r> Evidence<'r> {
@@ -35,6 +38,7 @@ impl<'r> Evidence<'r> {
             others: &[],
             beside: Growth::NONE,
             elsewhere: Risk::NONE,
+            since_fix_ms: None,
         }
     }
 

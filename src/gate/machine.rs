@@ -309,7 +309,8 @@ impl<'a> Gate<'a> {
             Err(reason) => return Verdict::deny(reason),
         };
         let radius = table.radius_squared();
-        let trust = match allowed_for(evidence.elsewhere, radius, source.trust) {
+        let aged = source.trust_after(evidence.since_fix_ms);
+        let trust = match allowed_for(evidence.elsewhere, radius, aged) {
             Some(trust) if evidence.elsewhere == Risk::NONE || evidence.can_make_up() => trust,
             _ => return Verdict::deny(Reason::ElsewhereTooLikely),
         };
@@ -517,11 +518,12 @@ impl<'a> Gate<'a> {
         let movement = self.settings.movement(source.motion, age_ms);
         let movement = movement.plus(evidence.beside);
         let radius = table.radius_squared();
+        let aged = source.trust_after(evidence.since_fix_ms);
         let allowed;
         let trust = if evidence.elsewhere == Risk::NONE {
-            &source.trust
+            &aged
         } else {
-            match allowed_for(evidence.elsewhere, radius, source.trust) {
+            match allowed_for(evidence.elsewhere, radius, aged) {
                 Some(trust) if evidence.can_make_up() => allowed = trust,
                 _ => return Ok(Err(Reason::ElsewhereTooLikely)),
             }
@@ -546,13 +548,14 @@ impl<'a> Gate<'a> {
         let movement = self.movement_by_complement(report, source);
         let movement = movement.plus(black_box(evidence).beside);
         let elsewhere = black_box(evidence).elsewhere;
+        let aged = source.trust_again(black_box(evidence).since_fix_ms);
         let allowed;
         let trust = if elsewhere == Risk::NONE {
-            &source.trust
+            &aged
         } else {
             // The radius from flash, as for the evaluation itself.
             let radius = table::stored_radius_squared(self.bytes);
-            match radius.and_then(|radius| allowed_for(elsewhere, radius, source.trust)) {
+            match radius.and_then(|radius| allowed_for(elsewhere, radius, aged)) {
                 Some(trust) => allowed = trust,
                 None => return Ok(Err(Reason::EvaluationsDisagree)),
             }

@@ -9,9 +9,9 @@
 //! use posegate::gate::{Gate, Restart, Settings, Source};
 //! use posegate::motion::MotionBounds;
 //! use posegate::report::{FrameId, Report};
-//! use posegate::set::Trust;
+//! use posegate::set::{Aging, Trust};
 //!
-//! static SOURCES: [Source; 1] = [Source { frame: FrameId::of("map"), trust: Trust::FULL, motion: MotionBounds::STANDS_STILL }];
+//! static SOURCES: [Source; 1] = [Source { frame: FrameId::of("map"), trust: Trust::FULL, aging: Aging::NONE, motion: MotionBounds::STANDS_STILL }];
 //! # fn example(table: &'static [u8], site_digest: [u8; 32], now_ms: u32, report: &Report) -> bool {
 //! let settings = Settings {
 //!     task: "dock",

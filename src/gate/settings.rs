@@ -2,7 +2,7 @@
 
 use crate::motion::MotionBounds;
 use crate::report::FrameId;
-use crate::set::{CrossTerms, Growth, Inflation, Trust};
+use crate::set::{Aging, CrossTerms, Growth, Inflation, Trust};
 
 /// A localization source as the controller knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,8 +10,11 @@ use crate::set::{CrossTerms, Growth, Inflation, Trust};
 pub struct Source {
     /// The frame that its reports must be in: the world frame of the site.
     pub frame: FrameId,
-    /// How far its covariances are trusted.
+    /// How far its covariances are trusted, whatever the time since its last fix.
     pub trust: Trust,
+    /// Smaller inflations for estimates soon after a fix ([`super::Evidence::since_fix_ms`]); none is larger than that of `trust`.
+    /// [`Aging::NONE`] if one factor is used.
+    pub aging: Aging,
     /// How fast the robot may move, from the stamp of an estimate until a permission on it ends.
     /// [`MotionBounds::STANDS_STILL`] if something else makes sure that it does not.
     pub motion: MotionBounds,
@@ -42,8 +45,30 @@ impl Source {
         Ok(Self {
             frame,
             trust,
+            aging: Aging::NONE,
             motion,
         })
+    }
+
+    /// Returns the trust in an estimate at a time since the last fix: the factor of its age, or that of the source if its age is not known.
+    #[must_use]
+    pub fn trust_after(&self, since_fix_ms: Option<u32>) -> Trust {
+        match since_fix_ms {
+            Some(since_fix_ms) => Trust {
+                inflation: self.aging.at(since_fix_ms, self.trust.inflation),
+                ..self.trust
+            },
+            None => self.trust,
+        }
+    }
+
+    /// Returns the same in another form, for the second evaluation.
+    pub(super) fn trust_again(&self, since_fix_ms: Option<u32>) -> Trust {
+        let age_ms = since_fix_ms.unwrap_or(u32::MAX);
+        Trust {
+            inflation: self.aging.at_from_oldest(age_ms, self.trust.inflation),
+            ..self.trust
+        }
     }
 }
 
@@ -117,6 +142,8 @@ pub enum InvalidParameter {
     Frame,
     /// An inflation is not a number, below 1 or above 4096.
     Inflation,
+    /// The inflations by age of a source are damaged, or one is larger than the source's own.
+    Aging,
     /// A time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more.
     InterlockTime,
     /// The report period is zero, or at least half of the range of the millisecond clock.
@@ -145,6 +172,7 @@ impl core::fmt::Display for InvalidParameter {
             Self::Sources => "no source is declared, or more than 256 sources are",
             Self::Frame => "a source has no frame",
             Self::Inflation => "an inflation is not a number, below 1 or above 4096",
+            Self::Aging => "an inflation by age is larger than the source's own, or its table is damaged",
             Self::InterlockTime => {
                 "a time of the interlock (read-back, heartbeat) is zero, or 2^31 ms or more"
             }
@@ -278,6 +306,9 @@ impl Settings<'_> {
             if !source.trust.is_valid() {
                 return Err(InvalidParameter::Inflation);
             }
+            if !(source.aging.is_valid() && source.aging.is_within(source.trust.inflation)) {
+                return Err(InvalidParameter::Aging);
+            }
         }
         Ok(())
     }
@@ -321,6 +352,7 @@ impl Settings<'_> {
                 CrossTerms::AllUnknown(share) => 0x200 | u32::from(share.q8()),
             };
             let [speed, turn] = source.motion.words();
+            let sum = source.aging.words().into_iter().fold(sum, mixed);
             [
                 frame as u32,
                 (frame >> 32) as u32,

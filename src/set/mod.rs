@@ -28,6 +28,7 @@ use crate::pose::Pose;
 use self::given::Given;
 use self::trust::Reach;
 
+pub use self::aging::{Aging, MOST_AGES};
 pub use self::factor::SqrtFactor;
 pub use self::growth::Growth;
 pub use self::trust::{CrossTerms, Inflation, SplitWeight, Trust};
@@ -36,6 +37,7 @@ pub(crate) use self::carried::{PathNoise, carried, metres, radians};
 pub(crate) use self::common::{Common, Turn, broad_um};
 pub(crate) use self::covariance::ScaledCovariance;
 
+mod aging;
 mod carried;
 mod common;
 mod covariance;

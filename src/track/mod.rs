@@ -104,6 +104,7 @@ impl Tracked {
             report: &self.report,
             others: &[],
             beside: self.beside,
+            since_fix_ms: None,
             elsewhere: Risk::NONE,
         }
     }

@@ -108,6 +108,7 @@ impl HypothesisCollector {
             report: self.report.insert(report),
             others: &self.others,
             beside: Growth::NONE,
+            since_fix_ms: None,
             elsewhere: Risk::NONE,
         }))
     }

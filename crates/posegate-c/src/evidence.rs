@@ -29,6 +29,11 @@ pub struct posegate_evidence {
     pub beside_q24: u32,
     /// The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of those that are left out.
     pub elsewhere_q32: u32,
+    /// The time from the source's last fix until the stamp, milliseconds, rounded up, at least 1; 0 if it is not known. It chooses the
+    /// factor of `posegate_source.ages`; without it the source's own inflation applies.
+    pub since_fix_ms: u32,
+    /// Reserved: 0.
+    pub reserved: u32,
 }
 
 /// A verdict on a report with several hypotheses.
@@ -75,6 +80,8 @@ impl posegate_evidence {
         beside_um: 0,
         beside_q24: 0,
         elsewhere_q32: 0,
+        since_fix_ms: 0,
+        reserved: 0,
     };
 }
 
@@ -85,6 +92,7 @@ pub(super) struct Read {
     count: usize,
     beside: Growth,
     elsewhere: Risk,
+    since_fix_ms: Option<u32>,
 }
 
 impl Read {
@@ -123,6 +131,10 @@ impl Read {
                     read(&raw const (*evidence).beside_q24)?,
                 ),
                 elsewhere: Risk::from_q32(read(&raw const (*evidence).elsewhere_q32)?),
+                since_fix_ms: match read(&raw const (*evidence).since_fix_ms)? {
+                    0 => None,
+                    since_fix_ms => Some(since_fix_ms),
+                },
             })
         }
     }
@@ -133,6 +145,7 @@ impl Read {
             others: self.others.get(..self.count).unwrap_or_default(),
             beside: self.beside,
             elsewhere: self.elsewhere,
+            since_fix_ms: self.since_fix_ms,
         }
     }
 }

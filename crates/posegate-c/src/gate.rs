@@ -15,11 +15,11 @@ use posegate::gate::{
 };
 use posegate::motion::MotionBounds;
 use posegate::report::FrameId;
-use posegate::set::{CrossTerms, Trust};
+use posegate::set::{Aging, CrossTerms, Trust};
 use posegate::table::checksum_continued;
 
 /// Words of a `posegate_gate`.
-pub const POSEGATE_GATE_WORDS: usize = 52;
+pub const POSEGATE_GATE_WORDS: usize = 60;
 /// Pointers of a `posegate_gate`.
 pub const POSEGATE_GATE_POINTERS: usize = 24;
 
@@ -281,6 +281,10 @@ fn digest(settings: &Settings<'_>) -> u32 {
         let sum = checksum_continued(sum, &source.frame.digest().to_le_bytes());
         let sum = checksum_continued(sum, &source.trust.inflation.q16().to_le_bytes());
         let sum = checksum_continued(sum, &[terms, share]);
+        let sum = checksum_continued(
+            sum,
+            source.aging.words().map(u32::to_le_bytes).as_flattened(),
+        );
         source.motion.words().iter().fold(sum, |sum, word| {
             checksum_continued(sum, &word.to_le_bytes())
         })
@@ -301,6 +305,7 @@ unsafe fn fill(
     const UNUSED: Source = Source {
         frame: FrameId::UNNAMED,
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: MotionBounds::STANDS_STILL,
     };
     let mut sources = [UNUSED; POSEGATE_MOST_SOURCES];

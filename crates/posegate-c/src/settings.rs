@@ -5,7 +5,7 @@ use super::posegate_status;
 use core::ffi::c_char;
 use posegate::gate::{Restart, Settings, Source};
 use posegate::motion::MotionBounds;
-use posegate::set::{CrossTerms, SplitWeight};
+use posegate::set::{Aging, CrossTerms, Inflation, MOST_AGES, SplitWeight};
 
 /// Bytes of a name. A shorter name is padded with zeros, as a C initialiser does.
 pub const POSEGATE_NAME_LENGTH: usize = 32;
@@ -46,6 +46,22 @@ pub enum posegate_motion {
     Moves = 2,
 }
 
+/// Largest number of inflations by age of a source.
+pub const POSEGATE_MOST_AGES: usize = 4;
+const _: () = assert!(POSEGATE_MOST_AGES == MOST_AGES);
+
+/// The inflation of estimates up to a time since the last fix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct posegate_age {
+    /// The largest time since the last fix, milliseconds, rounded down to 64 ms: at least 64, and more than that of the age before. 0 if
+    /// this age and those after it are not used.
+    pub until_ms: u32,
+    /// The factor by which covariances are multiplied, unit 2^-16: at least 1, not less than that of the age before, not more than the
+    /// source's own. It is rounded up to 2^-6.
+    pub inflation_q16: u32,
+}
+
 /// A localization source as the controller knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
@@ -69,6 +85,9 @@ pub struct posegate_source {
     pub across_m_s: f64,
     /// The largest turn rate, rad/s.
     pub turn_rad_s: f64,
+    /// Smaller inflations for estimates soon after a fix (`posegate_evidence.since_fix_ms`), the youngest first; all zero if one factor is
+    /// used. A tracker does not use them.
+    pub ages: [posegate_age; POSEGATE_MOST_AGES],
 }
 
 /// The parameters of a gate. No accepted value switches a check off, and zeroed settings are refused.
@@ -129,6 +148,10 @@ impl posegate_settings {
             along_m_s: 0.0,
             across_m_s: 0.0,
             turn_rad_s: 0.0,
+            ages: [posegate_age {
+                until_ms: 0,
+                inflation_q16: 0,
+            }; POSEGATE_MOST_AGES],
         }; POSEGATE_MOST_SOURCES],
         source_count: 0,
         maximum_age_ms: 0,
@@ -214,7 +237,25 @@ impl posegate_source {
             _ => None,
         };
         let motion = motion.ok_or(posegate_status::Motion)?;
-        Ok(Source::new(frame, self.inflation, cross_terms, motion)?)
+        let source = Source::new(frame, self.inflation, cross_terms, motion)?;
+        let aging = self.aging().ok_or(posegate_status::Aging)?;
+        Ok(Source { aging, ..source })
+    }
+
+    fn aging(&self) -> Option<Aging> {
+        let used = self.ages.iter().take_while(|age| age.until_ms != 0).count();
+        let (used, rest) = self.ages.split_at_checked(used)?;
+        if rest
+            .iter()
+            .any(|age| (age.until_ms, age.inflation_q16) != (0, 0))
+        {
+            return None;
+        }
+        let mut steps = [(0, Inflation::NONE); POSEGATE_MOST_AGES];
+        for (step, age) in steps.iter_mut().zip(used) {
+            *step = (age.until_ms, Inflation::from_q16(age.inflation_q16)?);
+        }
+        Aging::new(steps.get(..used.len())?)
     }
 }
 

@@ -4,7 +4,7 @@ use posegate::gate::InvalidParameter;
 use posegate::wire::WireError;
 
 /// Version of this interface. It changes if a struct or the meaning of a function changes.
-pub const POSEGATE_ABI_VERSION: u32 = 3;
+pub const POSEGATE_ABI_VERSION: u32 = 4;
 
 /// The result of a function: 0, or the reason why it did nothing. After an error every output is a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +68,9 @@ pub enum posegate_status {
     MaximumAgeTooShort = -25,
     /// An error of the odometry is below zero, not a number or too large, or a time of a tracker is not from 1 to 2^31 - 1.
     Odometry = -26,
+    /// The `ages` of a source do not rise by 64 ms, are below 64 ms or above 4194 s; or their factors fall, are not from 1 to 1023, or are,
+    /// rounded up to 2^-6, larger than the source's own inflation; or one follows an unused one.
+    Aging = -27,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
     /// The checksum of a frame is wrong.
@@ -103,6 +106,7 @@ impl From<InvalidParameter> for posegate_status {
             InvalidParameter::Sources => Self::Sources,
             InvalidParameter::Frame => Self::Frame,
             InvalidParameter::Inflation => Self::Inflation,
+            InvalidParameter::Aging => Self::Aging,
             InvalidParameter::InterlockTime => Self::InterlockTime,
             InvalidParameter::ReportPeriod => Self::ReportPeriod,
             InvalidParameter::PermitHoldTooShort { .. } => Self::PermitHoldTooShort,

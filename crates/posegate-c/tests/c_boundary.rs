@@ -17,6 +17,18 @@ use posegate::table::{Table, checksum};
 use posegate::wire::{LONGEST_BODY, Receiver, Reply, Request, encode};
 use posegate_c::*;
 
+const NO_AGES: [posegate_age; POSEGATE_MOST_AGES] = [posegate_age {
+    until_ms: 0,
+    inflation_q16: 0,
+}; POSEGATE_MOST_AGES];
+
+const fn age(until_ms: u32, inflation_q16: u32) -> posegate_age {
+    posegate_age {
+        until_ms,
+        inflation_q16,
+    }
+}
+
 static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
 
@@ -58,6 +70,7 @@ fn source() -> posegate_source {
         along_m_s: 0.001,
         across_m_s: 0.0,
         turn_rad_s: 0.0,
+        ages: NO_AGES,
     }
 }
 
@@ -78,6 +91,7 @@ fn settings() -> posegate_settings {
                 along_m_s: 0.0,
                 across_m_s: 0.0,
                 turn_rad_s: 0.0,
+                ages: NO_AGES,
             },
             // Not used: `source_count` is 2.
             posegate_source {
@@ -90,6 +104,7 @@ fn settings() -> posegate_settings {
                 along_m_s: 0.0,
                 across_m_s: 0.0,
                 turn_rad_s: 0.0,
+                ages: NO_AGES,
             },
             posegate_source {
                 frame: [0; 32],
@@ -101,6 +116,7 @@ fn settings() -> posegate_settings {
                 along_m_s: 0.0,
                 across_m_s: 0.0,
                 turn_rad_s: 0.0,
+                ages: NO_AGES,
             },
         ],
         source_count: 2,
@@ -664,7 +680,7 @@ fn what_is_no_report_closes_the_gate() {
 #[test]
 fn no_setting_switches_a_check_off() {
     type Change = fn(&mut posegate_settings);
-    let wrong: [(Change, posegate_status); 35] = [
+    let wrong: [(Change, posegate_status); 40] = [
         (|s| s.report_period_ms = 0, posegate_status::ReportPeriod),
         (
             |s| s.report_period_ms = 1 << 31,
@@ -719,6 +735,26 @@ fn no_setting_switches_a_check_off() {
         (
             |s| s.sources[0].turn_rad_s = f64::INFINITY,
             posegate_status::Motion,
+        ),
+        (
+            |s| s.sources[0].ages[0].until_ms = 64,
+            posegate_status::Aging,
+        ),
+        (
+            |s| s.sources[0].ages[0].inflation_q16 = 1 << 16,
+            posegate_status::Aging,
+        ),
+        (
+            |s| s.sources[0].ages[1] = age(640, 1 << 16),
+            posegate_status::Aging,
+        ),
+        (
+            |s| s.sources[0].ages = [age(640, 1 << 16); 4],
+            posegate_status::Aging,
+        ),
+        (
+            |s| s.sources[0].ages[0] = age(640, u32::MAX),
+            posegate_status::Aging,
         ),
         (|s| s.sources[1].share_q8 = 0, posegate_status::CrossTerms),
         (|s| s.sources[1].share_q8 = 256, posegate_status::CrossTerms),

@@ -3,12 +3,17 @@
 use posegate::gate::{Evidence, Gate, Reason, Settings, Source, Verdict};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{CrossTerms, Estimate, Growth, Uncertainty};
+use posegate::set::{Aging, CrossTerms, Estimate, Growth, Inflation, Uncertainty};
 use posegate::table::Table;
 use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_c::*;
 use std::collections::BTreeSet;
+
+const NO_AGES: [posegate_age; POSEGATE_MOST_AGES] = [posegate_age {
+    until_ms: 0,
+    inflation_q16: 0,
+}; POSEGATE_MOST_AGES];
 
 static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
@@ -42,6 +47,7 @@ fn source_of_c() -> posegate_source {
         along_m_s: 0.5,
         across_m_s: 0.0,
         turn_rad_s: 1.0,
+        ages: NO_AGES,
     }
 }
 
@@ -306,6 +312,67 @@ fn a_tracker_in_c_is_that_in_rust() {
     }
 }
 
+/// Inflations by age: each answer of C is that of Rust, at every age. A time that is not stated has the source's own inflation.
+#[test]
+fn inflations_by_age_in_c_are_those_in_rust() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let steps = [(512, 1 << 16), (4992, 9 << 16), (59_968, 100 << 16)];
+    let mut of_c = settings_of_c(&table);
+    of_c.sources[0].inflation = 400.0;
+    for (age, (until_ms, inflation_q16)) in of_c.sources[0].ages.iter_mut().zip(steps) {
+        *age = posegate_age {
+            until_ms,
+            inflation_q16,
+        };
+    }
+    let of_c = leaked(of_c);
+    let bounds = MotionBounds::new(0.5, 0.0, 1.0).unwrap();
+    let steps = steps.map(|(until_ms, q16)| (until_ms, Inflation::from_q16(q16).unwrap()));
+    let sources = [Source {
+        aging: Aging::new(&steps).unwrap(),
+        ..Source::new("map", 400.0, CrossTerms::Filled, bounds).unwrap()
+    }];
+    let settings = Settings {
+        task: table.task(),
+        site_digest: table.site_digest(),
+        sources: &sources,
+        ..Settings::for_source(20, 10)
+    };
+    let mut permits = BTreeSet::new();
+    for y_m in [0.0, 0.4, 0.8, 1.2, 1.6] {
+        for since_fix_ms in [0, 1, 512, 513, 4992, 4993, 59_968, 59_969, u32::MAX] {
+            let gate_c = zeroed();
+            // SAFETY: valid pointers.
+            let status = unsafe {
+                posegate_gate_init(gate_c, SEE_T7.as_ptr(), SEE_T7.len(), of_c, leaked(0), 0)
+            };
+            assert_eq!(status, posegate_status::Ok);
+            let mut gate = Gate::new(SEE_T7, &settings, 0).unwrap();
+            let mut evidence = evidence_of_c(report_of_c(1, 100, belief_of_c(0.0, y_m, 0.0)), &[]);
+            evidence.since_fix_ms = since_fix_ms;
+            let (status, step) = step_on(gate_c, 110, &evidence);
+            assert_eq!(status, posegate_status::Ok);
+            let report = Report {
+                source: 0,
+                frame: FrameId::of("map"),
+                sequence: 1,
+                stamp_ms: 100,
+                belief: belief(0.0, y_m, 0.0),
+            };
+            let evidence = Evidence {
+                since_fix_ms: (since_fix_ms > 0).then_some(since_fix_ms),
+                ..Evidence::of(&report)
+            };
+            let verdict = gate.step_on(110, &evidence).verdict;
+            let reason = verdict.err().map_or(0, |reason| u32::from(reason.code()));
+            assert_eq!(step.reason, reason, "{y_m} {since_fix_ms}");
+            permits.insert((since_fix_ms, verdict.is_ok()));
+        }
+    }
+    assert!(permits.contains(&(512, true)) && permits.contains(&(59_969, false)));
+    assert!(!permits.contains(&(0, true)) && !permits.contains(&(u32::MAX, true)));
+}
+
 /// Each hypothesis must be inside, the slip counts, and more than seven others are an error.
 #[test]
 fn hypotheses_in_c_are_those_in_rust() {
@@ -344,6 +411,7 @@ fn hypotheses_in_c_are_those_in_rust() {
                 report: &report,
                 others: &expected,
                 beside: Growth::new(beside_um, 0),
+                since_fix_ms: None,
                 elsewhere: Risk::NONE,
             },
         );

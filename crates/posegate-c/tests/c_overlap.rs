@@ -10,6 +10,11 @@ use posegate::wire::Request;
 use posegate_c::*;
 use std::collections::BTreeSet;
 
+const NO_AGES: [posegate_age; POSEGATE_MOST_AGES] = [posegate_age {
+    until_ms: 0,
+    inflation_q16: 0,
+}; POSEGATE_MOST_AGES];
+
 static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 
 /// The kind of an argument.
@@ -109,6 +114,7 @@ fn settings() -> posegate_settings {
         along_m_s: 0.0,
         across_m_s: 0.0,
         turn_rad_s: 0.0,
+        ages: NO_AGES,
     };
     posegate_settings {
         task: name("dock"),
@@ -205,6 +211,7 @@ fn tracker_settings() -> posegate_tracker_settings {
             along_m_s: 0.5,
             across_m_s: 0.0,
             turn_rad_s: 1.0,
+            ages: NO_AGES,
             ..settings().sources[0]
         },
         maximum_gap_ms: 60,

@@ -4,12 +4,13 @@ use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, GroupReport, InflationModel, InflationReport,
-    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, learn_bounds, learn_inflation,
-    outcomes, test_outcomes,
+    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, by_age_json, learn_bounds,
+    learn_inflation, outcomes, test_outcomes,
 };
 use serde_json::{Value, json};
 
 mod check;
+mod survey;
 mod taken_with;
 
 /// Learns models for the gate and the planner from recordings
@@ -19,6 +20,7 @@ pub enum Command {
     Inflation(Inflation),
     Outcomes(Outcomes),
     Check(check::Check),
+    Survey(survey::Survey),
 }
 
 /// Learns error bounds of detections by distance and angles, and the share of views that are detected
@@ -91,7 +93,9 @@ pub struct Inflation {
 
 /// Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
 ///
-/// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha.
+/// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha, whatever the results of
+/// earlier dockings. `lower` and `upper` limit the probability of success with confidence 1 - alpha at all of these looks together
+/// (a confidence sequence), if every docking succeeds with the same probability, independently of the others.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s if the rows are not in the order of time."
@@ -116,6 +120,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
         Command::Inflation(arguments) => inflation(arguments, files),
         Command::Outcomes(arguments) => look(arguments, files),
         Command::Check(arguments) => check::run(arguments, files),
+        Command::Survey(arguments) => survey::run(arguments, files),
     }
 }
 
@@ -297,6 +302,7 @@ fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
             ))?;
         }
         groups(&model)?;
+        source(&model)?;
     }
     Ok(answer(true))
 }
@@ -319,9 +325,29 @@ fn groups(model: &InflationModel) -> Result<(), Failure> {
             "the factors hold for a new {column} with confidence {}",
             model.confidence()
         )),
-        None if model.groups().is_empty() => Ok(()),
+        None if model.groups().is_empty() => {
+            print(&"the factors hold for the robot of these rows, not for another one")
+        }
         None => print(&"the factors hold for these alone, not for a new one"),
     }
+}
+
+/// Prints the settings of the controller's source.
+fn source(model: &InflationModel) -> Result<(), Failure> {
+    let Some(by_age) = model.by_age() else {
+        return print(&"no settings for a controller: a condition has no factor");
+    };
+    let own = f64::from(by_age.inflation.q16()) / 65_536.0;
+    let ages: Vec<String> = by_age
+        .steps()
+        .map(|(until_ms, inflation)| {
+            format!(", {inflation} up to {until_ms} ms since the last fix")
+        })
+        .collect();
+    print(&format_args!(
+        "on the controller: inflation {own:.6}{}",
+        ages.concat()
+    ))
 }
 
 fn parts(model: &InflationModel) -> Vec<(String, &InflationReport)> {
@@ -355,6 +381,9 @@ fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
         "new_group": model.new_group(),
         "groups": model.groups().iter().map(group).collect::<Vec<_>>(),
         "condition": model.condition(), "overall": of(model.overall()),
+        "source": model.by_age().map(|by_age| json!({
+            "inflation": f64::from(by_age.inflation.q16()) / 65_536.0, "ages": by_age_json(&by_age),
+        })),
         "conditions": model.parts().iter().map(of).collect::<Vec<_>>(),
     })
 }
@@ -373,7 +402,7 @@ fn look(arguments: &Outcomes, files: &Files) -> Outcome {
         }))?;
     } else {
         print(&format_args!(
-            "{} of {} succeeded: {:.4} to {:.4} with confidence {}",
+            "{} of {} succeeded: {:.4} to {:.4} with confidence {}, however often one looks",
             found.successes,
             found.count,
             found.limits[0],

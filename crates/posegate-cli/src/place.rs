@@ -7,7 +7,7 @@ use posegate_host::draw::{Column, Mounted, mounting_sheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::place::{
     Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
-    PlacementProblem, PosePrior, Space, Task, candidates, compare, place, ranges,
+    PlacementProblem, PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
 };
 use posegate_host::site::Site;
 use serde_json::{Value, json};
@@ -39,8 +39,8 @@ pub struct Arguments {
     epsilon: Option<f64>,
     #[command(flatten)]
     weights: Weights,
-    /// Take the cost of a view from this learnt [error_model] of the site instead of c1, c2 and c3: 100 times the bound in
-    /// metres plus the bound in degrees, including the tolerances of tag and camera
+    /// Take the cost of a view from this [error_model] of the site, learnt or a formula, instead of c1, c2 and c3: 100 times the
+    /// bound in metres plus the bound in degrees, including the tolerances of tag and camera
     #[arg(long)]
     error_model: Option<String>,
     /// Ranges of the tag's pose: x, y, z (m) and yaw_deg, such as x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall only z
@@ -287,7 +287,7 @@ fn pictures(
     Ok(())
 }
 
-/// Returns the cost of the learnt model that --error-model names.
+/// Returns the cost of the model that --error-model names.
 fn learnt<'a>(
     arguments: &Arguments,
     site: &'a Site,
@@ -297,13 +297,15 @@ fn learnt<'a>(
     let Some(name) = &arguments.error_model else {
         return Ok(None);
     };
-    let model = site.error_models.get(name).ok_or_else(|| {
+    let learnt = site.error_models.get(name).map(ViewBound::Learnt);
+    let formula = site.error_formulas.get(name).map(ViewBound::Formula);
+    let model = learnt.or(formula).ok_or_else(|| {
         Failure::usage(
             format!(
-                "{}: there is no learnt error model `{name}`",
+                "{}: there is no error model `{name}`",
                 arguments.site.display()
             ),
-            "write [error_model.NAME] with file = \"MODEL.toml\", made by `posegate learn bounds`",
+            "write [error_model.NAME] with translation and yaw_deg, or with file = \"MODEL.toml\", made by `posegate learn bounds`",
         )
     })?;
     Ok(Some(LearntCost::new(model, c_high, task)))

@@ -1,6 +1,7 @@
 //! `posegate replay`: runs a recording through the gate, and through the rules that are in use today.
 
 mod arguments;
+mod inflation;
 mod input;
 mod odometry;
 mod outputs;
@@ -8,6 +9,7 @@ mod words;
 
 pub use self::arguments::Arguments;
 
+use self::inflation::Inflated;
 use self::input::Recorded;
 use self::outputs::Outputs;
 use self::words::{asked_for, nothing, recording, sentences};
@@ -42,20 +44,24 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let radius =
         Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
-    let mut input = Recorded::open(arguments, files, &site, radius_squared)?;
+    let inflated = Inflated::of(arguments, files, radius.radius_squared())?;
+    let mut input = Recorded::open(arguments, files, &site, radius_squared, &inflated)?;
     let odometry = odometry::odometry(arguments, files)?;
-    let trust = arguments
-        .trust()
-        .ok_or_else(|| parameter(InvalidParameter::Inflation))?;
+    let trust = arguments.trust(inflated.factors.inflation);
     // What is carried along an odometry has the trust applied already.
     let carried = odometry.is_some();
-    let (inflation, terms) = if carried {
-        (1.0, CrossTerms::Filled)
-    } else {
-        (arguments.inflation, arguments.terms())
-    };
-    let source = Source::new(&arguments.frame, inflation, terms, arguments.motion()?);
-    let sources = vec![source.map_err(parameter)?; arguments.topic.len().max(1)];
+    let source = Source::new(
+        &arguments.frame,
+        1.0,
+        CrossTerms::Filled,
+        arguments.motion()?,
+    );
+    let mut source = source.map_err(parameter)?;
+    if !carried {
+        source.trust = trust;
+        source.aging = inflated.factors.aging;
+    }
+    let sources = vec![source; arguments.topic.len().max(1)];
     let settings = Settings {
         task: &arguments.task,
         site_digest: site.digest,
@@ -114,6 +120,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     let mut summary = replay.summary();
     summary["task"] = json!(arguments.task);
+    if arguments.inflation_model.is_some() {
+        summary["inflation"] = inflated.told();
+    }
     summary["recording"] = recording(&input);
     if let Some(looks) = &input.part.looks
         && is_looked(&input)
@@ -155,7 +164,7 @@ fn name_of(path: &std::path::Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-fn parameter(error: InvalidParameter) -> Failure {
+pub(super) fn parameter(error: InvalidParameter) -> Failure {
     let help = match error {
         InvalidParameter::Inflation => "give --inflation 1 to 4096",
         InvalidParameter::Frame => "name the world frame: --frame map",

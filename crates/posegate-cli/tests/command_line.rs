@@ -502,6 +502,7 @@ fn every_subcommand_has_help_with_an_example() {
         "chain",
         "plan",
         "learn check",
+        "learn survey",
     ] {
         let (out, _) = folder.expect(0, &format!("{command} --help"));
         assert!(out.contains("Example:\n  posegate"), "{command}: {out}");

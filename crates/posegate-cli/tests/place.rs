@@ -546,10 +546,40 @@ fn a_learnt_model_hangs_the_tag_askew() {
         None,
     );
     assert!(
-        other.code == 2 && other.err.contains("no learnt error model `other`"),
+        other.code == 2 && other.err.contains("no error model `other`"),
         "{}",
         other.err
     );
+}
+
+/// A formula with the paper's weights gives the paper's cost: a metre counts as 100, a degree as 1.
+#[test]
+fn a_formula_is_a_cost() {
+    let folder = tempfile::tempdir().unwrap();
+    let formula = |name: &str, translation: &str, yaw: &str| {
+        format!("\n[error_model.{name}]\ntranslation = {translation}\nyaw_deg = {yaw}\n")
+    };
+    let site = SITE.to_owned()
+        + &formula("paper", "[0.0, 1.0, 0.5, 0.5]", "[0.0, 0.0, 0.0, 0.0]")
+        + &formula("yaw", "[0.0, 0.0, 0.0, 0.0]", "[0.0, 100.0, 50.0, 50.0]")
+        + &formula("near", "[0.0, 2.0, 0.5, 0.5]", "[0.0, 0.0, 0.0, 0.0]");
+    let mean = |model: &str| {
+        let line = place("0.05", "--free x=0.8:4,yaw_deg=110:250 --budget 200 --json");
+        let told = run_in(folder.path(), &site, &format!("{line}{model}"), None);
+        assert_eq!(told.code, 0, "{}{}", told.out, told.err);
+        let best: Value = serde_json::from_str(&told.out).unwrap();
+        best["mean"].as_f64().unwrap()
+    };
+    let paper = mean("");
+    for model in ["paper", "yaw"] {
+        let found = mean(&format!(" --error-model {model}"));
+        assert!(
+            (found / paper - 1.0).abs() < 1e-2,
+            "{model}: {found} {paper}"
+        );
+    }
+    let near = mean(" --error-model near");
+    assert!(near > 1.1 * paper, "{near} {paper}");
 }
 
 #[test]

@@ -8,7 +8,7 @@
 use posegate::gate::{Gate, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{Estimate, Trust, Uncertainty};
+use posegate::set::{Aging, Estimate, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_testkit::counts::{first_seed, is_deep};
 use posegate_testkit::hall::{self, Believed};
@@ -73,6 +73,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
     let sources = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: told(&drive),
     }];
     let settings = Settings {

@@ -10,7 +10,7 @@
 use posegate::gate::{Gate, Reason, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{Estimate, RadiusSquared, Trust, Uncertainty};
+use posegate::set::{Aging, Estimate, RadiusSquared, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_testkit::counts::{first_seed, is_deep};
@@ -300,6 +300,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
     let sources = [Source {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: drive.bounds(),
     }];
     let settings = Settings {

@@ -5,7 +5,7 @@ use crate::arguments::Arguments;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::report::FrameId;
-use posegate::set::Trust;
+use posegate::set::{Aging, Trust};
 use posegate::table::{Table, TableError};
 use posegate::track::TrackerSettings;
 use std::path::PathBuf;
@@ -202,6 +202,7 @@ impl NodeSettings {
             } else {
                 trust
             },
+            aging: Aging::NONE,
             motion: bounds,
         };
         let settings = Self {

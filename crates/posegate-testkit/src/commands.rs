@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 32] = [
+pub const LINES: [(&str, &str); 34] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
@@ -50,10 +50,15 @@ pub const LINES: [(&str, &str); 32] = [
     ),
     ("learn outcomes", "learn outcomes {outcomes} --epsilon 0.9"),
     ("learn check", "learn check {model} {detections}"),
+    ("learn survey", "learn survey {site} {dockings}"),
     ("predict", "predict {model} --at {at}"),
     (
         "replay",
         "replay {site} {log} --task dock --truth {truth} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --mcap {mcap} -o {output}",
+    ),
+    (
+        "replay",
+        "replay {site} {log} --task dock --inflation-model {inflation_model}",
     ),
     ("seal", "seal {firmware} -o {output}"),
     ("family", "family {site} --tag t7 --r 0.02"),
@@ -141,6 +146,7 @@ pub fn file_of(leaf: &str, argument: &str) -> &'static str {
         ("predict" | "learn check", "model") => "model.toml",
         ("learn inflation", "estimates") => "scored.csv",
         ("metrics", "estimate") => "estimate.tum",
+        ("replay", "inflation_model") => "filter.toml",
         (_, "site") => "site.toml",
         (_, "table") => "dock.posegate",
         (_, "poses" | "estimates" | "log") => "estimates.csv",
@@ -148,6 +154,7 @@ pub fn file_of(leaf: &str, argument: &str) -> &'static str {
         (_, "costs") => "costs.csv",
         (_, "detections") => "detections.csv",
         (_, "outcomes") => "outcomes.csv",
+        (_, "dockings") => "dockings.csv",
         (_, "at") => "at.csv",
         (_, "firmware") => "firmware",
         (_, "covariance_file") => "covariance.csv",
@@ -351,6 +358,20 @@ fn fixture() -> Folder {
         }
         scored += &format!("{row},1.5,0.2,0\n");
     }
+    let dockings = (0..8).map(|docking| {
+        let [x, y, yaw] = [0; 3].map(|_| 0.01 * random());
+        format!(
+            "{docking},dock,t7,{:.5},{:.5},{:.5}\n",
+            1.5 + x,
+            0.2 + y,
+            yaw
+        )
+    });
+    let dockings: String = dockings.collect();
+    folder.write(
+        "dockings.csv",
+        format!("run,dock,tag,x_m,y_m,yaw_rad\n{dockings}"),
+    );
     folder.write("estimates.csv", estimates);
     folder.write("scored.csv", scored);
     folder.write("truth.tum", &tum);
@@ -358,6 +379,7 @@ fn fixture() -> Folder {
     folder.write("firmware", firmware());
     for line in [
         "learn bounds detections.csv --quantile 0.9 -o model.toml",
+        "learn inflation scored.csv --epsilon 0.99 --confidence 0.5 -o filter.toml",
         "table build site.toml --task dock -o dock.posegate",
         "chain site.toml --name back-to-dock -o picture.svg",
         "site build site.toml --tables-only -o built",

@@ -7,7 +7,7 @@ use crate::stepped::{At, Stepped, Stop};
 use posegate::gate::{Evidence, Gate, Reason, Restart, Settings, Source, State};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{Growth, Trust};
+use posegate::set::{Aging, Growth, Trust};
 use posegate::table::Table;
 use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
@@ -43,11 +43,13 @@ static SOURCES: [Source; 2] = [
     Source {
         frame: MAP,
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: SPEEDS,
     },
     Source {
         frame: MAP,
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: SPEEDS,
     },
 ];
@@ -429,6 +431,7 @@ impl Controller {
                     report: &sent,
                     others: &others,
                     beside: Growth::NONE,
+                    since_fix_ms: None,
                     elsewhere: Risk::NONE,
                 };
                 let step = self.gate.step_on(told.now_ms, &evidence);

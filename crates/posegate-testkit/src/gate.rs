@@ -3,7 +3,7 @@
 use posegate::gate::{Gate, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{Estimate, Trust};
+use posegate::set::{Aging, Estimate, Trust};
 use posegate::table::Table;
 
 pub const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
@@ -11,6 +11,7 @@ pub const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate")
 pub const SOURCE: Source = Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
+    aging: Aging::NONE,
     motion: MotionBounds::STANDS_STILL,
 };
 pub static SOURCES: [Source; 2] = [SOURCE; 2];

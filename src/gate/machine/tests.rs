@@ -2,7 +2,7 @@ use super::*;
 use crate::gate::{Restart, Source};
 use crate::motion::MotionBounds;
 use crate::report::{FrameId, PoseEstimate};
-use crate::set::{Estimate, Trust, Uncertainty};
+use crate::set::{Aging, Estimate, Trust, Uncertainty};
 use crate::table::CRC_LENGTH;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
@@ -11,6 +11,7 @@ const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 const MAP: Source = Source {
     frame: FrameId::of("map"),
     trust: Trust::FULL,
+    aging: Aging::NONE,
     motion: MotionBounds::STANDS_STILL,
 };
 static SOURCES: [Source; 1] = [MAP];
@@ -295,6 +296,7 @@ fn settings_that_change_are_found_in_every_cycle() {
     const OTHER: Source = Source {
         frame: FrameId::of("odom"),
         trust: Trust::FULL,
+        aging: Aging::NONE,
         motion: MotionBounds::STANDS_STILL,
     };
     type Change = fn(&mut Settings<'_>);
@@ -597,4 +599,5 @@ fn a_shorter_table_in_the_same_place_is_refused() {
     }
 }
 
+mod aging;
 mod hypotheses;

@@ -2,15 +2,14 @@
 //! and from a recorded filter on rows that they were not learnt from.
 
 mod moving;
+mod robots;
 
 use crate::arguments::Arguments;
-use crate::files::{self, Scratch, release};
+use crate::files::release;
 use crate::jobs::docs::release_program;
 use crate::jobs::test::{passed, ran, suite};
 use crate::need::{self, THUMBS};
-use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd, program_at};
-use serde_json::Value;
 use std::path::Path;
 
 const TIMES: &str = "--max-age-ms 3000 --permit-hold-ms 3000 --json";
@@ -28,6 +27,7 @@ pub fn recorded(given: &Arguments) -> Result {
         return Err("no test of learn is named *recorded*".into());
     }
     rules(&folder)?;
+    robots::robots(&folder)?;
     moving::moving(&folder)
 }
 
@@ -37,8 +37,7 @@ fn release_posegate() -> Cmd {
 }
 
 /// Prints what the gate, and the rules that are in use today, would have permitted: for AMCL's estimates of the Nav2 recording, which
-/// has no truth, and for those of a filter on real robots, whose truth is known. Fails if the gate permits falsely on the robots with
-/// even numbers, with covariances inflated by the factor that `learn` finds on the others.
+/// has no truth, and for those of a filter on real robots, whose truth is known.
 fn rules(folder: &Path) -> Result {
     release_program()?;
     need::command("python3", "python3")?;
@@ -72,41 +71,7 @@ fn rules(folder: &Path) -> Result {
             &replay(&estimates, inflation)?,
         )?;
     }
-    let half = Scratch::new()?;
-    let text = files::read(&estimates)?;
-    files::write(half.join("learn.csv"), of_robots(&text, 1))?;
-    files::write(half.join("held.csv"), of_robots(&text, 0))?;
-    // Three robots have 133 independent rows: enough for a confidence of 0.7.
-    let learnt = posegate()
-        .words("learn inflation")
-        .arg(half.join("learn.csv"))
-        .words("--epsilon 0.99 --confidence 0.7 --json -o")
-        .arg(half.join("filter.toml"))
-        .read()?;
-    // In Python, because it prints the number with all of its digits.
-    let inflation = cmd("python3 -c")
-        .arg("import json, sys; print(json.load(sys.stdin)['overall']['inflation'])")
-        .input(learnt)
-        .read()?;
-    let inflation = inflation.trim();
-    let held = replay(&half.join("held.csv"), inflation)?;
-    table(
-        &format!("mrclam, bay, robots 2 and 4, inflation {inflation} learnt of 1, 3 and 5"),
-        &held,
-    )?;
-    let held: Value = serde_json::from_str(&held)?;
-    let gate = &held["rules"]["gate"];
-    let mut report = Report::default();
-    report.require(
-        gate["false_permits"].as_u64() == Some(0),
-        "false permits of the gate",
-    );
-    report.require(gate["permits"].as_u64() > Some(0), "permits of the gate");
-    report.require(
-        held["truth"]["coverage"].as_f64() >= Some(0.99),
-        "truth in the pose-sets",
-    );
-    report.finish()
+    Ok(())
 }
 
 /// Prints a replay's rules as JSON lines.
@@ -115,32 +80,4 @@ fn table(name: &str, replay: &str) -> Result {
         .arg(name)
         .input(replay)
         .print()
-}
-
-/// Returns the header and the rows of robots whose number, the first column, is this modulo 2.
-fn of_robots(rows: &str, parity: u64) -> String {
-    let mut kept = String::new();
-    for (index, line) in rows.lines().enumerate() {
-        let robot = line
-            .split(',')
-            .next()
-            .and_then(|number| number.trim().parse::<u64>().ok());
-        if index == 0 || robot.is_some_and(|number| number % 2 == parity) {
-            kept.push_str(line);
-            kept.push('\n');
-        }
-    }
-    kept
-}
-
-#[cfg(test)]
-mod tests {
-    use super::of_robots;
-
-    #[test]
-    fn rows_are_chosen_by_the_robots_number() {
-        let rows = "robot,x\n1,0.5\n2,0.6\n3,0.7\n";
-        assert_eq!(of_robots(rows, 1), "robot,x\n1,0.5\n3,0.7\n");
-        assert_eq!(of_robots(rows, 0), "robot,x\n2,0.6\n");
-    }
 }

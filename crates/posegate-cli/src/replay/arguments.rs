@@ -43,6 +43,10 @@ pub struct Arguments {
     /// Factor by which covariances are multiplied, at least 1
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub inflation: f64,
+    /// A model of `posegate learn inflation`: each covariance is multiplied by the factor for its time since the last fix (a CSV's
+    /// column), or by the largest factor if that is not known or beyond the data
+    #[arg(long, value_name = "MODEL", conflicts_with = "inflation")]
+    pub inflation_model: Option<Input>,
     /// Which terms of their covariance the sources fill (AMCL: yaw-unknown)
     #[arg(long, value_enum, default_value = "filled")]
     pub cross_terms: Terms,
@@ -213,12 +217,12 @@ impl Arguments {
             })
     }
 
-    /// Returns the trust in the sources.
-    pub fn trust(&self) -> Option<Trust> {
-        Some(Trust {
-            inflation: Inflation::new(self.inflation)?,
+    /// Returns the trust in the sources, with this inflation.
+    pub fn trust(&self, inflation: Inflation) -> Trust {
+        Trust {
+            inflation,
             cross_terms: self.terms(),
-        })
+        }
     }
 
     /// Returns the frames of which poses are composed.

@@ -2,6 +2,7 @@
 
 use super::Arguments;
 use super::arguments::Kind;
+use super::inflation::Inflated;
 use super::words::topics;
 use crate::door::Failure;
 use posegate_host::files::{FileError, Files, Input, Opened};
@@ -35,6 +36,7 @@ impl Recorded {
         files: &Files,
         site: &Site,
         radius_squared: f64,
+        inflated: &Inflated,
     ) -> Result<Self, Failure> {
         let Opened {
             reader,
@@ -85,7 +87,8 @@ impl Recorded {
             }
             Format::Csv => {
                 let gaussian = arguments.set == Kind::Gaussian;
-                let text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
+                let mut text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
+                inflated.reads(&mut text, &name);
                 // A recorded time of use is the clock, however far it is from the stamps.
                 clock = Some(if text.has_use() {
                     Clock::Logged

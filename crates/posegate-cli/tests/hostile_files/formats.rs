@@ -240,6 +240,16 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             ],
         ),
         format(
+            "dockings CSV",
+            Text,
+            "mutant.csv",
+            text(&[&dockings()]),
+            &[
+                "learn survey dock.toml {} --json",
+                "learn survey dock.toml {}",
+            ],
+        ),
+        format(
             "learnt models TOML",
             Text,
             "mutant.toml",
@@ -407,6 +417,14 @@ fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
 pub fn tum() -> String {
     let line = |k: u32| format!("{}.5 {} 0.25 0 0 0 0 1\n", k, 0.1 * f64::from(k));
     (0..40).map(line).collect()
+}
+
+fn dockings() -> String {
+    let rows = (0..30).map(|k| format!("{k},dock,t7,0.0{},0.0{},0.0{}\n", k % 7, k % 5, k % 3));
+    ["run,dock,tag,x_m,y_m,yaw_rad\n".to_owned()]
+        .into_iter()
+        .chain(rows)
+        .collect()
 }
 
 fn outcomes() -> String {

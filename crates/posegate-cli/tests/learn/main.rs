@@ -2,6 +2,7 @@
 //! in every accepted region; inflated sets for their share of the estimates. They are not looser than necessary.
 
 mod bounds;
+mod by_age;
 mod command;
 mod dependence;
 mod drift;
@@ -11,6 +12,7 @@ mod law;
 mod provenance;
 mod recorded;
 mod site;
+mod survey;
 
 use posegate_host::learn::acceptance;
 

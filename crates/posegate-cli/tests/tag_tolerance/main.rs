@@ -9,7 +9,7 @@ mod nature;
 
 use nature::{Random, Vector, World};
 use posegate_host::learn::{BoundsSettings, Detections, ErrorModel, learn_bounds};
-use posegate_host::place::{LearntCost, Task, ViewCost};
+use posegate_host::place::{LearntCost, Task, ViewBound, ViewCost};
 use posegate_host::site::Site;
 use posegate_testkit::counts;
 use serde_json::Value;
@@ -380,7 +380,7 @@ fn the_cost_of_a_view_has_the_tolerances_in_it() {
             wall: None,
             reserve: site.tags["t7"].tolerance,
         };
-        let cost = LearntCost::new(&MODEL, 1e6, &task);
+        let cost = LearntCost::new(ViewBound::Learnt(&MODEL), 1e6, &task);
         for d in [1.0, 2.0, 3.5, 5.0] {
             let at = [d, 0.0, 0.05];
             let bounds = learnt(at);

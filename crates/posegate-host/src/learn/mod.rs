@@ -2,6 +2,7 @@
 
 pub use self::binomial::{acceptance, at_most, clopper_pearson, conformal_rank, rank};
 pub use self::bounds::{BoundsSettings, learn_bounds};
+pub use self::by_age::{ByAge, by_age_json};
 pub use self::check::{
     BoundCheck, Change, CheckReport, CheckSettings, DetectionCheck, RegionCheck, check_bounds,
 };
@@ -14,12 +15,15 @@ pub use self::inflation::{InflationModel, InflationReport, InflationSettings, le
 pub use self::kind::Model;
 pub use self::outcomes::{OutcomesReport, outcomes, test_outcomes};
 pub use self::runs::{RunSource, Runs};
+pub use self::sequence::confidence_sequence;
+pub use self::survey::{Look, OffsetReport, Surveyed, SurveyedSite, looks, survey};
 pub use self::taken_with::TakenWith;
 pub use self::views::ViewBox;
 
 mod axis;
 mod binomial;
 mod bounds;
+mod by_age;
 mod calibration;
 mod cells;
 mod check;
@@ -28,14 +32,17 @@ mod document;
 mod error;
 mod error_model;
 mod estimates;
+mod fisher;
 mod groups;
 mod inflation;
 mod kind;
 mod outcomes;
 mod runs;
+mod sequence;
 mod sheet;
 mod smooth;
 mod split;
 mod student;
+mod survey;
 mod taken_with;
 mod views;

@@ -1,7 +1,7 @@
 //! Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon.
 
 use super::LearnError;
-use super::binomial::clopper_pearson;
+use super::sequence::confidence_sequence;
 use super::sheet::Sheet;
 
 /// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` if that column exists.
@@ -36,8 +36,8 @@ pub struct OutcomesReport {
     pub count: u64,
     /// Dockings that succeeded.
     pub successes: u64,
-    /// Clopper-Pearson limits of the probability of success, with confidence `1 - alpha`. They are valid for one
-    /// evaluation, at a number of dockings that was fixed beforehand.
+    /// Limits of the probability of success, with confidence `1 - alpha` for all evaluations together: a confidence
+    /// sequence, see [`confidence_sequence`].
     pub limits: [f64; 2],
     /// The value of the bet against the claim after the last docking.
     pub e_value: f64,
@@ -56,7 +56,8 @@ const BETS: u32 = 64;
 /// A bet starts at 1. At each docking it is multiplied by the likelihood ratio of the outcome: its probability under a
 /// higher failure rate over that under the claimed one. The e-value is the mean of the bets on many rates. If the claim
 /// is true, the e-value ever reaches `1 / alpha` with probability at most `alpha` (Ville's inequality), however often
-/// it is evaluated and whenever one stops. The e-value is the test; the limits are additional information.
+/// it is evaluated and whenever one stops. The e-value is the test. The limits are valid at every evaluation too, if every
+/// docking succeeds with one probability.
 ///
 /// # Errors
 /// [`LearnError::Share`] if epsilon or alpha is not in (0, 1).
@@ -97,7 +98,7 @@ pub fn test_outcomes(
     Ok(OutcomesReport {
         count,
         successes,
-        limits: clopper_pearson(successes, count, 1.0 - alpha),
+        limits: confidence_sequence(successes, count, alpha),
         e_value: libm::exp(e.min(700.0)),
         largest_e_value: libm::exp(largest.min(700.0)),
         contradicted_at,
@@ -144,7 +145,7 @@ mod tests {
         let found = test_outcomes(&[true; 100], 0.9, 0.05).unwrap();
         assert!(found.e_value < 1.0 && found.contradicted_at.is_none());
         assert_eq!(found.successes, 100);
-        assert!(found.limits[1] == 1.0 && (found.limits[0] - 0.963_783).abs() < 1e-5);
+        assert_eq!(found.limits, confidence_sequence(100, 100, 0.05));
         let found = test_outcomes(&[false; 10], 0.9, 0.05).unwrap();
         assert!(found.contradicted_at.is_some_and(|at| at <= 3));
         assert!(test_outcomes(&[true], 1.0, 0.05).is_err());

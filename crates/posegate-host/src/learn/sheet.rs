@@ -177,6 +177,11 @@ impl Line<'_> {
         ))
     }
 
+    /// Returns the error of a field.
+    pub(super) fn wrong_at(&self, column: Column, what: String) -> LearnError {
+        self.wrong(column.index + 1, what)
+    }
+
     fn wrong(&self, column: usize, what: String) -> LearnError {
         LearnError::Place {
             file: self.file.to_owned(),

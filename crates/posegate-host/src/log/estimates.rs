@@ -35,6 +35,8 @@ pub struct Row {
     pub truth: Option<[f64; 3]>,
     /// The number of the row within its report; `None` if there is no such column.
     pub hypothesis: Option<u64>,
+    /// The time since the last fix, seconds, if the reader was told its column and the field is not empty.
+    pub since_fix_s: Option<f64>,
     /// The row's line in the file, from 1.
     pub line: u64,
 }
@@ -152,6 +154,7 @@ pub struct Rows<R: Read> {
     lower: [Option<Place>; 3],
     truth: Option<[Place; 3]>,
     hypothesis: Option<Place>,
+    since_fix: Option<Place>,
 }
 
 impl<R: Read> Rows<R> {
@@ -245,7 +248,15 @@ impl<R: Read> Rows<R> {
             lower,
             truth,
             hypothesis,
+            since_fix: None,
         })
+    }
+
+    /// Also reads the time since the last fix from a column, if the header has it. Returns whether it does.
+    pub fn reads_since_fix(&mut self, column: &str) -> bool {
+        let index = self.header.split(", ").position(|name| name == column);
+        self.since_fix = index.map(|index| (index, "the time since the last fix"));
+        index.is_some()
     }
 
     /// Checks that the header has a time column.
@@ -341,6 +352,7 @@ impl<R: Read> Rows<R> {
             covariance,
             truth,
             hypothesis: self.hypothesis.map(|place| self.whole(place)).transpose()?,
+            since_fix_s: self.maybe(self.since_fix)?,
             line: self.line(),
         })
     }

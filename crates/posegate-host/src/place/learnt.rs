@@ -1,17 +1,42 @@
-//! Cost of a view by bounds learnt from a detector's own errors.
+//! Cost of a view by the bounds of an error model: learnt from a detector's own errors, or a formula.
 
 use super::objective::{Task, ViewCost};
 use super::quadrature::Quadrature;
 use crate::learn::ErrorModel;
 use core::cell::RefCell;
-use posegate::shape::Visibility;
+use posegate::shape::{self, Visibility};
+
+/// A bound on the error of an observation by d, phi and psi.
+#[derive(Clone, Copy, Debug)]
+pub enum ViewBound<'a> {
+    /// Learnt from data.
+    Learnt(&'a ErrorModel),
+    /// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2`.
+    Formula(&'a shape::ErrorModel),
+}
+
+impl ViewBound<'_> {
+    /// Returns the two bounds, metres and degrees, for metres and radians. `None` if a learnt model has too few data there.
+    fn at(self, d: f64, phi: f64, psi: f64) -> Option<[f64; 2]> {
+        match self {
+            Self::Learnt(model) => model
+                .bounds(d, phi, psi)
+                .map(|(translation, yaw)| [translation, yaw.to_degrees()]),
+            Self::Formula(model) => {
+                let sum =
+                    |[c0, c1, c2, c3]: [f64; 4]| c0 + c1 * d * d + c2 * phi * phi + c3 * psi * psi;
+                Some([model.translation, model.yaw_deg].map(sum))
+            }
+        }
+    }
+}
 
 /// The bound on the error of an observation, plus the error due to the tolerances of tag and camera: `100 translation +
 /// yaw`, so one centimetre counts as much as one degree. A view that the model does not cover is a miss.
 #[derive(Clone, Debug)]
 pub struct LearntCost<'a> {
     /// The bounds, by d, phi and psi.
-    model: &'a ErrorModel,
+    model: ViewBound<'a>,
     /// The cost of a miss.
     c_high: f64,
     /// The views with tolerances, with the tag at the camera's height: the lever is longest there, and a search may
@@ -22,7 +47,7 @@ pub struct LearntCost<'a> {
 impl<'a> LearntCost<'a> {
     /// Creates the cost of a task's views; `c_high` is the cost of a miss.
     #[must_use]
-    pub fn new(model: &'a ErrorModel, c_high: f64, task: &Task) -> Self {
+    pub fn new(model: ViewBound<'a>, c_high: f64, task: &Task) -> Self {
         let views: RefCell<Vec<Visibility>> = RefCell::default();
         let _ = task.set.with_views_of(&task.tag, |view| {
             if view.is_exact() {
@@ -49,13 +74,13 @@ impl<'a> LearntCost<'a> {
 
 impl ViewCost for LearntCost<'_> {
     fn of_view(&self, [d, phi, psi]: [f64; 3]) -> f64 {
-        let bounds = self.model.bounds(d, phi, psi);
+        let bounds = self.model.at(d, phi, psi);
         let added = self.views.iter().map(|view| {
             let [metres, degrees] = view.tolerance_error(d + view.tolerance_margins().ray);
             100.0 * metres + degrees
         });
-        bounds.map_or(f64::INFINITY, |(translation, yaw)| {
-            100.0 * translation + yaw.to_degrees() + added.fold(0.0, f64::max)
+        bounds.map_or(f64::INFINITY, |[translation, yaw_deg]| {
+            100.0 * translation + yaw_deg + added.fold(0.0, f64::max)
         })
     }
 

@@ -16,7 +16,7 @@
 
 pub use self::cost::{Cost, CostError, ExpectedCost, expected_cost, expected_cost_of};
 pub use self::gaussian::{Gaussian, GaussianError};
-pub use self::learnt::LearntCost;
+pub use self::learnt::{LearntCost, ViewBound};
 pub use self::objective::{Objective, PosePrior, Task, ViewCost};
 pub use self::placement::{
     PlaceError, Placed, Placement, PlacementProblem, Restart, compare, place,

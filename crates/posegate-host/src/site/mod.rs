@@ -103,6 +103,8 @@ pub struct Site {
     pub files: Vec<PathBuf>,
     /// The learnt error models, by name.
     pub error_models: BTreeMap<String, ErrorModel>,
+    /// The error models that are formulas, by name.
+    pub error_formulas: BTreeMap<String, posegate::shape::ErrorModel>,
 }
 
 impl Site {

@@ -168,6 +168,13 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         controller,
         digest: digest(sha256, files.iter().map(|file| &file.digest)),
         files: files.into_iter().map(|file| file.path).collect(),
+        error_formulas: error_models
+            .iter()
+            .filter_map(|(name, model)| match model {
+                places::SiteModel::Grows(model) => Some((name.clone(), *model)),
+                places::SiteModel::Learnt(_) => None,
+            })
+            .collect(),
         error_models: error_models
             .into_iter()
             .filter_map(|(name, model)| match model {

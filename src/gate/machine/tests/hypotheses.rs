@@ -12,6 +12,7 @@ fn evidence<'r>(report: &'r Report, others: &'r [PoseEstimate], beside: Growth) 
         report,
         others,
         beside,
+        since_fix_ms: None,
         elsewhere: Risk::NONE,
     }
 }
@@ -139,6 +140,7 @@ fn what_is_left_out_counts() {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         let _ = gate.tick(1010);
         let evidence = Evidence {
+            since_fix_ms: None,
             elsewhere,
             ..evidence(report, &[], Growth::NONE)
         };
@@ -157,6 +159,7 @@ fn what_is_left_out_counts() {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         gate.table = Ok(Table::parse(table).unwrap());
         let evidence = Evidence {
+            since_fix_ms: None,
             elsewhere,
             ..evidence(&wide, &[], Growth::NONE)
         };
@@ -187,6 +190,7 @@ fn what_is_left_out_counts() {
     ] {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         let evidence = Evidence {
+            since_fix_ms: None,
             elsewhere,
             ..evidence(&little, others, beside)
         };

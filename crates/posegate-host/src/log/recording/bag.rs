@@ -534,6 +534,7 @@ impl Notes {
                 z_m: position[2],
                 belief: belief(position, orientation, covariance),
                 truth: None,
+                since_fix_ms: None,
             }),
             (Content::Detections(found), Role::Estimates(source)) => Item::Detections {
                 source,

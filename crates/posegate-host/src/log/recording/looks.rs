@@ -109,6 +109,7 @@ impl TagLocalizer {
                 spread,
             },
             truth: None,
+            since_fix_ms: None,
         })
     }
 

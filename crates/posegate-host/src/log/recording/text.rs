@@ -75,6 +75,14 @@ impl<R: Read> Text<R> {
         }
     }
 
+    /// Also reads the time since the last fix from a column of a CSV, seconds. Returns whether the header has it.
+    pub fn reads_since_fix(&mut self, column: &str) -> bool {
+        match &mut self.lines {
+            Lines::Csv(rows) => rows.reads_since_fix(column),
+            Lines::Tum { .. } => false,
+        }
+    }
+
     /// Returns a reader of a trajectory: estimates without a covariance.
     pub fn tum(input: R, file: &str) -> Self {
         let (input, bytes) = counted(input);
@@ -157,6 +165,12 @@ impl<R: Read> Recording for Text<R> {
     }
 }
 
+/// Returns a time since the last fix in milliseconds, rounded up. `None` if it is below zero or not a number.
+fn milliseconds(since_fix_s: f64) -> Option<u32> {
+    // A conversion to `u32` saturates.
+    (since_fix_s >= 0.0).then(|| libm::ceil(since_fix_s * 1000.0) as u32)
+}
+
 fn of_row(row: &Row, covariance: bool) -> Sample {
     let mut belief = PoseEstimate::new(row.estimate, Uncertainty::Gaussian(row.covariance));
     if !covariance {
@@ -171,6 +185,7 @@ fn of_row(row: &Row, covariance: bool) -> Sample {
         z_m: 0.0,
         belief,
         truth: row.truth,
+        since_fix_ms: row.since_fix_s.and_then(milliseconds),
     }
 }
 
@@ -189,5 +204,6 @@ fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
             spread: None,
         },
         truth: None,
+        since_fix_ms: None,
     }
 }

@@ -10,7 +10,7 @@
 //! use posegate::gate::{Restart, Settings, Source};
 //! use posegate::motion::MotionBounds;
 //! use posegate::report::FrameId;
-//! use posegate::set::Trust;
+//! use posegate::set::{Aging, Trust};
 //! use posegate_host::log::recording::Text;
 //! use posegate_host::log::replay::{Part, Replay, ReplayConfig, Thresholds, play};
 //! # const SITE: &str = include_str!("../../../../../examples/sites/dock.toml");
@@ -22,7 +22,7 @@
 //! let settings = Settings {
 //!     task: "dock",
 //!     site_digest: site.digest,
-//!     sources: &[Source { frame: FrameId::of("map"), trust: Trust::FULL, motion: MotionBounds::STANDS_STILL }],
+//!     sources: &[Source { frame: FrameId::of("map"), trust: Trust::FULL, aging: Aging::NONE, motion: MotionBounds::STANDS_STILL }],
 //!     maximum_age_ms: 200,
 //!     response_ms: 20,
 //!     report_period_ms: 50,
@@ -92,7 +92,7 @@ use super::recording::{Findings, Sample, TruePose, yaw_of};
 use super::{Trajectory, TruthLookup};
 use crate::log::{clock_ms, factor};
 use posegate::contain::Margin;
-use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
+use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::report::{FrameId, Heading, Report};
 use posegate::set::InputError;
@@ -323,10 +323,10 @@ impl<'a> Replay<'a> {
         let Some((now, stamp)) = times else {
             return Verdict::deny(Reason::Stale);
         };
-        let trust = self
-            .carry
-            .as_ref()
-            .map_or(source.trust, |carry| carry.trust);
+        let trust = self.carry.as_ref().map_or_else(
+            || source.trust_after(sample.since_fix_ms),
+            |carry| carry.trust,
+        );
         let set = report.belief.pose_set(self.judge.radius_squared(), trust);
         let movement = self
             .setup
@@ -384,10 +384,14 @@ impl<'a> Replay<'a> {
         self.carry = Some(carry);
     }
 
-    /// Gives the gate a fix: as it is, or carried along the odometry.
-    fn take_fix(&mut self, now_ms: u32, report: &Report) -> Step {
+    /// Gives the gate a fix: as it is, with the time since the source's last fix, or carried along the odometry.
+    fn take_fix(&mut self, now_ms: u32, report: &Report, since_fix_ms: Option<u32>) -> Step {
         let Some(carry) = &mut self.carry else {
-            return self.gate.step(now_ms, report);
+            let evidence = Evidence {
+                since_fix_ms,
+                ..Evidence::of(report)
+            };
+            return self.gate.step_on(now_ms, &evidence);
         };
         match carry.tracker.fix(report) {
             Ok(()) => match carry.tracker.tracked(now_ms) {
@@ -425,7 +429,7 @@ impl<'a> Replay<'a> {
         }
         self.drive_until(now_s);
         self.let_time_pass(now_ms);
-        let step = self.take_fix(now_ms, &report);
+        let step = self.take_fix(now_ms, &report, sample.since_fix_ms);
         self.last_now_ms = now_ms;
         let verdict = examined.unwrap_or_else(|| match step.verdict {
             Ok(()) => Verdict::Permit {
@@ -460,7 +464,8 @@ impl<'a> Replay<'a> {
             let trust = settings.sources.get(usize::from(row.source));
             row.possible = trust.is_some_and(|source| {
                 let radius = self.judge.radius_squared();
-                report.belief.pose_set(radius, source.trust).is_ok()
+                let trust = source.trust_after(row.since_fix_ms);
+                report.belief.pose_set(radius, trust).is_ok()
             });
         }
         self.waiting.push_back((row, truth));
@@ -516,7 +521,7 @@ impl<'a> Replay<'a> {
         self.counts.truth_other_frame += u64::from(row.truth.is_some() && !row.in_world);
         row.against = comparable.map(|truth| {
             let source = self.setup.settings.sources.get(usize::from(row.source));
-            let trust = source.map(|source| source.trust);
+            let trust = source.map(|source| source.trust_after(row.since_fix_ms));
             TruthComparison::of(
                 row,
                 truth,

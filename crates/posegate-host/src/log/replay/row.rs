@@ -43,6 +43,8 @@ pub struct Row {
     pub step: Result<(), Reason>,
     /// The true pose (m, m, rad), if known.
     pub truth: Option<[f64; 3]>,
+    /// The time since the last fix of its source, milliseconds, if known.
+    pub since_fix_ms: Option<u32>,
     /// The comparison with the truth.
     pub against: Option<TruthComparison>,
     /// The results of the rules in [`super::RULES`]. `None` if a rule lacks its input.
@@ -78,6 +80,7 @@ impl Row {
             state: State::Inhibited(Reason::Silent),
             step: Err(Reason::Silent),
             truth: sample.truth,
+            since_fix_ms: sample.since_fix_ms,
             against: None,
             rules: [None; 3],
         }

@@ -112,6 +112,7 @@ mod tests {
             state: State::Inhibited(Reason::Silent),
             step: Err(Reason::Silent),
             truth: None,
+            since_fix_ms: None,
             against: None,
             rules: [None; 3],
         }

@@ -1,0 +1,99 @@
+//! Factors by the time since the last fix, from rows to the gate.
+
+use crate::command::{lines, run, write};
+use crate::law::Random;
+use std::fmt::Write;
+
+const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad,since_fix_s";
+
+/// Estimates at the dock that state deviations of 4 mm and 4 mrad: true within a second of a fix, ten times too small later. Each tenth row has an
+/// old fix.
+fn estimates(count: u32, seed: u64) -> String {
+    let mut random = Random(seed);
+    let mut text = format!("{HEADER}\n");
+    for k in 0..count {
+        let is_old = k % 10 == 9;
+        let since = if is_old { 5.0 } else { 0.0 } + random.even();
+        let sigma = 0.004 * if is_old { 10.0 } else { 1.0 };
+        let [x, y, yaw] = [0; 3].map(|_| sigma * random.normal());
+        let t = 0.05 * f64::from(k);
+        writeln!(
+            text,
+            "{t},0,0,0,1.6e-5,0,0,1.6e-5,0,1.6e-5,{x},{y},{yaw},{since:.3}"
+        )
+        .unwrap();
+    }
+    text
+}
+
+#[test]
+fn replay_uses_the_factor_of_the_age() {
+    let folder = tempfile::tempdir().unwrap();
+    let site = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/sites/dock.toml"
+    );
+    write(&folder, "e.csv", &estimates(6000, 3));
+    write(&folder, "new.csv", &estimates(500, 4));
+    let learn = |epsilon: &str| {
+        run(
+            &folder,
+            &format!("learn inflation e.csv --epsilon {epsilon} -o m.toml --json"),
+        )
+    };
+    let (code, out, err) = learn("0.99");
+    assert_eq!(code, 0, "{err}");
+    let source = &lines(&out)[0]["source"];
+    let largest = source["inflation"].as_f64().unwrap();
+    let ages = source["ages"].as_array().unwrap();
+    assert!(largest > 80.0 && !ages.is_empty(), "{source}");
+    assert!(ages[0]["inflation"].as_f64().unwrap() < 1.5, "{source}");
+
+    let replay = |file: &str, options: &str| {
+        let line = format!("replay {site} {file} --task dock --json --fast {options}");
+        let (code, out, err) = run(&folder, &line);
+        assert!(code < 2, "{err}");
+        let told = lines(&out).pop().unwrap();
+        let gate = &told["rules"]["gate"];
+        let [permits, falsely] =
+            ["permits", "false_permits"].map(|key| gate[key].as_u64().unwrap());
+        (
+            permits,
+            falsely,
+            told["truth"]["coverage"].as_f64().unwrap(),
+            err,
+        )
+    };
+    let (permits, falsely, coverage, _) = replay("new.csv", "--inflation-model m.toml");
+    // Nine of ten rows are fresh. Which rows lie near a border of the learnt conditions depends on the data.
+    assert!(
+        (380..=450).contains(&permits) && falsely == 0,
+        "{permits} {falsely}"
+    );
+    assert!(coverage >= 0.98, "{coverage}");
+    let (permits, ..) = replay("new.csv", &format!("--inflation {largest}"));
+    assert_eq!(permits, 0);
+    let (permits, _, coverage, _) = replay("new.csv", "--inflation 1");
+    assert!(permits == 500 && coverage < 0.93, "{permits} {coverage}");
+    // Without the column each estimate has the largest factor.
+    let without = estimates(500, 4).replace("since_fix_s", "since");
+    write(&folder, "without.csv", &without);
+    let (permits, _, _, err) = replay("without.csv", "--inflation-model m.toml");
+    assert!(
+        permits == 0 && err.contains("no column `since_fix_s`"),
+        "{err}"
+    );
+
+    let line = format!("replay {site} new.csv --task dock --inflation-model m.toml");
+    for (more, message) in [
+        (" --epsilon 0.95", "learnt at epsilon 0.99"),
+        (" --inflation 4", "cannot be used with"),
+        (
+            " --set bounded --translation 0.1 --yaw-deg 1",
+            "--set bounded",
+        ),
+    ] {
+        let (code, _, err) = run(&folder, &format!("{line}{more}"));
+        assert!(code == 2 && err.contains(message), "{more}: {err}");
+    }
+}

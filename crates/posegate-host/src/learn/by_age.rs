@@ -1,0 +1,172 @@
+//! A learnt model as the controller has it: one factor, and smaller ones by the time since the last fix.
+
+use super::InflationModel;
+use posegate::set::{Aging, Inflation, MOST_AGES};
+
+/// The unit of an age on the controller, milliseconds.
+const UNIT_MS: f64 = 64.0;
+
+/// The settings of a controller's source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByAge {
+    /// The source's own inflation: the largest factor of all.
+    pub inflation: Inflation,
+    /// Smaller factors by the time since the last fix.
+    pub aging: Aging,
+}
+
+impl ByAge {
+    /// Returns the steps: the largest time since the last fix in milliseconds, and the factor up to it.
+    pub fn steps(&self) -> impl Iterator<Item = (u32, f64)> {
+        let used = self.aging.words().into_iter().filter(|word| *word != 0);
+        used.map(|word| ((word & 0xffff) * 64, f64::from(word >> 16) / 64.0))
+    }
+}
+
+/// Returns the steps as JSON: the settings of a source.
+#[must_use]
+pub fn by_age_json(by_age: &ByAge) -> serde_json::Value {
+    let steps = by_age.steps().map(|(until_ms, inflation)| {
+        serde_json::json!({
+            "until_ms": until_ms, "inflation": inflation, "inflation_q16": (inflation * 65_536.0) as u32,
+        })
+    });
+    steps.collect()
+}
+
+impl InflationModel {
+    /// Returns the factors for a controller. Each is at least that of [`InflationModel::inflation`] at every time since the last fix that
+    /// the data have, and none falls with the time. There are no steps if the conditions are not times since the last fix (a column
+    /// `since_..._s`). With more conditions than steps, the one whose factor is nearest to that of the next is left out. `None` if a condition
+    /// has no factor.
+    #[must_use]
+    pub fn by_age(&self) -> Option<ByAge> {
+        let largest = self.inflation(None)?;
+        let inflation = Inflation::new(largest)?;
+        let condition = self.condition();
+        let mut steps: Vec<(u32, Inflation)> = Vec::new();
+        if condition.starts_with("since_") && condition.ends_with("_s") {
+            let mut most = 1.0f64;
+            for part in self.parts() {
+                most = most.max(part.inflation);
+                // On a border the next condition's factor counts too, so the step ends before it.
+                let units = libm::ceil(part.to * 1000.0 / UNIT_MS) - 1.0;
+                let factor = Inflation::new(most)?;
+                // Rounded up to 2^-6, it must still be less than the source's own.
+                let is_smaller = (factor.q16().div_ceil(1 << 10)) << 10 < inflation.q16();
+                if !((1.0..65_536.0).contains(&units) && is_smaller) {
+                    continue;
+                }
+                let until_ms = units as u32 * 64;
+                match steps.last_mut() {
+                    Some(last) if last.1 == factor => last.0 = until_ms.max(last.0),
+                    Some(last) if last.0 >= until_ms => {}
+                    _ => steps.push((until_ms, factor)),
+                }
+            }
+            while steps.len() > MOST_AGES {
+                let ratio = |k: usize| {
+                    let next = steps.get(k + 1).map_or(inflation, |step| step.1);
+                    f64::from(next.q16()) / f64::from(steps[k].1.q16())
+                };
+                let nearest = (0..steps.len()).min_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
+                steps.remove(nearest);
+            }
+        }
+        let aging = Aging::new(&steps)?;
+        Some(ByAge { inflation, aging })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::{InflationSettings, Scored, ScoredEstimates, learn_inflation};
+
+    /// A model whose conditions have these factors: each a time since the last fix, and a scale.
+    fn model(conditions: &[(f64, f64)], name: &str) -> InflationModel {
+        let mut random = 1u64;
+        let mut rows = Vec::new();
+        for (condition, scale) in conditions {
+            for _ in 0..600 {
+                random = crate::learn::split::mixed(random);
+                let even = (random >> 11) as f64 / (1u64 << 53) as f64;
+                rows.push(Scored {
+                    squared_distance: scale * 6.25 * even / 0.9,
+                    condition: *condition,
+                    run: rows.len() as u32,
+                    group: 0,
+                });
+            }
+        }
+        let estimates = ScoredEstimates {
+            rows,
+            impossible: Vec::new(),
+            condition: name.into(),
+            timed: true,
+            groups: Vec::new(),
+            grouped_by: "robot",
+            sha256: [0; 32],
+        };
+        let settings = InflationSettings {
+            epsilon: 0.9,
+            ..InflationSettings::default()
+        };
+        learn_inflation(&estimates, &settings).unwrap()
+    }
+
+    /// The factor of the controller at an age, from the words of the table.
+    fn at(by_age: &ByAge, age_s: f64) -> f64 {
+        let age_ms = libm::ceil(age_s * 1000.0);
+        let mut steps = by_age.steps();
+        let step = steps.find(|(until_ms, _)| age_ms <= f64::from(*until_ms));
+        step.map_or(f64::from(by_age.inflation.q16()) / 65_536.0, |step| step.1)
+    }
+
+    #[test]
+    fn factors_are_never_below_those_of_the_model() {
+        for conditions in [
+            &[(0.1, 1.0), (5.0, 9.0)][..],
+            &[(0.1, 9.0), (5.0, 1.0)],
+            &[(0.0, 1.0), (1.0, 4.0), (2.0, 3.0), (40.0, 20.0)],
+            &[(0.01, 2.0), (0.02, 4.0), (0.03, 9.0)],
+            &[
+                (0.5, 1.0),
+                (1.0, 2.0),
+                (2.0, 3.0),
+                (4.0, 4.5),
+                (8.0, 9.0),
+                (5000.0, 30.0),
+            ],
+        ] {
+            let model = model(conditions, "since_fix_s");
+            let by_age = model.by_age().unwrap();
+            let last = conditions.last().unwrap().0;
+            let ages = (0..2000)
+                .map(|k| 0.005 * f64::from(k))
+                .chain([64.0, 4194.0]);
+            let borders = model.parts().iter().flat_map(|part| [part.from, part.to]);
+            let mut before = (0.0, 0.0);
+            for age in ages.filter(|age| *age <= last).chain(borders) {
+                let (used, learnt) = (at(&by_age, age), model.inflation(Some(age)).unwrap());
+                assert!(used >= learnt, "{age} s: {used} {learnt} {conditions:?}");
+                assert!(age < before.0 || used >= before.1, "{age} s: falls");
+                before = (age, used);
+            }
+            assert_eq!(at(&by_age, 1e6), at(&by_age, last));
+        }
+    }
+
+    #[test]
+    fn a_fresh_estimate_has_a_smaller_factor() {
+        let by_age = model(&[(0.2, 1.0), (10.0, 9.0)], "since_fix_s").by_age();
+        let by_age = by_age.unwrap();
+        assert!(at(&by_age, 0.2) < 1.5 && at(&by_age, 9.0) > 8.0);
+        // The size of a covariance is no age.
+        let by_size = model(&[(0.2, 1.0), (10.0, 9.0)], "log_det")
+            .by_age()
+            .unwrap();
+        assert_eq!(by_size.aging, Aging::NONE);
+        assert!(at(&by_size, 0.2) > 8.0);
+    }
+}

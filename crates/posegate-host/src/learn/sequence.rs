@@ -1,0 +1,140 @@
+//! Confidence limits of a probability that are valid however often one looks.
+
+/// Returns limits of a probability after `successes` of `count` trials: a confidence sequence.
+///
+/// With a probability of at least `1 - alpha`, the limits contain the true probability after *every* trial, so one may look
+/// at each and stop at any (Clopper-Pearson limits allow one look, at a number of trials that was fixed beforehand). The
+/// limits enclose the p for which the likelihood ratio
+///
+/// ```text
+/// B(successes + 1/2, failures + 1/2) / B(1/2, 1/2) / (p^successes (1 - p)^failures)
+/// ```
+///
+/// is below `1 / alpha`. For the true p this ratio is a martingale that starts at 1 (Ville's inequality). It assumes that
+/// each trial succeeds with probability p, whatever the results of earlier ones. `alpha` is above 0 and below 1. The limits are
+/// rounded outwards by 1e-12.
+#[must_use]
+pub fn confidence_sequence(successes: u64, count: u64, alpha: f64) -> [f64; 2] {
+    let (s, f) = (
+        successes.min(count) as f64,
+        count.saturating_sub(successes) as f64,
+    );
+    let mixture = log_beta(s + 0.5, f + 0.5) - log_beta(0.5, 0.5);
+    let threshold = -libm::log(alpha);
+    // The ratio falls down to the share of successes, where it is at most 1, and rises from there.
+    let is_contradicted = |p: f64| {
+        let likelihood = times_log(s, libm::log(p)) + times_log(f, libm::log1p(-p));
+        mixture - likelihood >= threshold
+    };
+    let share = if count == 0 { 0.5 } else { s / (s + f) };
+    // The border between `outside`, which is contradicted, and `inside`, which is not.
+    let border = |mut outside: f64, mut inside: f64| {
+        if !is_contradicted(outside) {
+            return outside;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (outside + inside);
+            if is_contradicted(middle) {
+                outside = middle;
+            } else {
+                inside = middle;
+            }
+        }
+        outside
+    };
+    [
+        (border(0.0, share) - 1e-12).max(0.0),
+        (border(1.0, share) + 1e-12).min(1.0),
+    ]
+}
+
+/// Returns `times` the logarithm of a number; 0 for no times, also if the number is 0.
+fn times_log(times: f64, log: f64) -> f64 {
+    if times == 0.0 { 0.0 } else { times * log }
+}
+
+fn log_beta(a: f64, b: f64) -> f64 {
+    libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::clopper_pearson;
+    use crate::learn::split::mixed;
+
+    const ALPHA: f64 = 0.05;
+
+    /// Returns how many of the fleets have limits that exclude the true probability after some docking.
+    fn excluded(fleets: u64, truth: f64, limits: impl Fn(u64, u64) -> [f64; 2]) -> u64 {
+        let limit = (truth * (1u64 << 53) as f64) as u64;
+        let excludes = |fleet: &u64| {
+            let mut successes = 0;
+            (1..=600).any(|count| {
+                successes += u64::from(mixed(mixed(*fleet) ^ count) >> 11 < limit);
+                let [low, high] = limits(successes, count);
+                !(low..=high).contains(&truth)
+            })
+        };
+        (0..fleets).filter(excludes).count() as u64
+    }
+
+    /// The limits beside the test are looked at after every docking.
+    #[test]
+    fn truth_is_inside_at_every_look_except_in_a_share_of_alpha() {
+        for truth in [0.99, 0.9, 0.5] {
+            let count = excluded(400, truth, |s, n| confidence_sequence(s, n, ALPHA));
+            // 5 % of 400, and three standard deviations more.
+            assert!(count <= 33, "{truth}: {count} of 400");
+            // Limits for one look fail.
+            let once = excluded(100, truth, |s, n| clopper_pearson(s, n, 1.0 - ALPHA));
+            assert!(once >= 12, "{truth}: {once} of 100");
+        }
+    }
+
+    /// A rate that changes is no single probability: the limits exclude the first one, and then have no claim.
+    #[test]
+    fn a_rate_that_changes_is_excluded() {
+        let successes = |count: u64| count.min(300) + count.saturating_sub(300) / 2;
+        let excludes = |count: u64| confidence_sequence(successes(count), count, ALPHA)[1] < 0.99;
+        assert!(!(1..=300).any(excludes) && (301..=340).any(excludes));
+    }
+
+    #[test]
+    fn limits_solve_their_equation_and_are_not_loose() {
+        assert_eq!(confidence_sequence(0, 0, ALPHA), [0.0, 1.0]);
+        for (s, n) in [
+            (0, 1),
+            (1, 1),
+            (100, 100),
+            (960, 1000),
+            (3, 8),
+            (999_000, 1_000_000),
+        ] {
+            let [low, high] = confidence_sequence(s, n, ALPHA);
+            let share = s as f64 / n as f64;
+            assert!((low..=high).contains(&share), "{s} of {n}: {low} {high}");
+            let [once_low, once_high] = clopper_pearson(s, n, 1.0 - ALPHA);
+            assert!(
+                low <= once_low + 1e-9 && once_high <= high + 1e-9,
+                "{s} of {n}"
+            );
+            if n >= 100 {
+                // The price of looking at each trial grows as the root of the logarithm of their number.
+                assert!(high - low <= 2.6 * (once_high - once_low), "{s} of {n}");
+            }
+            // By hand: (2n choose n) / 4^n / p^n = 1 / alpha for n successes of n.
+            if s == n {
+                let choose: f64 = (1..=n)
+                    .map(|k| (2.0 * k as f64 - 1.0) / (2.0 * k as f64))
+                    .map(f64::ln)
+                    .sum();
+                let expected = ((choose + ALPHA.ln()) / n as f64).exp();
+                assert!(
+                    (low - expected).abs() < 1e-9,
+                    "{s} of {n}: {low} {expected}"
+                );
+            }
+        }
+    }
+}

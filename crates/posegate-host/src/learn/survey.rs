@@ -1,0 +1,353 @@
+//! Are docks and tags where the site file says? Offsets from logs of dockings.
+
+use super::LearnError;
+use super::fisher::fisher_quantile;
+use super::sheet::Sheet;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// The fewest dockings from which an offset and its region follow.
+const FEWEST: usize = 5;
+
+/// What a site file says: the goals of its docks, by the name of the task, and the places of its tags.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SurveyedSite {
+    /// x, y (m), yaw (rad), world frame.
+    pub docks: BTreeMap<String, [f64; 3]>,
+    /// x, y (m), world frame.
+    pub tags: BTreeMap<String, [f64; 2]>,
+}
+
+/// A robot in contact with a dock, localized by one tag.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// The docking: rows of one docking depend on each other.
+    pub run: String,
+    /// The name of the dock's task.
+    pub dock: String,
+    /// The tag's name.
+    pub tag: String,
+    /// The robot's pose at contact, computed from the surveyed place of the tag: x, y (m), yaw (rad), world frame.
+    pub pose: [f64; 3],
+}
+
+/// A dock or a tag.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Surveyed {
+    /// A dock: the goal of a task.
+    Dock,
+    /// A tag.
+    Tag,
+}
+
+/// The offset of a dock or a tag from where the site file says it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OffsetReport {
+    /// What it is.
+    pub kind: Surveyed,
+    /// Its name.
+    pub name: String,
+    /// Dockings with it.
+    pub dockings: u64,
+    /// The true place minus that of the site file: x, y (m, world axes), yaw (rad). `None` if there are too few dockings.
+    pub offset: Option<[f64; 3]>,
+    /// Half the extent of the confidence region of the offset along each of x, y and yaw.
+    pub region: Option<[f64; 3]>,
+    /// Hotelling's statistic of the offset over the limit beyond which it is significant; above 1 if it is.
+    pub significance: f64,
+    /// `true` if it is to be surveyed again: its offset is significant, and explains the looks better than any other one.
+    pub stale: bool,
+    /// The others whose offset explains the looks as well: they were only ever seen together.
+    pub or: Vec<(Surveyed, String)>,
+}
+
+/// Reads looks: `run` (the docking), `dock` (the name of its task), `tag`, and `x_m, y_m, yaw_rad`, the robot's pose at contact as it
+/// follows from a look at that tag.
+///
+/// # Errors
+/// The first invalid field, with its line and column; a dock or a tag that the site does not have; a file without rows.
+pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>, LearnError> {
+    const ALL: [&str; 6] = ["run", "dock", "tag", "x_m", "y_m", "yaw_rad"];
+    let mut sheet = Sheet::new(bytes, file)?;
+    let [run, dock, tag] = [ALL[0], ALL[1], ALL[2]].map(|name| sheet.needed(name, &ALL));
+    let (run, dock, tag) = (run?, dock?, tag?);
+    let [x, y, yaw] = [ALL[3], ALL[4], ALL[5]].map(|name| sheet.needed(name, &ALL));
+    let pose = [x?, y?, yaw?];
+    let mut rows = Vec::new();
+    while let Some(line) = sheet.line()? {
+        let known = |column, names: &mut dyn Iterator<Item = &String>, what: &str| {
+            let name = line.name(column, what)?;
+            let mut others = Vec::new();
+            for known in names {
+                if *known == name {
+                    return Ok(name);
+                }
+                others.push(known.as_str());
+            }
+            let has = others.join(", ");
+            Err(line.wrong_at(
+                column,
+                format!("`{name}` is no {what} of the site; it has: {has}"),
+            ))
+        };
+        let mut numbers = [0.0; 3];
+        for (number, column) in numbers.iter_mut().zip(pose) {
+            *number = line.number(column, |_| true, "a number in metres or radians")?;
+        }
+        rows.push(Look {
+            run: line.name(run, "the name of the docking")?,
+            dock: known(dock, &mut site.docks.keys(), "work task")?,
+            tag: known(tag, &mut site.tags.keys(), "tag")?,
+            pose: numbers,
+        });
+    }
+    if rows.is_empty() {
+        return Err(LearnError::Empty {
+            file: file.to_owned(),
+        });
+    }
+    Ok(rows)
+}
+
+/// Returns the offsets of docks and tags, the significant ones found one after the other: each time the one that leaves least to explain is
+/// taken as off by its offset, and the others are tested again. If everything is where the site file says, anything is called stale with a
+/// probability of at most 1 - `confidence`.
+///
+/// A dock's offset in a docking is the mean over its looks of the localized pose minus the goal. A tag's offset is the displacement of the
+/// tag, about itself, that makes up for the difference. Each is tested by Hotelling's T-squared test over dockings, with the error divided by
+/// the number of docks and tags. This assumes that dockings are independent of each other, that their errors are normal and have no
+/// mean: neither a bias of the camera, nor play on one side of the dock.
+///
+/// # Errors
+/// [`LearnError::Share`] if the confidence is not in (0, 1).
+pub fn survey(
+    looks: &[Look],
+    site: &SurveyedSite,
+    confidence: f64,
+) -> Result<Vec<OffsetReport>, LearnError> {
+    if !(confidence > 0.0 && confidence < 1.0) {
+        return Err(LearnError::Share {
+            name: "confidence",
+            value: confidence,
+        });
+    }
+    let mut residuals: Vec<Residual> = looks.iter().filter_map(|look| of(look, site)).collect();
+    let mut objects: Vec<(Surveyed, String)> = Vec::new();
+    for look in looks {
+        objects.push((Surveyed::Dock, look.dock.clone()));
+        objects.push((Surveyed::Tag, look.tag.clone()));
+    }
+    objects.sort();
+    objects.dedup();
+    let level = 1.0 - (1.0 - confidence) / objects.len().max(1) as f64;
+    let mut found: BTreeMap<(Surveyed, String), OffsetReport> = BTreeMap::new();
+    while found.len() < objects.len() {
+        let left = objects.iter().filter(|object| !found.contains_key(*object));
+        let reports: Vec<OffsetReport> = left
+            .map(|(kind, name)| report(&residuals, *kind, name, level))
+            .collect();
+        let Some(best) = best(&residuals, &objects, &reports, level) else {
+            for report in reports {
+                found.insert((report.kind, report.name.clone()), report);
+            }
+            break;
+        };
+        // Those of the same looks have the same statistic: nothing tells them apart.
+        let same = |report: &&OffsetReport| {
+            report.name != best.name
+                && mates(
+                    &residuals,
+                    (best.kind, &best.name),
+                    (report.kind, &report.name),
+                )
+        };
+        let or = reports.iter().filter(same);
+        let best = OffsetReport {
+            stale: true,
+            or: or
+                .map(|report| (report.kind, report.name.clone()))
+                .collect(),
+            ..best.clone()
+        };
+        take_off(&mut residuals, &best);
+        found.insert((best.kind, best.name.clone()), best);
+    }
+    Ok(found.into_values().collect())
+}
+
+/// Returns the significant offset that leaves least to explain: the sum of what is significant afterwards is the least. Of equal ones (seen
+/// together only) the first: a dock before a tag.
+fn best<'a>(
+    residuals: &[Residual],
+    objects: &[(Surveyed, String)],
+    reports: &'a [OffsetReport],
+    level: f64,
+) -> Option<&'a OffsetReport> {
+    let mut best: Option<(f64, &OffsetReport)> = None;
+    for candidate in reports.iter().filter(|report| report.significance > 1.0) {
+        let mut rest = residuals.to_vec();
+        take_off(&mut rest, candidate);
+        let others = objects
+            .iter()
+            .map(|(kind, name)| report(&rest, *kind, name, level));
+        let left: f64 = others.map(|report| report.significance).sum();
+        if best.is_none_or(|(least, _)| left < least * (1.0 - 1e-6) - 1e-9) {
+            best = Some((left, candidate));
+        }
+    }
+    best.map(|(_, report)| report)
+}
+
+/// The localized pose at contact minus the goal, and what turns it into a displacement of the tag.
+#[derive(Clone)]
+struct Residual {
+    run: String,
+    dock: String,
+    tag: String,
+    difference: Vector3<f64>,
+    /// From the tag to the dock's goal, metres.
+    lever: [f64; 2],
+}
+
+fn of(look: &Look, site: &SurveyedSite) -> Option<Residual> {
+    let goal = site.docks.get(&look.dock)?;
+    let tag = site.tags.get(&look.tag)?;
+    let turn = look.pose[2] - goal[2];
+    Some(Residual {
+        run: look.run.clone(),
+        dock: look.dock.clone(),
+        tag: look.tag.clone(),
+        difference: Vector3::new(
+            look.pose[0] - goal[0],
+            look.pose[1] - goal[1],
+            libm::atan2(libm::sin(turn), libm::cos(turn)),
+        ),
+        lever: [goal[0] - tag[0], goal[1] - tag[1]],
+    })
+}
+
+impl Residual {
+    /// Returns the displacement of the tag that explains the difference. A tag that is off by t and turned by a makes the localized pose off by
+    /// -t - a J lever, and -a, J being a quarter turn to the left.
+    fn of_tag(&self) -> Vector3<f64> {
+        let turn = -self.difference.z;
+        let [x, y] = self.lever;
+        Vector3::new(
+            -self.difference.x + turn * y,
+            -self.difference.y - turn * x,
+            turn,
+        )
+    }
+
+    /// Returns what the displacement of the tag adds to the localized pose.
+    fn by_tag(&self, tag: Vector3<f64>) -> Vector3<f64> {
+        let [x, y] = self.lever;
+        Vector3::new(-tag.x + tag.z * y, -tag.y - tag.z * x, -tag.z)
+    }
+
+    fn is_of(&self, kind: Surveyed, name: &str) -> bool {
+        name == match kind {
+            Surveyed::Dock => &self.dock,
+            Surveyed::Tag => &self.tag,
+        }
+    }
+}
+
+/// Returns `true` if every look at one is a look at the other.
+fn mates(residuals: &[Residual], a: (Surveyed, &str), b: (Surveyed, &str)) -> bool {
+    residuals
+        .iter()
+        .all(|residual| residual.is_of(a.0, a.1) == residual.is_of(b.0, b.1))
+}
+
+fn report(residuals: &[Residual], kind: Surveyed, name: &str, level: f64) -> OffsetReport {
+    // One observation per docking.
+    let mut runs: BTreeMap<&str, (Vector3<f64>, f64)> = BTreeMap::new();
+    for residual in residuals
+        .iter()
+        .filter(|residual| residual.is_of(kind, name))
+    {
+        let offset = match kind {
+            Surveyed::Dock => residual.difference,
+            Surveyed::Tag => residual.of_tag(),
+        };
+        let sum = runs.entry(&residual.run).or_default();
+        *sum = (sum.0 + offset, sum.1 + 1.0);
+    }
+    let offsets: Vec<Vector3<f64>> = runs.values().map(|(sum, count)| sum / *count).collect();
+    let count = offsets.len();
+    let mut report = OffsetReport {
+        kind,
+        name: name.to_owned(),
+        dockings: count as u64,
+        offset: None,
+        region: None,
+        significance: 0.0,
+        stale: false,
+        or: Vec::new(),
+    };
+    if count < FEWEST {
+        return report;
+    }
+    let n = count as f64;
+    let mean = offsets.iter().sum::<Vector3<f64>>() / n;
+    let scatter: Matrix3<f64> = offsets
+        .iter()
+        .map(|offset| (offset - mean) * (offset - mean).transpose())
+        .sum();
+    let covariance = scatter / (n - 1.0);
+    let limit = 3.0 * (n - 1.0) / (n - 3.0) * fisher_quantile(level, 3.0, n - 3.0);
+    report.offset = Some([mean.x, mean.y, mean.z]);
+    report.region = Some([0, 1, 2].map(|k| libm::sqrt(limit * covariance[(k, k)] / n)));
+    // Looks without scatter are no sample; they tell nothing.
+    if let Some(factor) = covariance.cholesky() {
+        report.significance = n * mean.dot(&factor.solve(&mean)) / limit;
+    }
+    report
+}
+
+/// Takes the effect of an offset off the looks.
+fn take_off(residuals: &mut [Residual], report: &OffsetReport) {
+    let Some([x, y, yaw]) = report.offset else {
+        return;
+    };
+    let offset = Vector3::new(x, y, yaw);
+    for residual in residuals {
+        if residual.is_of(report.kind, &report.name) {
+            residual.difference -= match report.kind {
+                Surveyed::Dock => offset,
+                Surveyed::Tag => residual.by_tag(offset),
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_displaced_tag_is_computed_back() {
+        let residual = |difference| Residual {
+            run: String::new(),
+            dock: String::new(),
+            tag: String::new(),
+            difference,
+            lever: [-1.5, 0.4],
+        };
+        let tag = Vector3::new(0.02, -0.01, 0.03);
+        let effect = residual(Vector3::zeros()).by_tag(tag);
+        assert!((residual(effect).of_tag() - tag).norm() < 1e-15);
+        // A tag 2 m ahead, turned by 0.01 rad to the left: the robot, which is taken to see it as it was, seems to be turned to the right about the
+        // tag: it seems 2 cm to the left.
+        let ahead = Residual {
+            lever: [-2.0, 0.0],
+            ..residual(Vector3::zeros())
+        };
+        let effect = ahead.by_tag(Vector3::new(0.0, 0.0, 0.01));
+        assert!(
+            (effect - Vector3::new(0.0, 0.02, -0.01)).norm() < 1e-12,
+            "{effect}"
+        );
+    }
+}

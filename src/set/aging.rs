@@ -1,0 +1,255 @@
+//! Factors of a covariance by the time since the last fix: smaller ones for estimates that are fresh from a fix.
+
+use super::Inflation;
+
+/// The largest number of steps.
+pub const MOST_AGES: usize = 4;
+
+/// The unit of an age in a step, as a power of two of milliseconds.
+const AGE_POWER: u32 = 6;
+/// The unit of a factor in a step is 2^-6: this power less than that of an [`Inflation`].
+const FACTOR_POWER: u32 = 10;
+
+/// Factors by the time since the last fix: up to four steps, each an age and the factor up to that age. Neither falls from a step to the
+/// next one, so an older estimate never has a smaller factor.
+///
+/// Each word has an age in its lower 16 bits, in units of 64 ms, rounded down; and in its upper ones a factor in units of 2^-6, rounded
+/// up, at least 1. A word 0 is not used; used ones come first. The factor of an age is that of the first step whose age is not less,
+/// so it is never below the factor that was given for this age. Beyond the last step, or if the time since the last fix is not
+/// known, the source's own inflation applies, which no step exceeds ([`Aging::is_within`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Aging([u32; MOST_AGES]);
+
+impl Aging {
+    /// No steps: the source's own inflation at every age.
+    pub const NONE: Self = Self([0; MOST_AGES]);
+
+    /// Returns factors by age, from the youngest: up to `age_ms` milliseconds, ends included, the factor. Ages are rounded down to 64 ms,
+    /// factors up to 2^-6. `None` if there are more than [`MOST_AGES`] steps, an age is below 64 ms or above 4194 s, ages do not
+    /// rise by 64 ms, factors fall, or a factor is above 1023.
+    #[must_use]
+    pub fn new(steps: &[(u32, Inflation)]) -> Option<Self> {
+        let mut words = [0; MOST_AGES];
+        if steps.len() > words.len() {
+            return None;
+        }
+        for (word, (age_ms, inflation)) in words.iter_mut().zip(steps) {
+            let age = u16::try_from(age_ms >> AGE_POWER).ok()?;
+            // At most 2^28, so the sum does not overflow.
+            let up = (1u32 << FACTOR_POWER).wrapping_sub(1);
+            let factor = inflation.q16().wrapping_add(up) >> FACTOR_POWER;
+            let factor = u16::try_from(factor).ok()?;
+            *word = u32::from(factor) << 16 | u32::from(age);
+        }
+        let aging = Self(words);
+        let used = words.iter().filter(|word| **word != 0).count();
+        (used == steps.len() && aging.is_valid()).then_some(aging)
+    }
+
+    /// Returns factors by age from words, as [`Aging::words`] returns them. `None` if they are not valid.
+    #[must_use]
+    pub fn from_words(words: [u32; MOST_AGES]) -> Option<Self> {
+        let aging = Self(words);
+        aging.is_valid().then_some(aging)
+    }
+
+    /// Returns the words: of each step its age and its factor.
+    #[must_use]
+    pub const fn words(self) -> [u32; MOST_AGES] {
+        self.0
+    }
+
+    /// Returns `true` if ages rise, factors are at least 1 and do not fall, and unused words come last. A bit flip in memory can make it
+    /// invalid.
+    #[must_use]
+    pub fn is_valid(self) -> bool {
+        let mut before = (0u32, 0u32);
+        let mut is_over = false;
+        for word in self.0 {
+            let (age, factor) = (word & 0xffff, word >> 16);
+            if word == 0 {
+                is_over = true;
+            } else if is_over || !(age > before.0 && factor >= before.1 && factor >= 1 << 6) {
+                return false;
+            } else {
+                before = (age, factor);
+            }
+        }
+        true
+    }
+
+    /// Returns `true` if no step has a larger factor than `inflation`.
+    #[must_use]
+    pub fn is_within(self, inflation: Inflation) -> bool {
+        self.0
+            .iter()
+            .all(|word| u64::from(word >> 16) << FACTOR_POWER <= u64::from(inflation.q16()))
+    }
+
+    /// Returns the factor of an age, or `inflation` beyond the last step.
+    #[must_use]
+    pub(crate) fn at(self, since_fix_ms: u32, inflation: Inflation) -> Inflation {
+        // Rounded up: an age between two units is beyond the lower one.
+        let age = (u64::from(since_fix_ms).wrapping_add(63) >> AGE_POWER) as u32;
+        for word in self.0 {
+            if word != 0 && age <= word & 0xffff {
+                return stepped(word).unwrap_or(inflation);
+            }
+        }
+        inflation
+    }
+
+    /// Returns the same from the other end and in another form, for the second evaluation.
+    #[must_use]
+    pub(crate) fn at_from_oldest(self, since_fix_ms: u32, inflation: Inflation) -> Inflation {
+        let mut factor = inflation;
+        for word in self.0.iter().rev() {
+            let ends_ms = (word & 0xffff) << AGE_POWER;
+            if *word != 0 && !(since_fix_ms > ends_ms) {
+                factor = stepped(*word).unwrap_or(inflation);
+            }
+        }
+        factor
+    }
+}
+
+/// Returns the factor of a step; `None` if it is damaged.
+fn stepped(word: u32) -> Option<Inflation> {
+    Inflation::from_q16((word >> 16) << FACTOR_POWER)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn factor(q16: u32) -> Inflation {
+        Inflation::from_q16(q16).expect("a factor")
+    }
+
+    /// The definition: the factor that was given for an age, in exact numbers.
+    fn given(steps: &[(u32, Inflation)], since_fix_ms: u32, inflation: Inflation) -> Inflation {
+        let covers = |step: &&(u32, Inflation)| since_fix_ms <= step.0;
+        steps.iter().find(covers).map_or(inflation, |step| step.1)
+    }
+
+    /// All tables of up to two steps on small ages and factors, at every age around their steps.
+    #[test]
+    fn small_tables_are_never_below_what_was_given() {
+        let ages = [64, 65, 127, 128, 129, 191, 192, 1000];
+        let factors = [
+            1 << 16,
+            (1 << 16) + 1,
+            66_559,
+            66_560,
+            66_561,
+            3 << 16,
+            5 << 16,
+        ];
+        let largest = factor(5 << 16);
+        let mut tried = 0;
+        let mut check = |steps: &[(u32, Inflation)]| {
+            let Some(aging) = Aging::new(steps) else {
+                return;
+            };
+            tried += 1;
+            assert!(aging.is_valid() && aging.is_within(largest));
+            let mut before = Inflation::NONE;
+            for age in (0..1200).chain([4_194_240, u32::MAX - 63, u32::MAX]) {
+                let used = aging.at(age, largest);
+                assert_eq!(used, aging.at_from_oldest(age, largest), "{age} {steps:?}");
+                assert!(
+                    used >= given(steps, age, largest),
+                    "{age} {steps:?} {used:?}"
+                );
+                assert!(used >= before, "{age} {steps:?}");
+                before = used;
+            }
+        };
+        check(&[]);
+        for (a, f) in ages
+            .iter()
+            .flat_map(|a| factors.iter().map(move |f| (*a, factor(*f))))
+        {
+            check(&[(a, f)]);
+            for (b, g) in ages
+                .iter()
+                .flat_map(|a| factors.iter().map(move |f| (*a, factor(*f))))
+            {
+                check(&[(a, f), (b, g)]);
+            }
+        }
+        assert!(tried > 700, "{tried} tables");
+    }
+
+    #[test]
+    fn steps_that_are_no_table_are_refused() {
+        let two = factor(2 << 16);
+        let one = Inflation::NONE;
+        for steps in [
+            &[(63, one)][..],
+            &[(1 << 22, one)],
+            &[(1000, two), (2000, one)],
+            &[(1000, one), (1010, two)],
+            &[(1000, factor(1 << 26))],
+            &[(100, one), (200, one), (300, one), (400, one), (500, one)],
+        ] {
+            assert_eq!(Aging::new(steps), None, "{steps:?}");
+        }
+        let table = Aging::new(&[(1000, one), (2000, two)]).expect("a table");
+        assert!(!table.is_within(factor((2 << 16) - 1)) && table.is_within(two));
+        assert_eq!(Aging::from_words(table.words()), Some(table));
+        // A gap, a factor below 1, a fall.
+        let [a, b, _, _] = table.words();
+        for words in [
+            [0, a, b, 0],
+            [a & 0xffff, b, 0, 0],
+            [b, a, 0, 0],
+            [a, a, 0, 0],
+        ] {
+            assert_eq!(Aging::from_words(words), None, "{words:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn factor_is_never_below_what_was_given(
+            raw in proptest::collection::vec((64u32..1 << 22, 1u32 << 16..1 << 25), 0..=MOST_AGES),
+            more in 0u32..1 << 25,
+            ages in proptest::collection::vec(any::<u32>(), 16),
+        ) {
+            let mut steps: Vec<(u32, Inflation)> = raw.iter().map(|(age, q16)| (*age, factor(*q16))).collect();
+            steps.sort_unstable();
+            let mut most = Inflation::NONE;
+            for step in &mut steps {
+                most = most.max(step.1);
+                step.1 = most;
+            }
+            // Room for the rounding of the last factor.
+            let largest = factor(most.q16() + 1024 + more);
+            if let Some(aging) = Aging::new(&steps) {
+                prop_assert!(aging.is_within(largest));
+                let near = steps.iter().flat_map(|(age, _)| [age - 1, *age, age + 1, age & !63]);
+                for age in ages.iter().map(|age| age >> 8).chain(ages.iter().copied()).chain(near) {
+                    let used = aging.at(age, largest);
+                    prop_assert_eq!(used, aging.at_from_oldest(age, largest));
+                    prop_assert!(used >= given(&steps, age, largest));
+                    prop_assert!(used <= largest);
+                }
+            }
+        }
+
+        /// Any words, as a fault in memory leaves them: a factor of the table or the source's, without a panic.
+        #[test]
+        fn any_words_have_a_factor(words in any::<[u32; MOST_AGES]>(), age: u32) {
+            let aging = Aging(words);
+            let largest = factor(4 << 16);
+            for used in [aging.at(age, largest), aging.at_from_oldest(age, largest)] {
+                prop_assert!(Inflation::from_q16(used.q16()).is_some());
+            }
+            let _ = (aging.is_valid(), aging.is_within(largest));
+        }
+    }
+}
