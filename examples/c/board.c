@@ -1,12 +1,19 @@
 #include "board.h"
 
-#define UART_DATA 0x40004000U
-#define UART_STATE 0x40004004U
-#define UART_CONTROL 0x40004008U
-#define UART_DIVIDER 0x40004010U
+#if defined(__ARM_ARCH_8M_MAIN__)
+/* mps2-an505, in secure state. */
+#define UART 0x50200000U
+#define LEDS 0x50302000U
+#else
+#define UART 0x40004000U
+#define LEDS 0x40028000U
+#endif
+#define UART_DATA UART
+#define UART_STATE (UART + 4U)
+#define UART_CONTROL (UART + 8U)
+#define UART_DIVIDER (UART + 16U)
 #define UART_SEND_FULL 1U
 #define UART_RECEIVE_FULL 2U
-#define LEDS 0x40028000U
 #define LED_0 1U
 #define TIMER_CONTROL 0xe000e010U
 #define TIMER_RELOAD 0xe000e014U
@@ -103,6 +110,8 @@ const char *core_name(void)
 #endif
     case 0xc24U:
         return "Cortex-M4";
+    case 0xd21U:
+        return "Cortex-M33";
     default:
         return "unknown core";
     }

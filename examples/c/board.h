@@ -1,6 +1,6 @@
 /*
- * The parts of the boards that QEMU calls mps2-an385 and mps2-an386 (Arm MPS2+ with a Cortex-M3, a
- * Cortex-M4F) used by the examples: one LED, the serial line, the system timer, and semihosting. A product
+ * The parts of the boards that QEMU calls mps2-an385, mps2-an386 and mps2-an505 (Arm MPS2+ with a Cortex-M3, a
+ * Cortex-M4F, a Cortex-M33) used by the examples: one LED, the serial line, the system timer, and semihosting. A product
  * uses its HAL instead.
  */
 #ifndef BOARD_H

@@ -4,6 +4,7 @@ pub mod browser;
 pub mod budgets;
 pub mod c;
 pub mod compare;
+pub mod dist;
 pub mod docs;
 pub mod faults;
 pub mod figures;

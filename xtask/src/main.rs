@@ -220,8 +220,14 @@ const JOBS: &[Job] = &[
     job(
         "ros2",
         "[RUNS]",
-        "the ROS 2 node with rclpy and Fast DDS from wheels: permits, their end, damaged payloads, rows of a bag",
+        "the ROS 2 node with rclpy and Fast DDS from wheels: permits, their end, damaged payloads, a controller on a serial line",
         jobs::ros2::ros2,
+    ),
+    job(
+        "nav2",
+        "DIR",
+        "a recording of Nav2 played to the ROS 2 node in real time and faster: verdicts equal to `replay`",
+        jobs::ros2::nav2,
     ),
     job(
         "behaviortree",
@@ -282,6 +288,12 @@ const JOBS: &[Job] = &[
         "[FOLDER]",
         "the crates as a stranger gets them: contents, installation, firmware",
         jobs::package::package,
+    ),
+    job(
+        "dist",
+        "[FOLDER [BUILDS]]",
+        "the files of a release: built twice alike, installed into empty roots, and run there",
+        jobs::dist::dist,
     ),
     job(
         "slurm",

@@ -49,6 +49,7 @@ mod terminal;
 /// runs on the controller.
 #[derive(Parser)]
 #[command(
+    name = "posegate",
     version,
     after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage, or standard output that cannot be written (without a message if its reader has ended); 3 internal."
 )]

@@ -475,6 +475,12 @@ fn exported_arrays_hold_the_bytes() {
 }
 
 #[test]
+fn the_version_names_the_program() {
+    let (out, _) = Folder::new().expect(0, "--version");
+    assert_eq!(out.trim(), concat!("posegate ", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
 fn every_subcommand_has_help_with_an_example() {
     let folder = Folder::new();
     for command in [

@@ -1,4 +1,4 @@
-//! The command line: `posegate-node TABLE [--site-digest HEX] [--ros-args ...]`.
+//! The command line: `posegate-node TABLE [--site-digest HEX] [--serial DEV [--baud N]] [--ros-args ...]`.
 
 use crate::names::{NameError, Names};
 use crate::parameters::{ParameterError, Parameters};
@@ -8,14 +8,18 @@ use std::path::PathBuf;
 pub const USAGE: &str = "\
 Decide whether a robot is localized well enough for a task, as a ROS 2 node
 
-Usage: posegate-node TABLE [--site-digest HEX] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
+Usage: posegate-node TABLE [--site-digest HEX] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
 
   TABLE                the table of the task, made by `posegate table build`
   --site-digest HEX    SHA-256 of the site file that the table must be made from (`posegate table info` prints it)
+  --serial DEV         the serial line of a controller whose gate decides: poses are passed to it, and the permit is the controller's;
+                       TABLE is the table in its flash
+  --baud N             the speed of that line, bits per second [default: 115200]
   --help, --version
 
-Example:
+Examples:
   posegate-node dock.posegate --ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -r pose:=/amcl_pose
+  posegate-node dock.posegate --serial /dev/ttyUSB0 --ros-args -r pose:=/amcl_pose
 
 The parameters, the topics and what a consumer of the permit must do: docs/for-ros.md.";
 
@@ -37,6 +41,8 @@ pub struct Arguments {
     pub table: PathBuf,
     /// The digest of the site file, as it was given.
     pub site_digest: Option<String>,
+    /// The serial line of a controller, and its speed in bits per second.
+    pub serial: Option<(PathBuf, u32)>,
     /// The ROS parameters for this node.
     pub parameters: Parameters,
     /// The name of the node and of its topics.
@@ -58,7 +64,7 @@ pub enum ArgumentError {
     TwoTables(String, String),
     /// An option that does not exist.
     #[error(
-        "`{0}` is not an option of posegate-node: expected a table, --site-digest or --ros-args; see --help"
+        "`{0}` is not an option of posegate-node: expected a table, --site-digest, --serial, --baud or --ros-args; see --help"
     )]
     Unknown(String),
     /// An option of ROS that does not exist.
@@ -66,6 +72,12 @@ pub enum ArgumentError {
         "`{0}` is not an argument of ROS: expected -p NAME:=VALUE, --params-file FILE, -r FROM:=TO, --log-level LEVEL or `--`"
     )]
     UnknownRos(String),
+    /// Not a speed.
+    #[error("--baud is `{0}`: expected bits per second, a whole number from 1200 to 4000000")]
+    Baud(String),
+    /// A speed without a line.
+    #[error("--baud is given without --serial: write --serial DEV --baud N")]
+    BaudAlone,
     /// An option without its value.
     #[error("{0} needs a value: write {0} {1}")]
     NoValue(&'static str, &'static str),
@@ -87,7 +99,7 @@ impl Command {
     /// [`ArgumentError`]. Parameter files are read, so a missing one is an error too.
     pub fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
         let mut words = given.into_iter();
-        let (mut table, mut site_digest) = (None, None);
+        let (mut table, mut site_digest, mut serial, mut baud) = (None, None, None, None);
         let mut ros = Ros::default();
         while let Some(word) = words.next() {
             match word.as_str() {
@@ -97,6 +109,21 @@ impl Command {
                     let digest = words.next();
                     site_digest =
                         Some(digest.ok_or(ArgumentError::NoValue("--site-digest", "HEX"))?);
+                }
+                "--serial" => {
+                    serial = Some(
+                        words
+                            .next()
+                            .ok_or(ArgumentError::NoValue("--serial", "DEV"))?,
+                    );
+                }
+                "--baud" => {
+                    let given = words.next().ok_or(ArgumentError::NoValue("--baud", "N"))?;
+                    let known = given
+                        .parse()
+                        .ok()
+                        .filter(|baud| (1_200..=4_000_000).contains(baud));
+                    baud = Some(known.ok_or(ArgumentError::Baud(given))?);
                 }
                 "--ros-args" => ros.parse(&mut words)?,
                 option if option.starts_with("--site-digest=") => {
@@ -112,6 +139,10 @@ impl Command {
             }
         }
         let table = PathBuf::from(table.ok_or(ArgumentError::NoTable)?);
+        let serial = match (serial, baud) {
+            (None, Some(_)) => return Err(ArgumentError::BaudAlone),
+            (serial, baud) => serial.map(|path| (PathBuf::from(path), baud.unwrap_or(115_200))),
+        };
         let names = Names::new(&ros.remaps)?;
         let mut parameters = Parameters::default();
         for source in &ros.parameters {
@@ -127,6 +158,7 @@ impl Command {
         Ok(Self::Run(Box::new(Arguments {
             table,
             site_digest,
+            serial,
             parameters,
             names,
         })))
@@ -215,6 +247,9 @@ mod tests {
             ("a.posegate b.posegate", "two tables"),
             ("a.posegate --speed 3", "`--speed` is not an option"),
             ("a.posegate --site-digest", "needs a value"),
+            ("a.posegate --serial", "needs a value"),
+            ("a.posegate --baud 9600", "without --serial"),
+            ("a.posegate --serial /dev/ttyS0 --baud 1", "--baud is `1`"),
             ("a.posegate --ros-args -p", "needs a value"),
             ("a.posegate --ros-args -x", "not an argument of ROS"),
             ("a.posegate --ros-args -p inflation=2", ":="),

@@ -4,7 +4,7 @@ use crate::clock::Now;
 use crate::message::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, Time, WARN};
 use crate::peers::{Peers, delivery_words};
 use crate::permission::array;
-use crate::permit_gate::{Answer, LastReport};
+use crate::permit_gate::Answer;
 use crate::settings::{Delivery, NodeSettings};
 use posegate::gate::Reason;
 use posegate::report::FrameId;
@@ -75,33 +75,37 @@ impl Received {
     }
 }
 
-/// Returns the diagnostics of the node.
+/// Returns the diagnostics of the node: `frame` is that of the last pose, and `more` is what the decider adds.
 #[must_use]
 pub fn diagnostics(
     answer: &Answer,
     settings: &NodeSettings,
-    last: Option<&LastReport>,
+    frame: Option<&str>,
     pose: &Received,
     odometry: Option<&Received>,
     clock_steps: u64,
+    more: Vec<DiagnosticStatus>,
 ) -> DiagnosticArray {
     let mut status = vec![permission(answer, settings, clock_steps)];
-    let wrong_frame = last.and_then(|last| {
-        (FrameId::of(&last.frame) != FrameId::of(&settings.frame)).then(|| {
+    let wrong_frame = frame.and_then(|frame| {
+        (FrameId::of(frame) != FrameId::of(&settings.frame)).then(|| {
             format!(
-                "poses are in the frame `{}`, expected `{}`: set frame_id only if that is the world frame of the site",
-                last.frame, settings.frame
+                "poses are in the frame `{frame}`, expected `{}`: set frame_id only if that is the world frame of the site",
+                settings.frame
             )
         })
     });
     status.push(pose.status("pose", answer.now, wrong_frame));
     status.extend(odometry.map(|odometry| odometry.status("odometry", answer.now, None)));
+    status.extend(more);
     array(answer.now, status)
 }
 
 fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> DiagnosticStatus {
     let reason = answer.reason();
-    let site_check = if settings.site_is_checked {
+    let site_check = if settings.serial.is_some() {
+        "of the table that was given; the controller does not say from which site its own is"
+    } else if settings.site_is_checked {
         "as given"
     } else {
         "not given: any site's table would be accepted; start the node with --site-digest"
@@ -130,15 +134,15 @@ pub fn words(reason: Reason) -> String {
     format!("{} {}", reason.meaning(), reason.action())
 }
 
-/// Returns the answer of the service `explain`: the state of the gate, and what to do.
+/// Returns the answer of the service `explain`: the state of the gate, why the last report was denied, and what to do.
 #[must_use]
-pub fn explanation(answer: &Answer, last: Option<&LastReport>) -> String {
+pub fn explanation(answer: &Answer, last: Option<Reason>) -> String {
     let now = match answer.reason() {
         None => "permit".to_owned(),
         Some(reason) => format!("deny, {}: {}", reason.name(), words(reason)),
     };
     // While permits are counted, the last report says why they are not counted on.
-    match last.and_then(|last| last.step.err()) {
+    match last {
         Some(reason) if Some(reason) != answer.reason() => {
             format!("{now} Last report: {}: {}", reason.name(), words(reason))
         }

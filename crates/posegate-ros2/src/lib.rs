@@ -1,13 +1,17 @@
 //! Posegate as a ROS 2 node: poses with covariance in, a fail-safe permit out.
 //!
-//! [`permit_gate::PermitGate`] is the gate of the core behind ROS messages, without DDS. [`run::Runner`] is the node. The program
+//! [`permit_gate::PermitGate`] is the gate of the core behind ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate
+//! on a controller instead. [`run::Runner`] is the node. The program
 //! `posegate-node` parses a command line ([`arguments::Command`]) and runs it. What the topics mean and what a consumer of the permit
 //! must do is described in `docs/for-ros.md`.
 
 pub mod arguments;
+pub mod bridge;
 pub mod clock;
+pub mod decider;
 pub mod diagnostics;
 pub mod graph;
+pub mod link;
 pub mod markers;
 pub mod message;
 pub mod names;
@@ -16,4 +20,5 @@ pub mod peers;
 pub mod permission;
 pub mod permit_gate;
 pub mod run;
+pub mod serial;
 pub mod settings;

@@ -1,6 +1,7 @@
 //! `posegate-node`: the gate as a ROS 2 node.
 
 use posegate_ros2::arguments::{Command, USAGE};
+use posegate_ros2::bridge::Bridge;
 use posegate_ros2::clock::Now;
 use posegate_ros2::graph::Environment;
 use posegate_ros2::permit_gate::PermitGate;
@@ -46,16 +47,26 @@ fn start() -> Result<(), Box<dyn Error>> {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
-    let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?;
-    let mut runner = Runner::join(environment, &arguments.names, gate, &settings)?;
-    eprintln!(
-        "posegate-node: {} decides on the task `{}` by {}, in domain {}",
-        arguments.names.full_node(),
-        settings.task(),
-        arguments.names.pose,
-        environment.domain
-    );
-    runner.run(&stop)?;
+    let (names, domain) = (&arguments.names, environment.domain);
+    let (node, task) = (names.full_node(), settings.task());
+    if let Some(serial) = &settings.serial {
+        let bridge = Bridge::open(serial)?;
+        let mut runner = Runner::join(environment, names, bridge, &settings)?;
+        eprintln!(
+            "posegate-node: {node} passes {} to the controller on {}, which decides on the task `{task}`, in domain {domain}",
+            names.pose,
+            serial.path.display()
+        );
+        runner.run(&stop)?;
+    } else {
+        let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?;
+        let mut runner = Runner::join(environment, names, gate, &settings)?;
+        eprintln!(
+            "posegate-node: {node} decides on the task `{task}` by {}, in domain {domain}",
+            names.pose
+        );
+        runner.run(&stop)?;
+    }
     // Leaving the graph in order takes DDS many seconds, and the denial has been published.
     std::process::exit(0);
 }

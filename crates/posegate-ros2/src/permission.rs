@@ -39,12 +39,12 @@ impl Heartbeat {
         }
     }
 
-    /// Returns the next heartbeat.
+    /// Returns the next heartbeat, with what it says of the last report.
     pub fn next(
         &mut self,
         answer: &Answer,
         settings: &NodeSettings,
-        last: Option<&LastReport>,
+        report: Vec<KeyValue>,
     ) -> DiagnosticArray {
         self.sequence += 1;
         let mut values = vec![
@@ -60,9 +60,7 @@ impl Heartbeat {
             KeyValue::new("state", answer.state.name()),
             KeyValue::new("reason", answer.reason().map_or("", Reason::name)),
         ];
-        if let Some(last) = last {
-            values.extend(report_values(last));
-        }
+        values.extend(report);
         let status = DiagnosticStatus {
             level: if answer.is_open { OK } else { WARN },
             name: NAME.into(),
@@ -93,7 +91,8 @@ pub fn array(now: Now, status: Vec<DiagnosticStatus>) -> DiagnosticArray {
 }
 
 /// Returns the last report in names and values: its verdict alone, and what the gate answered.
-fn report_values(last: &LastReport) -> [KeyValue; 6] {
+#[must_use]
+pub fn report_values(last: &LastReport) -> [KeyValue; 6] {
     let (reason, margin, worst_pose) = match last.verdict {
         Verdict::Permit { margin } => (None, Some(margin), None),
         Verdict::Deny {

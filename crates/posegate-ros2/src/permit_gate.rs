@@ -255,14 +255,14 @@ pub fn estimate(message: &PoseWithCovariance) -> PoseEstimate {
 
 /// The sequence numbers of a topic: one more for each message of one publisher, more if messages were lost.
 #[derive(Clone, Copy, Debug, Default)]
-struct Order {
+pub(crate) struct Order {
     last: Option<Origin>,
     sequence: u32,
 }
 
 impl Order {
     /// Returns the sequence number of the next message, and whether its publisher is another one than before.
-    fn next(&mut self, origin: Origin) -> (u32, bool) {
+    pub(crate) fn next(&mut self, origin: Origin) -> (u32, bool) {
         let last = self.last.replace(origin);
         let is_same = last.is_none_or(|last| last.publisher == origin.publisher);
         let steps = match last {

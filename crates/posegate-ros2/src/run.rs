@@ -3,13 +3,13 @@
 //! One thread reads, decides and publishes the heartbeat, so a loop that hangs sends none, and consumers deny.
 
 use crate::clock::{ClockWatch, Now};
-use crate::diagnostics::{Received, diagnostics, explanation};
+use crate::decider::Decider;
+use crate::diagnostics::{Received, diagnostics};
 use crate::graph::{Environment, Graph, GraphError};
-use crate::markers::markers;
 use crate::message::{Bool, TriggerResponse};
 use crate::names::Names;
 use crate::permission::Heartbeat;
-use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::permit_gate::{Answer, Origin};
 use crate::settings::NodeSettings;
 use posegate::gate::Reason;
 use ros2_client::MessageInfo;
@@ -29,11 +29,11 @@ const SHORTEST: Duration = Duration::from_millis(2);
 const BATCH: usize = 64;
 
 /// A node that runs.
-pub struct Runner<'a> {
+pub struct Runner<'a, D> {
     graph: Graph,
     environment: Environment,
     names: &'a Names,
-    gate: PermitGate<'a>,
+    gate: D,
     settings: &'a NodeSettings,
     heartbeat: Heartbeat,
     watch: ClockWatch,
@@ -57,7 +57,7 @@ fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
     last.is_none_or(|last| now.saturating_duration_since(last) >= period)
 }
 
-impl<'a> Runner<'a> {
+impl<'a, D: Decider> Runner<'a, D> {
     /// Makes a node and joins a graph.
     ///
     /// # Errors
@@ -65,7 +65,7 @@ impl<'a> Runner<'a> {
     pub fn join(
         environment: Environment,
         names: &'a Names,
-        gate: PermitGate<'a>,
+        gate: D,
         settings: &'a NodeSettings,
     ) -> Result<Self, GraphError> {
         let graph = Graph::join(environment, names, settings)?;
@@ -116,6 +116,10 @@ impl<'a> Runner<'a> {
         while !stop.load(Ordering::Relaxed) {
             // A report that came right after a heartbeat waits no longer than it must.
             let timeout = if self.has_report { SHORTEST } else { cycle };
+            let timeout = self
+                .gate
+                .patience()
+                .map_or(timeout, |patience| timeout.min(patience));
             match self.graph.poll.poll(&mut events, Some(timeout)) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => other?,
@@ -146,7 +150,6 @@ impl<'a> Runner<'a> {
         }
         self.take_odometry();
         self.take_poses();
-        self.gate.scrub();
         let answer = self.gate.tick(Now::read());
         self.publish(&answer, Instant::now(), false);
         self.serve();
@@ -199,7 +202,8 @@ impl<'a> Runner<'a> {
         if has_changed || reports || is_due(self.sent.heartbeat, now, period) {
             self.has_report = false;
             self.sent.heartbeat = Some(now);
-            let message = self.heartbeat.next(answer, self.settings, self.gate.last());
+            let report = self.gate.report();
+            let message = self.heartbeat.next(answer, self.settings, report);
             let _ = self.graph.permission.publish(message);
         }
         if has_changed
@@ -219,18 +223,15 @@ impl<'a> Runner<'a> {
             let message = diagnostics(
                 answer,
                 self.settings,
-                self.gate.last(),
+                self.gate.frame(),
                 &self.pose,
                 self.odometry.as_ref(),
                 self.clock_steps,
+                self.gate.diagnostics(answer.now),
             );
             let _ = self.graph.diagnostics.publish(message);
-            if let (true, Some(last), Ok(table)) = (
-                self.settings.markers,
-                self.gate.last(),
-                self.gate.gate().table(),
-            ) {
-                let _ = self.graph.markers.publish(markers(answer, last, table));
+            if let Some(markers) = self.gate.markers(answer).filter(|_| self.settings.markers) {
+                let _ = self.graph.markers.publish(markers);
             }
         }
     }
@@ -240,7 +241,7 @@ impl<'a> Runner<'a> {
             let answer = self.gate.tick(Now::read());
             let response = TriggerResponse {
                 success: true,
-                message: explanation(&answer, self.gate.last()),
+                message: self.gate.explain(&answer),
             };
             let _ = self.graph.explain.send_response(id, response);
         }
@@ -249,16 +250,9 @@ impl<'a> Runner<'a> {
             let reset = self.gate.reset(now);
             let answer = self.gate.tick(Now::read());
             self.publish(&answer, Instant::now(), false);
-            let response = match reset {
-                Ok(()) => TriggerResponse {
-                    success: true,
-                    message: "the gate was reset: it is closed, and qualifies again".into(),
-                },
-                Err(error) => TriggerResponse {
-                    success: false,
-                    message: error.to_string(),
-                },
-            };
+            let success = reset.is_ok();
+            let (Ok(message) | Err(message)) = reset;
+            let response = TriggerResponse { success, message };
             let _ = self.graph.reset.send_response(id, response);
         }
     }

@@ -8,6 +8,7 @@ use posegate::report::FrameId;
 use posegate::set::{Aging, Trust};
 use posegate::table::{Table, TableError};
 use posegate::track::TrackerSettings;
+use std::path::PathBuf;
 
 mod reader;
 
@@ -20,7 +21,18 @@ pub struct Delivery {
     pub transient_local: bool,
 }
 
-/// The settings of a node.
+/// A serial line to a controller.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Serial {
+    /// The device.
+    pub path: PathBuf,
+    /// Its speed, bits per second.
+    pub baud: u32,
+    /// A state of the controller counts only if it is certainly younger than this, milliseconds.
+    pub link_timeout_ms: u32,
+}
+
+/// The settings of a node. With a serial line, those of the gate decide nothing: the controller has its own.
 #[derive(Clone, Debug)]
 pub struct NodeSettings {
     task: String,
@@ -55,6 +67,8 @@ pub struct NodeSettings {
     pub tracker: Option<TrackerSettings>,
     /// Whether markers are published.
     pub markers: bool,
+    /// The line to the controller that decides. Without one, the node decides.
+    pub serial: Option<Serial>,
 }
 
 /// Parameters that are refused.
@@ -102,6 +116,21 @@ pub enum SettingsError {
         "use_sim_time is true: the gate needs a clock that cannot stop, so this node uses the system's clock; set use_sim_time to false for it, and play recordings with `posegate replay`"
     )]
     SimulatedTime,
+    /// A setting of the gate, which is on the controller.
+    #[error(
+        "{place}: the parameter `{name}` is a setting of the gate, and with --serial the controller's gate decides by its own settings: leave it out"
+    )]
+    OfTheController {
+        /// The name.
+        name: String,
+        /// Where it was given.
+        place: String,
+    },
+    /// A setting of a line without one.
+    #[error(
+        "link_timeout_ms is given without --serial: it is for a controller on a serial line; give --serial DEV, or leave it out"
+    )]
+    NoSerial,
     /// Times that do not fit each other.
     #[error("{0}")]
     Times(&'static str),
@@ -157,9 +186,13 @@ impl NodeSettings {
                 expected: task,
             });
         }
+        let serial = reader.serial(arguments)?;
         let frame = reader.text("frame_id", "map")?;
         let trust = reader.trust()?;
-        let bounds = reader.bounds()?;
+        let bounds = match serial {
+            Some(_) => MotionBounds::STANDS_STILL,
+            None => reader.bounds()?,
+        };
         let tracker = reader.tracker(bounds, trust, &table)?;
         let source = Source {
             frame: FrameId::of(&frame),
@@ -206,6 +239,7 @@ impl NodeSettings {
             odom_delivery: reader.delivery("odom_reliability", "odom_durability", false)?,
             tracker,
             markers: reader.bool("markers", true)?,
+            serial,
         };
         settings.check()?;
         Ok(settings)
@@ -221,6 +255,9 @@ impl NodeSettings {
             return Err(SettingsError::Times(
                 "heartbeat_ms is less than cycle_ms: a heartbeat is sent by a control cycle; lengthen heartbeat_ms or shorten cycle_ms",
             ));
+        }
+        if self.serial.is_some() {
+            return Ok(());
         }
         if !(self.response_ms() < self.maximum_age_ms) {
             return Err(SettingsError::Times(

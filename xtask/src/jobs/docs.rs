@@ -136,8 +136,12 @@ fn commands(page: &str) -> Result<Option<Vec<String>>> {
 /// Returns the command of a line, or `None` if there is nothing to run.
 fn command(line: &str) -> Result<Option<String>> {
     let line = line.split('#').next().unwrap_or_default();
-    // The jobs' own command runs this job.
-    if line.trim().is_empty() || line.starts_with("./ci.sh") || line.starts_with("cargo xtask") {
+    // The jobs' own command runs this job, and `dist` runs those that need the files of a release.
+    let is_run_elsewhere = ["./ci.sh", "cargo xtask"]
+        .iter()
+        .any(|start| line.starts_with(start))
+        || crate::jobs::dist::installs(line);
+    if line.trim().is_empty() || is_run_elsewhere {
         return Ok(None);
     }
     if !PROGRAMS.iter().any(|program| line.starts_with(program)) {

@@ -1,7 +1,8 @@
-//! `ros2`: the node of `crates/posegate-ros2` with rclpy and Fast DDS from wheels, on loopback. `behaviortree`: the condition of
+//! `ros2` and `nav2`: the node of `crates/posegate-ros2` with rclpy and Fast DDS from wheels, on loopback. `behaviortree`: the condition of
 //! `integrations/behaviortree` with BehaviorTree.CPP.
 
 use crate::arguments::Arguments;
+use crate::board;
 use crate::files::{self, Scratch, target_folder};
 use crate::jobs::docs::release_program;
 use crate::need;
@@ -11,55 +12,120 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const CRATE: &str = "crates/posegate-ros2";
+/// The core of the controller that is emulated.
+const CORE: &str = "thumbv7em-none-eabihf";
 /// How often each cause that ends a permit is tried.
 const RUNS: u64 = 5;
-/// ROS 2 Jazzy as wheels of Python 3.11. There is no installation of ROS in this job.
-const WHEELS: &str = "ros-rclpy==7.1.6 ros-rmw-fastrtps-cpp==8.4.3 ros-geometry-msgs==5.3.6 ros-nav-msgs==5.3.6 ros-std-msgs==5.3.6 \
-                      ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 mcap==1.6.0 cyclonedds==11.0.1";
-const MODULES: &str = "rclpy, mcap, cyclonedds, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg, std_srvs.srv, diagnostic_msgs.msg, visualization_msgs.msg";
+/// A release of ROS 2 as wheels of Python 3.11. There is no installation of ROS in these jobs.
+struct Release {
+    name: &'static str,
+    environment: &'static str,
+    modules: &'static str,
+    wheels: &'static str,
+}
+const JAZZY: Release = Release {
+    name: "Jazzy",
+    environment: "ros2-tools",
+    modules: "cyclonedds",
+    wheels: "ros-rclpy==7.1.6 ros-rmw-fastrtps-cpp==8.4.3 ros-geometry-msgs==5.3.6 ros-nav-msgs==5.3.6 ros-std-msgs==5.3.6 \
+             ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 mcap==1.6.0 cyclonedds==11.0.1",
+};
+const KILTED: Release = Release {
+    name: "Kilted",
+    environment: "ros2-kilted-tools",
+    modules: "sys",
+    wheels: "ros-rclpy==9.1.2 ros-rmw-fastrtps-cpp==9.3.3 ros-geometry-msgs==5.5.1 ros-nav-msgs==5.5.1 ros-std-msgs==5.5.1 \
+             ros-std-srvs==5.5.1 ros-diagnostic-msgs==5.5.1 ros-visualization-msgs==5.5.1 mcap==1.6.0",
+};
+/// Modules whose import shows that a release is installed.
+const MODULES: &str = "rclpy, mcap, geometry_msgs.msg, nav_msgs.msg, std_msgs.msg, std_srvs.srv, diagnostic_msgs.msg, visualization_msgs.msg";
 /// The package of Python whose source has BehaviorTree.CPP 4.8.2 in it.
 const TREES: &str = "behaviortreepy==0.1.4";
 
-/// Lints and tests the crate, builds its program, and runs `tests/live` of the crate. The argument is how often each cause that ends a
+/// Lints and tests the crate, builds its program, and runs `tests/live` of the crate with Jazzy, and a part of it with Kilted. The argument is how often each cause that ends a
 /// permit is tried; 50 is the deep variant.
 pub fn ros2(given: &Arguments) -> Result {
     let runs = given.number(0, RUNS)?;
-    let python = python()?;
+    need::targets(&[CORE])?;
+    need::qemu()?;
+    let jazzy = python(&JAZZY)?;
+    let kilted = python(&KILTED)?;
     let manifest = format!("{CRATE}/Cargo.toml");
     say("lints");
     cmd("cargo fmt --check --manifest-path")
         .arg(&manifest)
         .run()?;
-    in_target(cmd("cargo clippy --locked --release --all-targets --manifest-path").arg(&manifest))
+    for features in ["", "--no-default-features --features humble"] {
+        in_target(
+            cmd("cargo clippy --locked --release --all-targets --manifest-path").arg(&manifest),
+        )
+        .words(features)
         .words("-- -D warnings")
         .run()?;
+    }
     say("tests without a network, and damaged payloads");
     in_target(cmd("cargo test --locked --release --manifest-path").arg(&manifest))
         .words("-- --nocapture --test-threads 1")
         .json()?;
-    in_target(cmd("cargo build --locked --release --manifest-path").arg(&manifest)).run()?;
-    release_program()?;
+    programs()?;
     let folder = Scratch::new()?;
     let bag = folder.join("drive.mcap");
     program_at(&target_folder().join("release/examples/drive_bag"))
         .arg(&bag)
         .arg(folder.join("drive.csv"))
         .run()?;
-    say("rclpy");
-    let live = |name: &str| {
-        program_at(&python)
-            .arg(format!("{CRATE}/tests/live/{name}.py"))
-            .env("POSEGATE_NODE", files::release("posegate-node"))
-            .env("POSEGATE", files::release("posegate"))
-            .limit(600)
-    };
-    live("listener").json()?;
-    live("permit").json()?;
-    live("odometry").json()?;
-    live("failsafe").arg(runs.to_string()).json()?;
-    live("rows").arg(&bag).json()?;
-    live("cyclone").json()?;
+    say(JAZZY.name);
+    live(&jazzy, "listener").json()?;
+    live(&jazzy, "permit").json()?;
+    live(&jazzy, "odometry").json()?;
+    live(&jazzy, "failsafe").arg(runs.to_string()).json()?;
+    live(&jazzy, "rows").arg(&bag).json()?;
+    live(&jazzy, "cyclone").json()?;
+    say("a controller on a serial line");
+    let firmware = board::build(CORE, "interrupt_gate")?;
+    live(&jazzy, "serial")
+        .arg(firmware)
+        .arg(runs.to_string())
+        .json()?;
+    say(KILTED.name);
+    live(&kilted, "permit").json()?;
+    live(&kilted, "odometry").json()?;
+    live(&kilted, "failsafe").arg("1").json()?;
     Ok(())
+}
+
+/// Plays the recording of Nav2 with its odometry to the node, in real time and at 20 times, and compares each verdict with the row of
+/// `posegate replay`. The argument is the folder of the recordings.
+pub fn nav2(given: &Arguments) -> Result {
+    let folder = given.folder(0, "the folder of the recordings")?;
+    let bag = folder.join("nav2/nav2_turtlebot.mcap");
+    programs()?;
+    for (release, speeds) in [(&JAZZY, "1 20"), (&KILTED, "20")] {
+        let python = python(release)?;
+        say(release.name);
+        live(&python, "nav2")
+            .arg(&bag)
+            .arg("examples/sites/turtlebot.toml")
+            .words(speeds)
+            .json()?;
+    }
+    Ok(())
+}
+
+/// Builds the node and the program.
+fn programs() -> Result {
+    let manifest = format!("{CRATE}/Cargo.toml");
+    in_target(cmd("cargo build --locked --release --manifest-path").arg(manifest)).run()?;
+    release_program()
+}
+
+/// Returns a command that runs a test of `tests/live` with a release of ROS.
+fn live(python: &Path, name: &str) -> Cmd {
+    program_at(python)
+        .arg(format!("{CRATE}/tests/live/{name}.py"))
+        .env("POSEGATE_NODE", files::release("posegate-node"))
+        .env("POSEGATE", files::release("posegate"))
+        .limit(600)
 }
 
 /// Builds BehaviorTree.CPP, and the condition with its test by CMake, and runs it.
@@ -105,8 +171,8 @@ pub fn behaviortree(_: &Arguments) -> Result {
     report.finish()
 }
 
-/// Returns the Python with ROS.
-fn python() -> Result<PathBuf> {
+/// Returns the Python with a release of ROS.
+fn python(release: &Release) -> Result<PathBuf> {
     need::command("python3", "python3")?;
     let version = cmd("python3 --version").read()?;
     if !version.trim().starts_with("Python 3.11.") {
@@ -116,7 +182,8 @@ fn python() -> Result<PathBuf> {
         )
         .into());
     }
-    need::python("ros2-tools", MODULES, WHEELS)
+    let modules = format!("{MODULES}, {}", release.modules);
+    need::python(release.environment, &modules, release.wheels)
 }
 
 /// Returns the folder in which BehaviorTree.CPP is installed. It is built once.

@@ -1,6 +1,7 @@
 //! Parameters by name, each with its type and range.
 
-use super::{Delivery, SettingsError, hex};
+use super::{Delivery, Serial, SettingsError, hex};
+use crate::arguments::Arguments;
 use crate::parameters::{Parameters, Value};
 use posegate::gate::site_digest;
 use posegate::motion::MotionBounds;
@@ -9,13 +10,14 @@ use posegate::table::Table;
 use posegate::track::{OdometryErrors, TrackerSettings};
 
 /// Every parameter.
-const NAMES: [&str; 36] = [
+const NAMES: [&str; 37] = [
     "cross_terms",
     "cycle_ms",
     "frame_id",
     "heartbeat_ms",
     "inflation",
     "inhibit_hold_ms",
+    "link_timeout_ms",
     "look_at",
     "markers",
     "max_speed",
@@ -48,6 +50,19 @@ const NAMES: [&str; 36] = [
     "valid_ms",
 ];
 
+/// What a node with a controller may be given. Everything else is a setting of the gate or of odometry, which such a node does not have.
+const WITH_CONTROLLER: [&str; 9] = [
+    "cycle_ms",
+    "frame_id",
+    "heartbeat_ms",
+    "link_timeout_ms",
+    "pose_durability",
+    "pose_reliability",
+    "site_digest",
+    "task",
+    "valid_ms",
+];
+
 const TIME: &str = "milliseconds, a whole number from 1 to 60000";
 const NUMBER: &str = "a number that is not below zero";
 
@@ -73,6 +88,30 @@ impl Reader<'_> {
             }),
             all: NAMES.join(", "),
         })
+    }
+
+    pub(super) fn serial(&self, arguments: &Arguments) -> Result<Option<Serial>, SettingsError> {
+        let Some((path, baud)) = &arguments.serial else {
+            return match self.0.get("link_timeout_ms") {
+                None => Ok(None),
+                Some(_) => Err(SettingsError::NoSerial),
+            };
+        };
+        let names = self.0.names().filter(|name| *name != "use_sim_time");
+        let foreign = names
+            .into_iter()
+            .find(|name| !WITH_CONTROLLER.contains(name));
+        match foreign {
+            Some(name) => Err(SettingsError::OfTheController {
+                name: name.to_owned(),
+                place: self.0.place(name).to_owned(),
+            }),
+            None => Ok(Some(Serial {
+                path: path.clone(),
+                baud: *baud,
+                link_timeout_ms: self.ms("link_timeout_ms", 150)?,
+            })),
+        }
     }
 
     fn invalid(&self, name: &'static str, expected: &'static str) -> SettingsError {

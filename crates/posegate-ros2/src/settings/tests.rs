@@ -148,3 +148,55 @@ fn bytes_that_are_no_table_are_refused() {
     let refused = NodeSettings::new(&arguments, &TABLE[..100]);
     assert!(matches!(refused, Err(SettingsError::Table(_))));
 }
+
+/// The gate is on the controller: what the node is given for a gate would decide nothing, so it is refused.
+#[test]
+fn with_a_controller_only_settings_of_the_node_are_accepted() {
+    let line = "--serial /dev/ttyUSB0 --baud 921600 --ros-args -p link_timeout_ms:=200 -p valid_ms:=300 -p task:=dock";
+    let serial = settings(line).unwrap().serial.unwrap();
+    assert_eq!(
+        (serial.path.to_str(), serial.baud, serial.link_timeout_ms),
+        (Some("/dev/ttyUSB0"), 921_600, 200)
+    );
+    let serial = settings("--serial /dev/ttyS1").unwrap().serial.unwrap();
+    assert_eq!((serial.baud, serial.link_timeout_ms), (115_200, 150));
+    for name in [
+        "max_speed:=0.3",
+        "stands_still:=true",
+        "inflation:=2.0",
+        "permit_hold_ms:=100",
+        "use_odometry:=true",
+        "markers:=true",
+    ] {
+        let error = settings(&format!("--serial /dev/ttyS1 --ros-args -p {name}")).unwrap_err();
+        assert!(
+            matches!(error, SettingsError::OfTheController { .. }),
+            "{name}: {error}"
+        );
+    }
+    for (line, words) in [
+        (
+            "--serial /dev/ttyS1 --ros-args -p task:=park",
+            "is for the task `dock`",
+        ),
+        (
+            "--serial /dev/ttyS1 --ros-args -p link_timeout_ms:=0",
+            "from 1 to 60000",
+        ),
+        (
+            "--serial /dev/ttyS1 --ros-args -p use_sim_time:=true",
+            "use_sim_time is true",
+        ),
+        (
+            "--serial /dev/ttyS1 --ros-args -p valid_ms:=60",
+            "twice heartbeat_ms",
+        ),
+        (
+            "--ros-args -p stands_still:=true -p link_timeout_ms:=9",
+            "without --serial",
+        ),
+    ] {
+        let message = settings(line).unwrap_err().to_string();
+        assert!(message.contains(words), "{line}: {message}");
+    }
+}

@@ -1,0 +1,113 @@
+//! What the node needs from whoever decides: the gate in this process, or the controller at the other end of a serial line.
+
+use crate::clock::Now;
+use crate::diagnostics::explanation;
+use crate::markers::markers;
+use crate::message::{
+    DiagnosticStatus, KeyValue, MarkerArray, Odometry, PoseWithCovarianceStamped,
+};
+use crate::permission::report_values;
+use crate::permit_gate::{Answer, Origin, PermitGate};
+use posegate::gate::Reason;
+use std::time::Duration;
+
+/// Decides, from messages of ROS.
+pub trait Decider {
+    /// Takes a pose with its covariance.
+    fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer;
+
+    /// Takes a pose of the odometry.
+    fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer;
+
+    /// Takes notice of a message of the odometry that could not be read.
+    fn odometry_lost(&mut self, now: Now) -> Answer;
+
+    /// Advances the time. Called in every control cycle.
+    fn tick(&mut self, now: Now) -> Answer;
+
+    /// Ends a permit for a cause that only the node sees.
+    fn inhibit(&mut self, now: Now, reason: Reason) -> Answer;
+
+    /// Restarts, closed, and returns what that was, in words.
+    ///
+    /// # Errors
+    /// Why it does not restart, in words.
+    fn reset(&mut self, now: Now) -> Result<String, String>;
+
+    /// Returns what the heartbeat says of the last report.
+    fn report(&self) -> Vec<KeyValue>;
+
+    /// Returns the name of the frame of the last pose.
+    fn frame(&self) -> Option<&str>;
+
+    /// Returns what the diagnostics say in addition.
+    fn diagnostics(&self, now: Now) -> Vec<DiagnosticStatus>;
+
+    /// Returns why there is a permit or none, and what to do.
+    fn explain(&self, answer: &Answer) -> String;
+
+    /// Returns the markers of the last report.
+    fn markers(&self, answer: &Answer) -> Option<MarkerArray>;
+
+    /// Returns the longest time to wait for a message, if it is shorter than a control cycle.
+    fn patience(&self) -> Option<Duration>;
+}
+
+impl Decider for PermitGate<'_> {
+    fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer {
+        Self::pose(self, now, message, origin)
+    }
+
+    fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer {
+        Self::odometry(self, now, message, origin)
+    }
+
+    fn odometry_lost(&mut self, now: Now) -> Answer {
+        Self::odometry_lost(self, now)
+    }
+
+    fn tick(&mut self, now: Now) -> Answer {
+        self.scrub();
+        Self::tick(self, now)
+    }
+
+    fn inhibit(&mut self, now: Now, reason: Reason) -> Answer {
+        Self::inhibit(self, now, reason)
+    }
+
+    fn reset(&mut self, now: Now) -> Result<String, String> {
+        match Self::reset(self, now) {
+            Ok(()) => Ok("the gate was reset: it is closed, and qualifies again".into()),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    fn report(&self) -> Vec<KeyValue> {
+        self.last()
+            .map(report_values)
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+
+    fn frame(&self) -> Option<&str> {
+        self.last().map(|last| last.frame.as_str())
+    }
+
+    fn diagnostics(&self, _: Now) -> Vec<DiagnosticStatus> {
+        Vec::new()
+    }
+
+    fn explain(&self, answer: &Answer) -> String {
+        explanation(answer, self.last().and_then(|last| last.step.err()))
+    }
+
+    fn markers(&self, answer: &Answer) -> Option<MarkerArray> {
+        let table = self.gate().table().ok()?;
+        Some(markers(answer, self.last()?, table))
+    }
+
+    fn patience(&self) -> Option<Duration> {
+        None
+    }
+}

@@ -1,0 +1,217 @@
+//! The line to a controller, in time: what it said last, and how old that can be. No input or output in here.
+//!
+//! A permit of the controller is news only for a moment. A line can be silent, repeat old bytes or deliver them late, and a controller
+//! can start again. Therefore a state counts only if its age has a bound, and the bound is short. The bound comes from a round trip:
+//! telemetry that names a report of ours was made after we sent that report. Later telemetry is later by the controller's clock, of
+//! which [`DRIFT_PER_MILLE`] is taken off. So no delay of the line, however constant, makes an old state look new.
+
+use posegate::gate::State;
+use posegate::wire::{LinkCounters, Receiver, Telemetry};
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// By how much the controller's clock may be faster than this machine's, in thousandths.
+pub const DRIFT_PER_MILLE: u32 = 2;
+/// Reports whose telemetry may still come.
+const SENT: usize = 64;
+/// A state that would have been made so long after it arrived is of another clock.
+const AHEAD: Duration = Duration::from_millis(20);
+
+/// What is counted of a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Telemetry messages that were read.
+    pub telemetry: u64,
+    /// Frames that were damaged.
+    pub damaged: u64,
+    /// Frames that are no telemetry of this version.
+    pub foreign: u64,
+    /// Messages that came again.
+    pub repeated: u64,
+    /// Messages that were lost, by their numbers.
+    pub lost: u64,
+    /// How often the controller, or its clock, started again.
+    pub restarts: u64,
+}
+
+/// The line to a controller.
+#[derive(Debug)]
+pub struct Link {
+    receiver: Receiver,
+    last: Option<Heard>,
+    /// A time of the controller's clock, and a time of this machine that was certainly before it.
+    anchor: Option<(u32, Instant)>,
+    sent: VecDeque<(u32, Instant)>,
+    counts: Counts,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    telemetry: Telemetry,
+    at: Instant,
+}
+
+impl Link {
+    /// Returns a line on which nothing was heard.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            receiver: Receiver::new(),
+            last: None,
+            anchor: None,
+            sent: VecDeque::new(),
+            counts: Counts::default(),
+        }
+    }
+
+    /// Forgets what was heard: the line was closed.
+    pub fn close(&mut self) {
+        let counts = self.counts;
+        *self = Self {
+            counts,
+            ..Self::new()
+        };
+    }
+
+    /// Takes bytes that were read.
+    pub fn take(&mut self, bytes: &[u8], at: Instant) {
+        for byte in bytes {
+            match self.receiver.push(*byte) {
+                None => {}
+                Some(Err(_)) => self.counts.damaged += 1,
+                Some(Ok(body)) => match Telemetry::from_body(&body) {
+                    None => self.counts.foreign += 1,
+                    Some(telemetry) => self.hear(telemetry, at),
+                },
+            }
+        }
+    }
+
+    fn hear(&mut self, telemetry: Telemetry, at: Instant) {
+        if let Some(last) = &self.last {
+            let steps = telemetry.number.wrapping_sub(last.telemetry.number);
+            let passed = telemetry.now_ms.wrapping_sub(last.telemetry.now_ms);
+            if telemetry == last.telemetry {
+                self.counts.repeated += 1;
+                return;
+            }
+            if (1..1 << 31).contains(&steps) && passed < 1 << 31 {
+                self.counts.lost += u64::from(steps - 1);
+            } else {
+                self.restart();
+            }
+        }
+        self.counts.telemetry += 1;
+        self.last = Some(Heard { telemetry, at });
+        if let Some(report) = telemetry.weighed {
+            let sent = self
+                .sent
+                .iter()
+                .find(|(number, _)| *number == report.sequence);
+            if let Some((_, sent)) = sent {
+                let is_newer = self
+                    .made_after(telemetry.now_ms)
+                    .is_none_or(|bound| bound < *sent);
+                if is_newer {
+                    self.anchor = Some((telemetry.now_ms, *sent));
+                }
+            }
+        }
+        if self
+            .made_after(telemetry.now_ms)
+            .is_some_and(|bound| bound > at + AHEAD)
+        {
+            self.restart();
+        }
+    }
+
+    /// Takes the clock of the controller for a new one. What was sent before is of the old one.
+    fn restart(&mut self) {
+        self.counts.restarts += 1;
+        self.anchor = None;
+        self.sent.clear();
+    }
+
+    /// Returns a time of this machine that was certainly before a time of the controller's clock.
+    fn made_after(&self, now_ms: u32) -> Option<Instant> {
+        let (anchor_ms, anchor) = self.anchor?;
+        let passed = u64::from(now_ms.wrapping_sub(anchor_ms));
+        if passed >= 1 << 31 {
+            return None;
+        }
+        let certain = passed - (passed * u64::from(DRIFT_PER_MILLE)).div_ceil(1_000);
+        Some(anchor + Duration::from_millis(certain))
+    }
+
+    /// Notes a report that is written to the line.
+    pub fn note_sent(&mut self, sequence: u32, at: Instant) {
+        if self.sent.len() == SENT {
+            self.sent.pop_front();
+        }
+        self.sent.push_back((sequence, at));
+    }
+
+    /// Returns the last telemetry.
+    #[must_use]
+    pub fn last(&self) -> Option<&Telemetry> {
+        self.last.as_ref().map(|heard| &heard.telemetry)
+    }
+
+    /// Returns how long ago the last telemetry arrived.
+    #[must_use]
+    pub fn silence(&self, now: Instant) -> Option<Duration> {
+        let last = self.last?;
+        Some(now.saturating_duration_since(last.at))
+    }
+
+    /// Returns how old the last telemetry is at most. `None` without a round trip: it can have any age.
+    #[must_use]
+    pub fn age(&self, now: Instant) -> Option<Duration> {
+        let bound = self.made_after(self.last?.telemetry.now_ms)?;
+        Some(now.saturating_duration_since(bound))
+    }
+
+    /// Returns the time of the controller's clock at a moment, or an earlier one: the delay of the telemetry is not added.
+    #[must_use]
+    pub fn clock_ms(&self, now: Instant) -> Option<u32> {
+        let last = self.last?;
+        let since = now.saturating_duration_since(last.at).as_millis();
+        Some(last.telemetry.now_ms.wrapping_add(since as u32))
+    }
+
+    /// Returns `true` if the controller permits: by a state that is certainly younger than `limit`, with its output high and without a
+    /// fault.
+    #[must_use]
+    pub fn permits(&self, now: Instant, limit: Duration) -> bool {
+        let is_young = self.age(now).is_some_and(|age| age < limit);
+        let says_so = self.last().is_some_and(|said| {
+            said.permitted
+                && said.state == State::Permitted
+                && said.interlock_high
+                && said.fault.is_none()
+        });
+        is_young && says_so
+    }
+
+    /// Returns the counts of this end of the line.
+    #[must_use]
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Returns the counts of the controller's end.
+    #[must_use]
+    pub fn controller_counts(&self) -> LinkCounters {
+        self.last()
+            .map_or_else(LinkCounters::default, |said| said.line)
+    }
+}
+
+impl Default for Link {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests;

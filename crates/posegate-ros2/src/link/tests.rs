@@ -1,0 +1,284 @@
+use super::*;
+use posegate::gate::{InterlockFault, Reason};
+use posegate::wire::{ReportOutcome, encode};
+use proptest::prelude::*;
+
+const LIMIT: Duration = Duration::from_millis(150);
+
+const fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+/// A controller that sends telemetry every 10 ms, and a line to it in virtual time.
+struct Line {
+    link: Link,
+    start: Instant,
+    now_ms: u64,
+    number: u32,
+    clock_ms: u32,
+    sequence: u32,
+}
+
+impl Line {
+    fn new(clock_ms: u32) -> Self {
+        Self {
+            link: Link::new(),
+            start: Instant::now(),
+            now_ms: 0,
+            number: 0,
+            clock_ms,
+            sequence: 100,
+        }
+    }
+
+    fn now(&self) -> Instant {
+        self.start + ms(self.now_ms)
+    }
+
+    /// Lets the time pass for both.
+    fn pass(&mut self, passed_ms: u64) {
+        self.now_ms += passed_ms;
+        self.clock_ms = self.clock_ms.wrapping_add(passed_ms as u32);
+    }
+
+    /// Makes the next message of the controller, which permits.
+    fn permitting(&mut self) -> Telemetry {
+        self.number += 1;
+        Telemetry {
+            number: self.number,
+            cycle: self.number,
+            now_ms: self.clock_ms,
+            weighed: None,
+            state: State::Permitted,
+            permitted: true,
+            interlock_high: true,
+            fault: None,
+            line: LinkCounters::default(),
+        }
+    }
+
+    /// Sends a report, and returns the message that names it.
+    fn answered(&mut self) -> Telemetry {
+        self.sequence += 1;
+        let (sequence, now) = (self.sequence, self.now());
+        self.link.note_sent(sequence, now);
+        self.pass(10);
+        let weighed = Some(ReportOutcome {
+            source: 0,
+            sequence,
+            stamp_ms: 0,
+            verdict: Ok(()),
+        });
+        Telemetry {
+            weighed,
+            ..self.permitting()
+        }
+    }
+
+    fn arrive(&mut self, telemetry: &Telemetry) {
+        let now = self.now();
+        self.link.take(&encode(&telemetry.body()), now);
+    }
+
+    fn permits(&self) -> bool {
+        self.link.permits(self.now(), LIMIT)
+    }
+
+    /// A line that permits by a round trip of 10 ms.
+    fn open(clock_ms: u32) -> Self {
+        let mut line = Self::new(clock_ms);
+        let answer = line.answered();
+        line.arrive(&answer);
+        assert!(line.permits());
+        line
+    }
+}
+
+#[test]
+fn a_permit_without_a_round_trip_is_none() {
+    let mut line = Line::new(7);
+    for _ in 0..100 {
+        let said = line.permitting();
+        line.arrive(&said);
+        line.pass(10);
+        assert!(!line.permits());
+    }
+    let answer = line.answered();
+    line.arrive(&answer);
+    assert!(line.permits());
+}
+
+#[test]
+fn a_silent_controller_permits_no_longer_than_the_limit() {
+    // The age counts from before the report was sent, 10 ms ago. The clock wraps meanwhile.
+    for clock_ms in [0, u32::MAX - 50] {
+        let mut line = Line::open(clock_ms);
+        line.pass(139);
+        assert!(line.permits());
+        line.pass(1);
+        assert!(!line.permits());
+    }
+}
+
+#[test]
+fn telemetry_prolongs_by_the_controllers_clock() {
+    let mut line = Line::open(u32::MAX - 500);
+    for _ in 0..200 {
+        line.pass(10);
+        let said = line.permitting();
+        line.arrive(&said);
+        assert!(line.permits());
+    }
+    // Two thousandths of two seconds are taken off.
+    assert_eq!(line.link.age(line.now()), Some(ms(10 + 4)));
+}
+
+#[test]
+fn what_the_controller_denies_is_denied_at_once() {
+    type Change = fn(&mut Telemetry);
+    let changes: [Change; 5] = [
+        |said| said.permitted = false,
+        |said| said.state = State::Inhibited(Reason::NotContained),
+        |said| said.state = State::Qualifying(3),
+        |said| said.interlock_high = false,
+        |said| said.fault = Some(InterlockFault::NotFollowing),
+    ];
+    for change in changes {
+        let mut line = Line::open(0);
+        line.pass(10);
+        let mut said = line.permitting();
+        change(&mut said);
+        line.arrive(&said);
+        assert!(!line.permits(), "{said:?}");
+    }
+}
+
+#[test]
+fn bytes_that_come_again_are_no_news() {
+    let mut line = Line::open(0);
+    let said = line.permitting();
+    line.arrive(&said);
+    for _ in 0..20 {
+        line.pass(10);
+        line.arrive(&said);
+    }
+    assert!(!line.permits());
+    assert_eq!(line.link.counts().repeated, 20);
+}
+
+/// A recorded stretch that is played again and again, as a hung adapter does.
+#[test]
+fn a_stretch_that_is_repeated_permits_nothing() {
+    let mut line = Line::new(0);
+    let mut stretch = vec![line.answered()];
+    for _ in 0..9 {
+        line.pass(10);
+        stretch.push(line.permitting());
+    }
+    for said in &stretch {
+        line.arrive(said);
+    }
+    line.pass(200);
+    for _ in 0..10 {
+        for said in &stretch {
+            line.arrive(said);
+            assert!(!line.permits());
+            line.pass(10);
+        }
+    }
+    assert!(line.link.counts().restarts >= 10);
+}
+
+#[test]
+fn telemetry_that_is_always_late_permits_nothing() {
+    let mut line = Line::open(0);
+    let mut delayed = VecDeque::new();
+    for _ in 0..300 {
+        line.pass(10);
+        // Reports are answered, but what the controller says arrives 200 ms later.
+        let said = line.answered();
+        delayed.push_back(said);
+        if delayed.len() > 10 {
+            let said = delayed.pop_front().expect("one");
+            line.arrive(&said);
+        }
+        if delayed.len() == 10 && line.now_ms > 400 {
+            assert!(!line.permits(), "{}", line.now_ms);
+        }
+    }
+    assert!(!line.permits());
+}
+
+#[test]
+fn a_controller_that_starts_again_must_answer_first() {
+    let mut line = Line::open(50_000);
+    line.pass(20);
+    // It starts at another time, and claims to permit at once.
+    (line.number, line.clock_ms) = (0, 3);
+    for _ in 0..50 {
+        let said = line.permitting();
+        line.arrive(&said);
+        assert!(!line.permits());
+        line.pass(10);
+    }
+    assert_eq!(line.link.counts().restarts, 1);
+    let answer = line.answered();
+    line.arrive(&answer);
+    assert!(line.permits());
+}
+
+#[test]
+fn a_clock_that_jumps_ahead_is_another_clock() {
+    let mut line = Line::open(0);
+    line.clock_ms += 1_000;
+    let said = line.permitting();
+    line.arrive(&said);
+    assert!(!line.permits());
+    assert_eq!(line.link.counts().restarts, 1);
+}
+
+#[test]
+fn a_closed_line_is_forgotten() {
+    let mut line = Line::open(0);
+    line.link.close();
+    assert!(!line.permits() && line.link.last().is_none());
+    let said = line.permitting();
+    line.arrive(&said);
+    assert!(!line.permits());
+}
+
+#[test]
+fn the_controllers_clock_is_never_ahead() {
+    let mut line = Line::new(1_000);
+    let said = line.permitting();
+    // 30 ms on the line.
+    line.pass(30);
+    line.arrive(&said);
+    line.pass(5);
+    assert_eq!(line.link.clock_ms(line.now()), Some(1_005));
+    assert!(line.clock_ms >= 1_005);
+}
+
+proptest! {
+    /// Damaged bytes between and within messages never permit what no sound message said.
+    #[test]
+    fn garbage_permits_nothing(
+        steps in proptest::collection::vec((any::<u64>(), any::<bool>(), proptest::collection::vec(any::<u8>(), 0..40)), 1..60),
+    ) {
+        let mut line = Line::open(0);
+        line.pass(200);
+        for (random, is_telemetry, noise) in steps {
+            line.pass(random % 20);
+            let now = line.now();
+            if is_telemetry {
+                let mut bytes = encode(&line.permitting().body());
+                let bits = bytes.len() * 8;
+                let bit = (random >> 8) as usize % bits;
+                bytes[bit / 8] ^= 1 << (bit % 8);
+                line.link.take(&bytes, now);
+            }
+            line.link.take(&noise, now);
+            prop_assert!(!line.permits());
+        }
+    }
+}
