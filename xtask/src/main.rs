@@ -171,7 +171,7 @@ const JOBS: &[Job] = &[
     ),
     job(
         "gate_mutants",
-        "[PART]",
+        "[PART|--texts]",
         "checks of the gate removed one at a time: each must fail a fast test",
         jobs::mutants::gate_mutants,
     ),
@@ -322,6 +322,7 @@ const ALL: &[&str] = &[
     "wasm",
     "no_panic",
     "alone",
+    "gate_mutants --texts",
     "peers",
     "docs",
     "faults 21",
