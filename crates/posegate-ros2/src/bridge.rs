@@ -4,7 +4,7 @@
 use crate::clock::Now;
 use crate::decider::Decider;
 use crate::diagnostics::explanation;
-use crate::link::Link;
+use crate::link::{Link, SOURCE};
 use crate::message::{
     DiagnosticStatus, ERROR, KeyValue, MarkerArray, OK, Odometry, PoseWithCovarianceStamped, Time,
 };
@@ -19,8 +19,6 @@ use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher};
 use std::time::{Duration, Instant};
 
-/// The source of the reports, by the controller's list.
-const SOURCE: u8 = 0;
 /// How often the line is read. A controller sends a hundred messages a second.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// For how long a clock that was set denies. Stamps from before and after are not of one clock.
@@ -208,6 +206,8 @@ impl Decider for Bridge {
 
     fn inhibit(&mut self, now: Now, reason: Reason) -> Answer {
         self.held = Some((Instant::now(), reason));
+        // The monotonic clock stands still while the machine is suspended: what was heard before has no age any more.
+        self.link.close();
         self.gaps = self.gaps.wrapping_add(1);
         self.answer(now)
     }

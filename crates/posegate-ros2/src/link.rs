@@ -3,19 +3,25 @@
 //! A permit of the controller is news only for a moment. A line can be silent, repeat old bytes or deliver them late, and a controller
 //! can start again. Therefore a state counts only if its age has a bound, and the bound is short. The bound comes from a round trip:
 //! telemetry that names a report of ours was made after we sent that report. Later telemetry is later by the controller's clock, of
-//! which [`DRIFT_PER_MILLE`] is taken off. So no delay of the line, however constant, makes an old state look new.
+//! which [`DRIFT_PER_MILLE`] is taken off, for [`LIFE`] at most: then another round trip is needed. So no delay of the line, however
+//! constant, makes an old state look new. A clock that is faster than assumed makes a state look younger by what it gains in
+//! [`LIFE`], and no more.
 
 use posegate::gate::State;
 use posegate::wire::{LinkCounters, Receiver, Telemetry};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// By how much the controller's clock may be faster than this machine's, in thousandths.
-pub const DRIFT_PER_MILLE: u32 = 2;
+/// By how much the controller's clock may be faster than this machine's, in thousandths: an RC oscillator is within 30.
+pub const DRIFT_PER_MILLE: u32 = 30;
+/// For how long a round trip bounds the age of later telemetry, by the controller's clock.
+pub const LIFE: Duration = Duration::from_secs(2);
 /// Reports whose telemetry may still come.
 const SENT: usize = 64;
-/// A state that would have been made so long after it arrived is of another clock.
-const AHEAD: Duration = Duration::from_millis(20);
+/// A state that would have been made so long after it arrived is of another clock: times are whole milliseconds.
+const AHEAD: Duration = Duration::from_millis(2);
+/// The source of the reports that this end sends.
+pub const SOURCE: u8 = 0;
 
 /// What is counted of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -103,7 +109,7 @@ impl Link {
         }
         self.counts.telemetry += 1;
         self.last = Some(Heard { telemetry, at });
-        if let Some(report) = telemetry.weighed {
+        if let Some(report) = telemetry.weighed.filter(|report| report.source == SOURCE) {
             let sent = self
                 .sent
                 .iter()
@@ -132,11 +138,11 @@ impl Link {
         self.sent.clear();
     }
 
-    /// Returns a time of this machine that was certainly before a time of the controller's clock.
+    /// Returns a time of this machine that was certainly before a time of the controller's clock. `None` if no round trip is recent.
     fn made_after(&self, now_ms: u32) -> Option<Instant> {
         let (anchor_ms, anchor) = self.anchor?;
         let passed = u64::from(now_ms.wrapping_sub(anchor_ms));
-        if passed >= 1 << 31 {
+        if u128::from(passed) > LIFE.as_millis() {
             return None;
         }
         let certain = passed - (passed * u64::from(DRIFT_PER_MILLE)).div_ceil(1_000);

@@ -129,8 +129,80 @@ fn telemetry_prolongs_by_the_controllers_clock() {
         line.arrive(&said);
         assert!(line.permits());
     }
-    // Two thousandths of two seconds are taken off.
-    assert_eq!(line.link.age(line.now()), Some(ms(10 + 4)));
+    // Three hundredths of two seconds are taken off.
+    assert_eq!(line.link.age(line.now()), Some(ms(10 + 60)));
+    // Then another round trip is needed.
+    line.pass(10);
+    let said = line.permitting();
+    line.arrive(&said);
+    assert!(!line.permits() && line.link.age(line.now()).is_none());
+    let answer = line.answered();
+    line.arrive(&answer);
+    assert!(line.permits());
+}
+
+/// A line that delivers everything a second late, of a controller whose clock is fast: no state is ever taken for a young one.
+#[test]
+fn a_late_line_of_a_fast_clock_never_permits() {
+    for per_mille in [0u64, 1, 5, 10, 20, 30] {
+        let mut link = Link::new();
+        let start = Instant::now();
+        let mut on_the_line = VecDeque::new();
+        for now_ms in 0..300_000u64 {
+            let at = start + ms(now_ms);
+            let sequence = (now_ms / 100) as u32;
+            if now_ms % 100 == 0 {
+                link.note_sent(sequence, at);
+            }
+            if now_ms % 10 == 5 {
+                let said = Telemetry {
+                    number: (now_ms / 10) as u32 + 1,
+                    cycle: 1,
+                    now_ms: (now_ms * (1_000 + per_mille) / 1_000) as u32,
+                    weighed: Some(ReportOutcome {
+                        source: 0,
+                        sequence,
+                        stamp_ms: 0,
+                        verdict: Ok(()),
+                    }),
+                    state: State::Permitted,
+                    permitted: true,
+                    interlock_high: true,
+                    fault: None,
+                    line: LinkCounters::default(),
+                };
+                on_the_line.push_back((now_ms, said));
+            }
+            while let Some((_, said)) =
+                on_the_line.pop_front_if(|(made, _)| *made + 1_000 <= now_ms)
+            {
+                link.take(&encode(&said.body()), at);
+            }
+            assert!(
+                !link.permits(at, LIMIT),
+                "{per_mille} per mille: {now_ms} ms"
+            );
+        }
+        // Every state is a second old: its bound is not below that.
+        let age = link.age(start + ms(300_000));
+        assert!(age.is_none_or(|age| age >= ms(1_000)), "{age:?}");
+    }
+}
+
+/// The answer to a report of another source names no report of this end.
+#[test]
+fn another_sources_answer_is_no_round_trip() {
+    let mut line = Line::new(7);
+    let answer = line.answered();
+    let of_another = answer.weighed.map(|report| ReportOutcome {
+        source: 1,
+        ..report
+    });
+    line.arrive(&Telemetry {
+        weighed: of_another,
+        ..answer
+    });
+    assert!(!line.permits());
 }
 
 #[test]

@@ -109,7 +109,12 @@ impl Reader<'_> {
             None => Ok(Some(Serial {
                 path: path.clone(),
                 baud: *baud,
-                link_timeout_ms: self.ms("link_timeout_ms", 150)?,
+                link_timeout_ms: self.whole(
+                    "link_timeout_ms",
+                    150,
+                    "a whole number of milliseconds from 1 to 500",
+                    1..=500,
+                )?,
             })),
         }
     }

@@ -181,7 +181,7 @@ fn with_a_controller_only_settings_of_the_node_are_accepted() {
         ),
         (
             "--serial /dev/ttyS1 --ros-args -p link_timeout_ms:=0",
-            "from 1 to 60000",
+            "from 1 to 500",
         ),
         (
             "--serial /dev/ttyS1 --ros-args -p use_sim_time:=true",
