@@ -55,16 +55,19 @@ impl Sources {
 
     /// Returns a command of cargo or of maturin whose output does not depend on the folders. Its words follow.
     fn reproducible(&self, program: &Path) -> Result<Cmd> {
-        let home = std::env::var_os("CARGO_HOME")
-            .map(PathBuf::from)
-            .or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")));
-        let home = home.ok_or("neither CARGO_HOME nor HOME is set")?;
+        let home = cargo_home()?;
         // The last one that matches counts.
-        let flags = [
+        let mut flags = vec![
             format!("--remap-path-prefix={}=cargo", home.display()),
             format!("--remap-path-prefix={}=target", self.target.display()),
             format!("--remap-path-prefix={PLACE}=posegate"),
         ];
+        // The folder of a registry has the name of its host, which may be a mirror.
+        let registries = fs::read_dir(home.join("registry/src"));
+        for registry in registries.into_iter().flatten() {
+            let folder = registry?.path();
+            flags.push(format!("--remap-path-prefix={}=registry", folder.display()));
+        }
         Ok(cmd("unshare --map-root-user --mount sh -c")
             .arg(MOUNTED)
             .arg(PLACE)
@@ -88,6 +91,35 @@ impl Sources {
             .filter_map(|line| compiled(line).transpose())
             .collect()
     }
+}
+
+fn cargo_home() -> Result<PathBuf> {
+    std::env::var_os("CARGO_HOME")
+        .map(PathBuf::from)
+        .or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".cargo")))
+        .ok_or_else(|| "neither CARGO_HOME nor HOME is set".into())
+}
+
+/// Fails if a built file names this machine's folders, or the host of a registry.
+fn names_no_machine(sources: &Sources, files: &[(String, PathBuf)]) -> Result {
+    let own = [
+        cargo_home()?,
+        sources.folder.clone(),
+        sources.target.clone(),
+    ];
+    let own = own.iter().map(|path| path.display().to_string());
+    let words: Vec<String> = own.chain(["registry/src/".into()]).collect();
+    for (name, path) in files {
+        let bytes = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        if let Some(word) = words.iter().find(|word| contains(&bytes, word.as_bytes())) {
+            return Err(format!("{name} contains `{word}`: a path of this machine").into());
+        }
+    }
+    Ok(())
+}
+
+fn contains(bytes: &[u8], word: &[u8]) -> bool {
+    bytes.windows(word.len()).any(|part| part == word)
 }
 
 /// Returns the crate that a line of cargo's messages says is compiled.
@@ -136,10 +168,9 @@ pub fn programs(sources: &Sources) -> Result<Built> {
             sources.target.join(STATIC).join("release").join(name),
         )
     };
-    Ok(Built {
-        files: vec![file("posegate"), file("posegate-node")],
-        crates,
-    })
+    let files = vec![file("posegate"), file("posegate-node")];
+    names_no_machine(sources, &files)?;
+    Ok(Built { files, crates })
 }
 
 /// Builds the archive for C, for each core.
@@ -160,6 +191,7 @@ pub fn archives(sources: &Sources) -> Result<Built> {
             .run()?;
         files.push((core.to_owned(), small));
     }
+    names_no_machine(sources, &files)?;
     Ok(Built {
         files,
         crates: vec![("posegate-c", all)],
@@ -210,11 +242,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_path_in_a_file_is_found() {
+        assert!(contains(
+            b"\0/home/x/.cargo/registry/src/host/a.rs",
+            b"registry/src/"
+        ));
+        assert!(!contains(b"registry/a.rs", b"registry/src/"));
+        assert!(!contains(b"", b"x"));
+    }
+
+    #[test]
     fn crates_are_read_from_the_ids_of_packages() {
         let crate_of = |id| crate_of(id).unwrap();
         let expected = |name: &str, version: &str| (name.to_owned(), version.to_owned());
         assert_eq!(
-            crate_of("registry+https://github.com/rust-lang/crates.io-index#serde@1.0.1"),
+            crate_of("registry+https://registry.example/index#serde@1.0.1"),
             expected("serde", "1.0.1")
         );
         assert_eq!(
