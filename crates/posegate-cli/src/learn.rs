@@ -347,6 +347,18 @@ fn source(model: &InflationModel) -> Result<(), Failure> {
     print(&format_args!(
         "on the controller: inflation {own:.6}{}",
         ages.concat()
+    ))?;
+    match begins_late(model) {
+        Some(late) => print(&late),
+        None => Ok(()),
+    }
+}
+
+/// Returns why a model by age has no smaller factors for young estimates, if so.
+pub fn begins_late(model: &InflationModel) -> Option<String> {
+    let late = model.begins_late()?;
+    Some(format!(
+        "the data begin {late} s after a fix: only data from at most 0.064 s on give smaller factors by age"
     ))
 }
 

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// camera nor the contact has a bias: a camera that is turned makes every dock seem off.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn survey site.toml dockings.csv --json\n\nColumns: run (the docking), dock (the name of its task), tag, x_m, y_m, yaw_rad (world frame)."
+    after_help = "Example:\n  posegate learn survey site.toml dockings.csv --json\n\nColumns: run (the docking at its dock), dock (the name of its task), tag, x_m, y_m, yaw_rad (world frame)."
 )]
 pub struct Survey {
     /// The site file
@@ -100,8 +100,12 @@ fn tell(found: &[OffsetReport]) -> Result<(), crate::door::Failure> {
     for report in found {
         let name = named(report.kind, &report.name);
         let (Some(offset), Some(region)) = (report.offset, report.region) else {
+            let why = match report.offset {
+                None => "too few, 5 are needed",
+                Some(_) => "not tested: x, y and yaw do not scatter, each by itself",
+            };
             print(&format_args!(
-                "{name:<20} {:>5} dockings: too few, 5 are needed",
+                "{name:<20} {:>5} dockings: {why}",
                 report.dockings
             ))?;
             continue;

@@ -9,11 +9,16 @@ const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw
 /// Estimates at the dock that state deviations of 4 mm and 4 mrad: true within a second of a fix, ten times too small later. Each tenth row has an
 /// old fix.
 fn estimates(count: u32, seed: u64) -> String {
+    estimates_from(0.0, count, seed)
+}
+
+/// The same, each age larger by `youngest` seconds.
+fn estimates_from(youngest: f64, count: u32, seed: u64) -> String {
     let mut random = Random(seed);
     let mut text = format!("{HEADER}\n");
     for k in 0..count {
         let is_old = k % 10 == 9;
-        let since = if is_old { 5.0 } else { 0.0 } + random.even();
+        let since = youngest + if is_old { 5.0 } else { 0.0 } + random.even();
         let sigma = 0.004 * if is_old { 10.0 } else { 1.0 };
         let [x, y, yaw] = [0; 3].map(|_| sigma * random.normal());
         let t = 0.05 * f64::from(k);
@@ -96,4 +101,54 @@ fn replay_uses_the_factor_of_the_age() {
         let (code, _, err) = run(&folder, &format!("{line}{more}"));
         assert!(code == 2 && err.contains(message), "{more}: {err}");
     }
+}
+
+/// Rows from 2 s after a fix say nothing about fresh estimates.
+#[test]
+fn ages_younger_than_the_data_have_the_largest_factor() {
+    let folder = tempfile::tempdir().unwrap();
+    let site = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/sites/dock.toml"
+    );
+    write(&folder, "e.csv", &estimates_from(2.0, 6000, 3));
+    let (code, out, err) = run(&folder, "learn inflation e.csv --epsilon 0.99 -o m.toml");
+    assert_eq!(code, 0, "{err}");
+    assert!(
+        out.contains("the data begin 2 s after a fix") && !out.contains("up to"),
+        "{out}"
+    );
+    let (code, out, err) = run(
+        &folder,
+        "learn inflation e.csv --epsilon 0.99 -o m.toml --json",
+    );
+    assert_eq!(code, 0, "{err}");
+    let source = &lines(&out)[0]["source"];
+    assert_eq!(source["ages"], serde_json::json!([]));
+    assert!(source["inflation"].as_f64().unwrap() > 80.0, "{source}");
+
+    write(&folder, "fresh.csv", &estimates(500, 4));
+    let (code, out, err) = run(
+        &folder,
+        &format!("replay {site} fresh.csv --task dock --json --fast --inflation-model m.toml"),
+    );
+    assert!(code < 2, "{err}");
+    let told = lines(&out).pop().unwrap();
+    assert_eq!(told["rules"]["gate"]["permits"], 0, "{told}");
+    assert!(err.contains("the data begin 2 s after a fix"), "{err}");
+    const COVARIANCE: &str = "cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw";
+    let numbers = "1.6e-5,0,0,1.6e-5,0,1.6e-5";
+    // A prediction below the data is refused, not extrapolated.
+    write(
+        &folder,
+        "at.csv",
+        &format!("{COVARIANCE},since_fix_s\n{numbers},1.9\n{numbers},2.1\n"),
+    );
+    let (_, out, err) = run(&folder, "predict m.toml --at at.csv --json");
+    let told = lines(&out);
+    assert_eq!(told.len(), 2, "{out} {err}");
+    assert!(
+        told[0]["inflation"].is_null() && told[1]["inflation"].is_f64(),
+        "{out} {err}"
+    );
 }

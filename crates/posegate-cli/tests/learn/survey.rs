@@ -192,6 +192,29 @@ fn survey_from_the_command_line() {
         near("y_m", 0.025, 0.004) && near("yaw_deg", 3.6, 0.3),
         "{offset}"
     );
+    // A column that is the same in all dockings is no measurement.
+    let mut constant = "run,dock,tag,x_m,y_m,yaw_rad\n".to_owned();
+    for docking in 0..6 {
+        let off = 0.001 * f64::from(docking * docking % 5);
+        writeln!(
+            constant,
+            "{docking},dock,t7,0.1,{off},{}",
+            0.5 * off - 1e-4 * f64::from(docking)
+        )
+        .unwrap();
+    }
+    write(&folder, "constant.csv", &constant);
+    let (code, out, err) = run(&folder, &format!("learn survey {site} constant.csv"));
+    assert!(
+        code == 0 && out.matches("do not scatter").count() == 2 && !out.contains("re-survey"),
+        "{out} {err}"
+    );
+    let (_, out, _) = run(&folder, &format!("learn survey {site} constant.csv --json"));
+    let told = &lines(&out)[0]["docks"][0];
+    assert!(
+        told["region"].is_null() && told["resurvey"] == false,
+        "{told}"
+    );
     let good = rows(0.0);
     for (from, to, place) in [
         ("3,dock,t7", "3,doc,t7", "bad.csv:5:2"),

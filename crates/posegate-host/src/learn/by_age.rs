@@ -5,6 +5,8 @@ use posegate::set::{Aging, Inflation, MOST_AGES};
 
 /// The unit of an age on the controller, milliseconds.
 const UNIT_MS: f64 = 64.0;
+/// The largest factor of a step in its units of 2^-6.
+const LARGEST: u32 = 65_535;
 
 /// The settings of a controller's source.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,25 +37,41 @@ pub fn by_age_json(by_age: &ByAge) -> serde_json::Value {
 }
 
 impl InflationModel {
+    /// Returns `true` if the conditions are times since the last fix: a column `since_..._s`.
+    fn is_by_age(&self) -> bool {
+        self.condition().starts_with("since_") && self.condition().ends_with("_s")
+    }
+
+    /// Returns the time since the last fix at which the data begin, seconds, if that is too late for steps: above 64 ms. A step has no lower
+    /// end, so its factor would apply to younger estimates too, of which the data tell nothing. `None` if the conditions are not times since
+    /// the last fix, or if there is only one.
+    #[must_use]
+    pub fn begins_late(&self) -> Option<f64> {
+        let youngest = self.parts().first()?.from;
+        let is_late = self.is_by_age() && self.parts().len() > 1 && youngest * 1000.0 > UNIT_MS;
+        is_late.then_some(youngest)
+    }
+
     /// Returns the factors for a controller. Each is at least that of [`InflationModel::inflation`] at every time since the last fix that
     /// the data have, and none falls with the time. There are no steps if the conditions are not times since the last fix (a column
-    /// `since_..._s`). With more conditions than steps, the one whose factor is nearest to that of the next is left out. `None` if a condition
-    /// has no factor.
+    /// `since_..._s`), or if the data begin later than 64 ms after a fix ([`InflationModel::begins_late`]). Ages below the data are then at most
+    /// one unit of the controller, which does not tell them apart. Factors above 1023.98 have no step, since a step cannot state them. With
+    /// more conditions than steps, the one whose factor is nearest to that of the next is left out. `None` if a condition has no factor.
     #[must_use]
     pub fn by_age(&self) -> Option<ByAge> {
         let largest = self.inflation(None)?;
         let inflation = Inflation::new(largest)?;
-        let condition = self.condition();
         let mut steps: Vec<(u32, Inflation)> = Vec::new();
-        if condition.starts_with("since_") && condition.ends_with("_s") {
+        if self.is_by_age() && self.begins_late().is_none() {
             let mut most = 1.0f64;
             for part in self.parts() {
                 most = most.max(part.inflation);
                 // On a border the next condition's factor counts too, so the step ends before it.
                 let units = libm::ceil(part.to * 1000.0 / UNIT_MS) - 1.0;
                 let factor = Inflation::new(most)?;
-                // Rounded up to 2^-6, it must still be less than the source's own.
-                let is_smaller = (factor.q16().div_ceil(1 << 10)) << 10 < inflation.q16();
+                // Rounded up to 2^-6, it must be one that a step can have, and still be less than the source's own.
+                let rounded = factor.q16().div_ceil(1 << 10);
+                let is_smaller = rounded <= LARGEST && rounded << 10 < inflation.q16();
                 if !((1.0..65_536.0).contains(&units) && is_smaller) {
                     continue;
                 }
@@ -130,6 +148,18 @@ mod tests {
             &[(0.1, 9.0), (5.0, 1.0)],
             &[(0.0, 1.0), (1.0, 4.0), (2.0, 3.0), (40.0, 20.0)],
             &[(0.01, 2.0), (0.02, 4.0), (0.03, 9.0)],
+            &[(0.06, 1.0), (5.0, 9.0)],
+            &[(0.06, 9.0), (5.0, 1.0)],
+            &[(0.07, 1.0), (5.0, 9.0)],
+            &[(2.0, 1.0), (20.0, 9.0), (60.0, 9.0)],
+            &[
+                (0.0, 1.0),
+                (1.0, 2.0),
+                (2.0, 3.0),
+                (4.0, 4.5),
+                (8.0, 9.0),
+                (5000.0, 30.0),
+            ],
             &[
                 (0.5, 1.0),
                 (1.0, 2.0),
@@ -141,14 +171,23 @@ mod tests {
         ] {
             let model = model(conditions, "since_fix_s");
             let by_age = model.by_age().unwrap();
-            let last = conditions.last().unwrap().0;
+            let (first, last) = (conditions[0].0, conditions.last().unwrap().0);
+            // An age below one unit is not told apart from one unit.
+            let unit = UNIT_MS / 1000.0;
+            assert_eq!(model.parts()[0].from, first);
             let ages = (0..2000)
                 .map(|k| 0.005 * f64::from(k))
                 .chain([64.0, 4194.0]);
             let borders = model.parts().iter().flat_map(|part| [part.from, part.to]);
             let mut before = (0.0, 0.0);
             for age in ages.filter(|age| *age <= last).chain(borders) {
-                let (used, learnt) = (at(&by_age, age), model.inflation(Some(age)).unwrap());
+                let used = at(&by_age, age);
+                // No row supports a smaller factor than the largest below the data.
+                let learnt = match model.inflation(Some(age)) {
+                    Some(learnt) => learnt,
+                    None if first <= unit => at(&by_age, unit),
+                    None => at(&by_age, 1e6),
+                };
                 assert!(used >= learnt, "{age} s: {used} {learnt} {conditions:?}");
                 assert!(age < before.0 || used >= before.1, "{age} s: falls");
                 before = (age, used);
@@ -157,9 +196,47 @@ mod tests {
         }
     }
 
+    /// A model of these ages, with exactly these factors.
+    fn stated(ages: &[f64], factors: &[f64]) -> InflationModel {
+        let conditions: Vec<(f64, f64)> = ages.iter().map(|age| (*age, 1.0)).collect();
+        let text = model(&conditions, "since_fix_s").write().unwrap();
+        let mut values = [factors[factors.len() - 1]]
+            .into_iter()
+            .chain(factors.iter().copied());
+        let lines = text
+            .lines()
+            .map(|line| match line.starts_with("inflation = ") {
+                true => format!("inflation = {:?}\n", values.next().unwrap()),
+                false => format!("{line}\n"),
+            });
+        let text: String = lines.collect();
+        assert_eq!(values.next(), None, "{text}");
+        InflationModel::parse(&text, "stated.toml").unwrap()
+    }
+
+    #[test]
+    fn factors_too_large_for_a_step_are_left_out() {
+        const MOST: f64 = 65_535.0 / 64.0;
+        for (factors, steps) in [
+            (&[1500.0, 3000.0][..], &[][..]),
+            (&[2.0, 1500.0, 3000.0], &[2.0]),
+            (&[2.0, MOST, 3000.0], &[2.0, MOST]),
+            (&[2.0, MOST + 1e-6, 3000.0], &[2.0]),
+            (&[MOST + 1e-6, 2.0, 4096.0], &[]),
+        ] {
+            let ages: Vec<f64> = (0..factors.len()).map(|k| k as f64).collect();
+            let by_age = stated(&ages, factors).by_age();
+            let by_age = by_age.unwrap_or_else(|| panic!("{factors:?}: no settings"));
+            let found: Vec<f64> = by_age.steps().map(|step| step.1).collect();
+            assert_eq!(found, steps, "{factors:?}");
+            let largest = factors.iter().copied().fold(0.0, f64::max);
+            assert_eq!(at(&by_age, 1e6), largest);
+        }
+    }
+
     #[test]
     fn a_fresh_estimate_has_a_smaller_factor() {
-        let by_age = model(&[(0.2, 1.0), (10.0, 9.0)], "since_fix_s").by_age();
+        let by_age = model(&[(0.05, 1.0), (10.0, 9.0)], "since_fix_s").by_age();
         let by_age = by_age.unwrap();
         assert!(at(&by_age, 0.2) < 1.5 && at(&by_age, 9.0) > 8.0);
         // The size of a covariance is no age.

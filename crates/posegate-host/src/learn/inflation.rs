@@ -191,10 +191,6 @@ pub fn learn_inflation(
         if last - first <= ALIKE * size {
             ends = std::vec![first - ALIKE * size, last + ALIKE * size];
         }
-        // An estimate closer to the last fix than any row is better known, not worse.
-        if estimates.condition != LOG_DET && ends[0] > 0.0 {
-            ends[0] = 0.0;
-        }
         part = ends.windows(2).map(|pair| of(pair[0], pair[1])).collect();
         let enough = |part: &InflationReport| {
             let rows = part.independent_rows as f64 >= ROOMY * fewest;

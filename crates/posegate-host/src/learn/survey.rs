@@ -3,11 +3,17 @@
 use super::LearnError;
 use super::fisher::fisher_quantile;
 use super::sheet::Sheet;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Cholesky, Const, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
 /// The fewest dockings from which an offset and its region follow.
 const FEWEST: usize = 5;
+/// Offsets whose deviation is less than this share of their mean and [`SMALL`] do not scatter: what is left is rounding.
+const SCATTER: f64 = 1e-9;
+/// A length (m) and an angle (rad) that is small for any mean.
+const SMALL: f64 = 1e-3;
+/// Offsets follow from each other if what is left of a variance is less than this share of it.
+const LEFT: f64 = 1e-9;
 
 /// What a site file says: the goals of its docks, by the name of the task, and the places of its tags.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,7 +27,7 @@ pub struct SurveyedSite {
 /// A robot in contact with a dock, localized by one tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// The docking: rows of one docking depend on each other.
+    /// The docking among those at its dock: rows of one docking depend on each other.
     pub run: String,
     /// The name of the dock's task.
     pub dock: String,
@@ -51,7 +57,8 @@ pub struct OffsetReport {
     pub dockings: u64,
     /// The true place minus that of the site file: x, y (m, world axes), yaw (rad). `None` if there are too few dockings.
     pub offset: Option<[f64; 3]>,
-    /// Half the extent of the confidence region of the offset along each of x, y and yaw.
+    /// Half the extent of the confidence region of the offset along each of x, y and yaw. `None` if there are too few dockings, or if their
+    /// offsets do not scatter in x, y and yaw, each by itself: such numbers are no measurements, and the offset is not tested.
     pub region: Option<[f64; 3]>,
     /// Hotelling's statistic of the offset over the limit beyond which it is significant; above 1 if it is.
     pub significance: f64,
@@ -61,7 +68,7 @@ pub struct OffsetReport {
     pub or: Vec<(Surveyed, String)>,
 }
 
-/// Reads looks: `run` (the docking), `dock` (the name of its task), `tag`, and `x_m, y_m, yaw_rad`, the robot's pose at contact as it
+/// Reads looks: `run` (the docking; those at another dock are others, even of the same name), `dock` (the name of its task), `tag`, and `x_m, y_m, yaw_rad`, the robot's pose at contact as it
 /// follows from a look at that tag.
 ///
 /// # Errors
@@ -154,7 +161,7 @@ pub fn survey(
         };
         // Those of the same looks have the same statistic: nothing tells them apart.
         let same = |report: &&OffsetReport| {
-            report.name != best.name
+            (report.kind, &report.name) != (best.kind, &best.name)
                 && mates(
                     &residuals,
                     (best.kind, &best.name),
@@ -262,7 +269,7 @@ fn mates(residuals: &[Residual], a: (Surveyed, &str), b: (Surveyed, &str)) -> bo
 
 fn report(residuals: &[Residual], kind: Surveyed, name: &str, level: f64) -> OffsetReport {
     // One observation per docking.
-    let mut runs: BTreeMap<&str, (Vector3<f64>, f64)> = BTreeMap::new();
+    let mut runs: BTreeMap<(&str, &str), (Vector3<f64>, f64)> = BTreeMap::new();
     for residual in residuals
         .iter()
         .filter(|residual| residual.is_of(kind, name))
@@ -271,7 +278,7 @@ fn report(residuals: &[Residual], kind: Surveyed, name: &str, level: f64) -> Off
             Surveyed::Dock => residual.difference,
             Surveyed::Tag => residual.of_tag(),
         };
-        let sum = runs.entry(&residual.run).or_default();
+        let sum = runs.entry((&residual.dock, &residual.run)).or_default();
         *sum = (sum.0 + offset, sum.1 + 1.0);
     }
     let offsets: Vec<Vector3<f64>> = runs.values().map(|(sum, count)| sum / *count).collect();
@@ -298,12 +305,24 @@ fn report(residuals: &[Residual], kind: Surveyed, name: &str, level: f64) -> Off
     let covariance = scatter / (n - 1.0);
     let limit = 3.0 * (n - 1.0) / (n - 3.0) * fisher_quantile(level, 3.0, n - 3.0);
     report.offset = Some([mean.x, mean.y, mean.z]);
-    report.region = Some([0, 1, 2].map(|k| libm::sqrt(limit * covariance[(k, k)] / n)));
     // Looks without scatter are no sample; they tell nothing.
-    if let Some(factor) = covariance.cholesky() {
+    if let Some(factor) = scattered(mean, covariance) {
+        report.region = Some([0, 1, 2].map(|k| libm::sqrt(limit * covariance[(k, k)] / n)));
         report.significance = n * mean.dot(&factor.solve(&mean)) / limit;
     }
     report
+}
+
+/// Returns the factor of a covariance. `None` if a coordinate does not scatter, or follows from the ones before it.
+fn scattered(mean: Vector3<f64>, covariance: Matrix3<f64>) -> Option<Cholesky<f64, Const<3>>> {
+    let factor = covariance.cholesky()?;
+    let lower = factor.l_dirty();
+    let scatters = |k: usize| {
+        let (variance, pivot) = (covariance[(k, k)], lower[(k, k)] * lower[(k, k)]);
+        let least = SCATTER * (mean[k].abs() + SMALL);
+        variance >= least * least && pivot >= LEFT * variance
+    };
+    (0..3).all(scatters).then_some(factor)
 }
 
 /// Takes the effect of an offset off the looks.
@@ -348,6 +367,107 @@ mod tests {
         assert!(
             (effect - Vector3::new(0.0, 0.02, -0.01)).norm() < 1e-12,
             "{effect}"
+        );
+    }
+
+    /// A site in which each name is a dock and a tag.
+    fn site(names: &[&str]) -> SurveyedSite {
+        SurveyedSite {
+            docks: names
+                .iter()
+                .map(|name| ((*name).into(), [0.0; 3]))
+                .collect(),
+            tags: names
+                .iter()
+                .map(|name| ((*name).into(), [1.0, 0.5]))
+                .collect(),
+        }
+    }
+
+    /// Dockings at a dock by a tag, numbered from 0, each off by what `pose` makes of three numbers around 0.
+    fn dockings(
+        dock: &str,
+        tag: &str,
+        count: u64,
+        pose: impl Fn([f64; 3]) -> [f64; 3],
+    ) -> Vec<Look> {
+        let mut random = 7u64;
+        let mut number = || {
+            random = crate::learn::split::mixed(random);
+            (random >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let look = |docking: u64| Look {
+            run: docking.to_string(),
+            dock: dock.into(),
+            tag: tag.into(),
+            pose: pose([number(), number(), number()]),
+        };
+        (0..count).map(look).collect()
+    }
+
+    #[test]
+    fn looks_without_scatter_tell_nothing() {
+        let site = site(&["a"]);
+        for count in 5..20 {
+            for value in [0.0, 1e-3, 0.0123, 0.1, 0.3, -2.7, 1000.1] {
+                let constant = |_: [f64; 3]| [value; 3];
+                let in_x = |[_, y, yaw]: [f64; 3]| [value, 0.01 * y, 0.01 * yaw];
+                let in_yaw = |[x, y, _]: [f64; 3]| [0.01 * x, 0.01 * y, value];
+                let following =
+                    |[x, y, _]: [f64; 3]| [0.01 * x, 0.01 * y, 0.3 * x + 0.2 * y + value];
+                for looks in [
+                    dockings("a", "a", count, constant),
+                    dockings("a", "a", count, in_x),
+                    dockings("a", "a", count, in_yaw),
+                    dockings("a", "a", count, following),
+                ] {
+                    for report in survey(&looks, &site, 0.99).unwrap() {
+                        let told = (report.significance, report.stale, report.region);
+                        assert_eq!(told, (0.0, false, None), "{count} of {value}: {report:?}");
+                        assert!(report.offset.is_some());
+                    }
+                }
+            }
+        }
+        // A thousandth of a millimetre is a scatter.
+        let looks = dockings("a", "a", 6, |numbers| {
+            numbers.map(|number| 0.02 + 1e-6 * number)
+        });
+        let found = survey(&looks, &site, 0.99).unwrap();
+        assert!(found.iter().any(|report| report.stale), "{found:?}");
+        assert!(found.iter().all(|report| report.region.is_some()));
+    }
+
+    #[test]
+    fn a_dock_and_a_tag_of_one_name_are_named_together() {
+        let looks = dockings("a", "a", 12, |numbers| {
+            numbers.map(|number| 0.03 + 0.01 * number)
+        });
+        let found = survey(&looks, &site(&["a"]), 0.99).unwrap();
+        let stale: Vec<&OffsetReport> = found.iter().filter(|report| report.stale).collect();
+        assert_eq!(stale.len(), 1);
+        assert_eq!(stale[0].kind, Surveyed::Dock);
+        assert_eq!(stale[0].or, [(Surveyed::Tag, "a".to_owned())]);
+    }
+
+    #[test]
+    fn dockings_numbered_anew_at_each_dock_are_told_apart() {
+        let small = |numbers: [f64; 3]| numbers.map(|number| 0.01 * number);
+        let mut looks = dockings("a", "b", 6, small);
+        looks.extend(dockings("b", "b", 7, small));
+        // Two looks of one docking are one.
+        looks.extend(dockings("b", "b", 3, small));
+        let found = survey(&looks, &site(&["a", "b"]), 0.99).unwrap();
+        let counted = found
+            .iter()
+            .map(|report| (report.kind, report.name.as_str(), report.dockings));
+        assert_eq!(
+            counted.collect::<Vec<_>>(),
+            [
+                (Surveyed::Dock, "a", 6),
+                (Surveyed::Dock, "b", 7),
+                (Surveyed::Tag, "b", 13)
+            ]
         );
     }
 }
