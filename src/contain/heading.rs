@@ -958,7 +958,7 @@ impl Section {
         } else {
             0
         };
-        // Two coordinates within 1.6 of a and of b, the quotient, and two products.
+        // a and b are within 5.6, the error of the heading included; the quotient and two products within 3.
         Reach {
             n: p.wrapping_add(off).wrapping_add(still).wrapping_add(9),
             tilt: of_slope(width.leaning),
