@@ -8,9 +8,10 @@ use crate::shell::{Result, cmd};
 use std::path::Path;
 
 /// Sample files that the pages name.
-const SAMPLES: [&str; 6] = [
+const SAMPLES: [&str; 7] = [
     "tests/data/estimates.csv",
     "tests/data/apriltag_errors_sample.csv",
+    "tests/data/dockings.csv",
     "examples/sites/loading-bay.toml",
     "examples/sites/paper-chain.toml",
     "examples/sites/docks.toml",
