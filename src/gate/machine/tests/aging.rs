@@ -154,3 +154,26 @@ fn a_changed_table_of_ages_is_found() {
     let damaged = State::Latched(Reason::MemoryDamaged);
     assert_eq!(gate.tick(1020).state, damaged);
 }
+
+/// Without an age the examination, too, uses the source's own factor.
+#[test]
+fn an_examination_without_an_age_is_that_of_the_source() {
+    let see_t7 = Table::parse(SEE_T7).unwrap();
+    let sources = [aged()];
+    let settings = Settings {
+        sources: &sources,
+        ..settings(&see_t7, 1)
+    };
+    let gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    let permits = |y_m: f64, since_fix_ms| {
+        let report = report(1, y_m);
+        let evidence = Evidence {
+            since_fix_ms,
+            ..Evidence::of(&report)
+        };
+        matches!(gate.examine_on(&evidence).1, Verdict::Permit { .. })
+    };
+    let differs = |y_m: &f64| permits(*y_m, Some(0)) && !permits(*y_m, None);
+    let places = (0..200).map(|k| 0.01 * f64::from(k));
+    assert!(places.filter(differs).count() > 10);
+}
