@@ -939,12 +939,12 @@ impl Section {
             };
         }
         // Squares of lengths below 2^29.2.
-        let (still_square, turned_square) = (squares(a2, a3), squares(b2, b3));
-        let grown = turned_square.saturating_sub(still_square);
+        let (along_square, ahead_square) = (squares(a2, a3), squares(b2, b3));
+        let grown = ahead_square.saturating_sub(along_square);
         let grown = (grown >> 28)
             .wrapping_add(1)
             .wrapping_mul(width.sine_square.unsigned_abs().into());
-        let p = sqrt_ceil(still_square.wrapping_add(grown)).max(16);
+        let p = sqrt_ceil(along_square.wrapping_add(grown)).max(16);
         let slope = slope(a2.wrapping_mul(b2).wrapping_add(a3.wrapping_mul(b3)), p);
         let of_slope = |part: i32| slope.wrapping_mul(i64::from(part)) >> 28;
         let off = (slope

@@ -79,7 +79,7 @@ mod tests {
         (0..fleets).filter(excludes).count() as u64
     }
 
-    /// The limits beside the test are looked at after every docking.
+    /// The limits beside the test are evaluated after every docking.
     #[test]
     fn truth_is_inside_at_every_look_except_in_a_share_of_alpha() {
         for truth in [0.99, 0.9, 0.5] {

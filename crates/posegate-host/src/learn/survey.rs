@@ -159,7 +159,7 @@ pub fn survey(
             }
             break;
         };
-        // Those of the same looks have the same statistic: nothing tells them apart.
+        // Docks and tags of the same looks have the same statistic and cannot be distinguished.
         let same = |report: &&OffsetReport| {
             (report.kind, &report.name) != (best.kind, &best.name)
                 && mates(
