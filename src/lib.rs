@@ -25,11 +25,12 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
+//! | `cells`, `headings`, `sight`, `unions` (on by default) | decisions on the cells of a table; on facets that turn, heading by heading; what the camera sees; pose-sets that only several pieces contain together. Without one, firmware is smaller and the gate denies more, never less (`./ci.sh flash`) |
 //! | `std` | lookup tables on a PC: success sets (`shape`), tables (`bake`) and their proofs (`verify`) |
 //! | `defmt` | `defmt::Format` on every public type of the core |
 //! | `firmware` | nothing for users: the project's own Cortex-M examples |
 //!
-//! Without features this is the core for a motion controller: `no_std`, no heap, no float on the decision path.
+//! Without `std` this is the core for a motion controller: `no_std`, no heap, no float on the decision path.
 //!
 //! Related packages: `posegate-host` (site files, plans, placement of tags, learning, replay), `posegate-cli` (the program
 //! `posegate`) and `posegate-c` (the C boundary, `include/posegate.h`).
@@ -64,6 +65,8 @@ pub(crate) const fn test_iterations(all: u32, interpreted: u32) -> u32 {
 }
 
 mod messages;
+
+mod parts;
 
 pub mod num;
 

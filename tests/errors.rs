@@ -48,6 +48,7 @@ fn errors() -> Vec<(&'static str, Vec<Box<dyn Error>>)> {
                 TableError::Grid,
                 TableError::Facets,
                 TableError::Sight,
+                TableError::NoCells,
             ]),
         ),
         (

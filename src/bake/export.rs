@@ -34,7 +34,7 @@ pub fn source(table: &Table<'_>, language: Language) -> String {
 }
 
 /// Returns the table's origin, one line per fact.
-fn facts(table: &Table<'_>) -> [String; 5] {
+fn facts(table: &Table<'_>) -> [String; 6] {
     let digest: String = table
         .site_digest()
         .iter()
@@ -58,6 +58,10 @@ fn facts(table: &Table<'_>) -> [String; 5] {
             worst.instructions_m4f(),
             worst.instructions_m0_plus()
         ),
+        match table.parts().as_slice() {
+            [] => "It needs none of the crate's optional features.".to_owned(),
+            parts => format!("It needs the crate's features {}.", parts.join(", ")),
+        },
     ]
 }
 

@@ -34,6 +34,7 @@ use super::heading::{self, Sweep};
 use super::nearest::{DecisionObserver, Nearest, NoObserver, ONE_Q10};
 use super::union;
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
+use crate::parts;
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet, Turn};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
@@ -110,7 +111,8 @@ fn plainly(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
 /// Step 4: for sets that turn.
 #[inline(never)]
 fn at_its_headings(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    facets.lever() != 0
+    parts::HEADINGS
+        && facets.lever() != 0
         && Sweep::of(facets, set, goal).is_some_and(|sweep| sweep.is_held(facets, set, goal))
 }
 

@@ -50,6 +50,7 @@
 //! the table has cells, these poses are looked up there. Both are spot checks, not proofs. How much they wrongly accept is
 //! measured.
 
+use crate::parts;
 use crate::report::PoseEstimate;
 use crate::set::{Growth, Trust};
 
@@ -110,6 +111,9 @@ fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth
     let by_planes = layout(table, 76).and_then(|planes| planes::hold(table, planes, &question));
     if by_planes == Some(true) {
         return Some(true);
+    }
+    if !parts::CELLS {
+        return None;
     }
     spots::hold(table, layout(table, 68)?, &question)
 }

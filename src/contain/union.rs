@@ -26,6 +26,7 @@
 use super::facets::in_arc;
 use super::heading::{Root, Section, Slab, Sweep, Width};
 use crate::num::{product, sqrt_ceil};
+use crate::parts;
 use crate::pose::Pose;
 use crate::set::PoseSet;
 use crate::table::{Axes, Facet, Facets, MOST_UNION_SLABS, Piece};
@@ -87,6 +88,9 @@ pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
 /// Whether the pieces together contain the set, or the offset of a pose for which none was found. `None` if that is no question for a
 /// search: the layout has one piece, or the set is far too wide.
 fn search(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Result<(), [i64; 3]>> {
+    if !parts::UNIONS {
+        return None;
+    }
     facets.pieces().nth(1)?;
     let sweep = Sweep::of(facets, set, goal).filter(|sweep| sweep.yaw <= 1 << 24)?;
     let sweep = sweep.with_disc();

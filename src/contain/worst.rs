@@ -2,6 +2,7 @@
 
 use super::{GoalFramePoseSet, Margin, union};
 use crate::num::{BinaryAngle, sqrt_ceil};
+use crate::parts;
 use crate::pose::Pose;
 use crate::set::Extent;
 use crate::table::Table;
@@ -36,7 +37,7 @@ impl GoalFramePoseSet<'_> {
         let first = self.witness_pose(table, high);
         let pieces = table
             .facets()
-            .filter(|layout| layout.pieces().nth(1).is_some());
+            .filter(|layout| parts::UNIONS && layout.pieces().nth(1).is_some());
         let Some(layout) = pieces.filter(|_| table.grid().is_none()) else {
             return first;
         };

@@ -54,8 +54,8 @@ impl Aging {
             *word = u32::from(factor) << 16 | u32::from(age);
         }
         let aging = Self::of(words);
-        let used = words.iter().filter(|word| **word != 0).count();
-        (used == steps.len() && aging.is_valid()).then_some(aging)
+        let are_used = words.iter().take(steps.len()).all(|word| *word != 0);
+        (are_used && aging.is_valid()).then_some(aging)
     }
 
     /// Returns factors by age from words, as [`Aging::words`] returns them. `None` if they are not valid.

@@ -54,9 +54,11 @@
 //! `[lo + i step, lo + (i + 1) step]`; the same applies to rows along y. See [`Grid`] for the layout.
 
 use crate::num::{BinaryAngle, Divisor, clamped};
+use crate::parts;
 use crate::pose::{GoalFrame, Pose};
 use crate::set::RadiusSquared;
 
+pub use self::checksum::{checksum, checksum_continued};
 pub use self::facets::{
     Axes, Facet, Facets, Frame, LARGEST_UNIT, LONGEST_LEVER, NORMAL_BITS, Piece,
 };
@@ -69,6 +71,7 @@ pub use self::worst::WorstCase;
 pub(crate) use self::worst::{MOST_SLABS, MOST_UNION_SLABS};
 
 mod bytes;
+mod checksum;
 mod facets;
 mod grid;
 mod sight;
@@ -88,25 +91,6 @@ const SITE_DIGEST_AT: usize = 96;
 pub const CRC_LENGTH: usize = 4;
 /// Largest distance of a cell from the goal on an axis, micrometres (2^27, 134 m).
 pub const LARGEST_REACH_UM: i32 = 1 << 27;
-
-/// CRC-32C detects every error of one, two or three bits, and of any odd number of bits, in up to 2^31 bits.
-const CRC_32C: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
-
-/// Returns the checksum of a table: the CRC-32C of the bytes.
-#[must_use]
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CRC_32C.checksum(bytes)
-}
-
-/// Continues a checksum: returns the checksum of data whose first part has the checksum `so_far` and whose rest is
-/// `bytes`, for a long check in short steps. The checksum of no bytes is 0.
-#[must_use]
-pub fn checksum_continued(so_far: u32, bytes: &[u8]) -> u32 {
-    // A checksum is the inverted register. The crate takes the initial register value bit-reversed.
-    let mut digest = CRC_32C.digest_with_initial((!so_far).reverse_bits());
-    digest.update(bytes);
-    digest.finalize()
-}
 
 /// Returns the checksum in the last four bytes of a table, read from memory at each call; 0 if there are fewer than
 /// four bytes.
@@ -165,6 +149,8 @@ pub enum TableError {
     Facets,
     /// A number of the sight record is out of its range.
     Sight,
+    /// The table has cells and no facets, and this build has no cells: feature `cells`.
+    NoCells,
 }
 
 crate::messages::messages!(TableError {
@@ -177,6 +163,7 @@ crate::messages::messages!(TableError {
     Grid => "the grid's directory or its runs are out of range",
     Facets => "the facets' counts do not add up, or an arc, a frame or a facet is out of range",
     Sight => "a number of the sight record is out of its range",
+    NoCells => "the table has cells and no facets, and this program is built without the feature `cells`",
 });
 
 /// The cells of a table: their position and number.
@@ -373,6 +360,10 @@ impl<'a> Table<'a> {
         if grid.is_none() && facets.is_none() {
             return None;
         }
+        if !parts::CELLS && facets.is_none() {
+            return Some(Err(TableError::NoCells));
+        }
+        let grid = grid.filter(|_| parts::CELLS);
         let grid = match grid.map(|bytes| Grid::parse(bytes, &cells)) {
             None => None,
             Some(Some(grid)) => Some(grid),
@@ -383,6 +374,7 @@ impl<'a> Table<'a> {
             Some(Some(facets)) => Some(facets),
             Some(None) => return Some(Err(TableError::Facets)),
         };
+        let sight = sight.filter(|_| parts::SIGHT);
         let sight = match sight.map(sight::checked) {
             None => None,
             Some(Some(words)) => Some(words),
@@ -460,13 +452,37 @@ impl<'a> Table<'a> {
         self.facets.as_ref()
     }
 
-    /// Returns the grid layout, if there is one.
+    /// Returns the features of this crate that firmware needs to decide on all of this table, in alphabetical order. Without one
+    /// the gate denies more, or refuses the table.
+    #[cfg(feature = "std")]
     #[must_use]
-    pub const fn grid(&self) -> Option<&Grid<'a>> {
-        self.grid.as_ref()
+    pub fn parts(&self) -> Vec<&'static str> {
+        let facets = self.facets();
+        let needed = [
+            ("cells", self.grid().is_some()),
+            ("headings", facets.is_some_and(|layout| layout.lever() != 0)),
+            ("sight", self.sight.is_some()),
+            (
+                "unions",
+                facets.is_some_and(|layout| layout.pieces().nth(1).is_some()),
+            ),
+        ];
+        let names = needed.into_iter().filter(|(_, is_needed)| *is_needed);
+        names.map(|(name, _)| name).collect()
     }
 
-    /// Returns the camera and the tag of a visibility set, if the table contains them.
+    /// Returns the grid layout, if there is one and this build has the feature `cells`.
+    #[must_use]
+    pub const fn grid(&self) -> Option<&Grid<'a>> {
+        // A constant `None` lets the compiler drop all that only cells need.
+        if parts::CELLS {
+            self.grid.as_ref()
+        } else {
+            None
+        }
+    }
+
+    /// Returns the camera and the tag of a visibility set, if the table contains them and this build has the feature `sight`.
     #[must_use]
     pub fn sight_record(&self) -> Option<SightRecord> {
         self.sight.map(SightRecord::of_words)
@@ -496,24 +512,6 @@ pub(crate) mod tests {
     pub(crate) use super::grid::tests::Rows;
     use super::grid::tests::layout;
     use super::*;
-
-    /// Published check values of CRC-32/ISCSI (RFC 3720, B.4, and the usual "123456789").
-    #[test]
-    fn the_checksum_is_crc_32c() {
-        assert_eq!(checksum(b"123456789"), 0xe306_9283);
-        assert_eq!(checksum(&[0; 32]), 0x8a91_36aa);
-        assert_eq!(checksum(&[0xff; 32]), 0x62a8_ab43);
-    }
-
-    #[test]
-    fn a_checksum_goes_on() {
-        let bytes: Vec<u8> = (0..200u8).map(|v| v.wrapping_mul(37)).collect();
-        for at in 0..=bytes.len() {
-            let (first, rest) = bytes.split_at(at);
-            assert_eq!(checksum_continued(checksum(first), rest), checksum(&bytes));
-        }
-        assert_eq!(checksum(&[]), 0);
-    }
 
     #[test]
     fn slabs_share_their_edges() {

@@ -8,6 +8,7 @@ pub mod dist;
 pub mod docs;
 pub mod faults;
 pub mod figures;
+pub mod flash;
 pub mod fuzz;
 pub mod lint;
 pub mod mcap;

@@ -244,8 +244,14 @@ const JOBS: &[Job] = &[
     job(
         "flash",
         "",
-        "bytes of code that a decision takes",
-        jobs::budgets::flash,
+        "bytes of flash of a whole gate in C, by part, core and level of optimization, and of a decision",
+        jobs::flash::flash,
+    ),
+    job(
+        "parts",
+        "",
+        "a gate without some of its parts denies more and never less",
+        jobs::flash::parts,
     ),
     job(
         "replay_speed",
@@ -328,6 +334,7 @@ const ALL: &[&str] = &[
     "faults 21",
     "vectors",
     "c",
+    "parts",
     "budgets",
     "adversarial 1000000 1 grid",
     "adversarial 1000000 1 facets",

@@ -69,6 +69,7 @@ fn the_whole_road() {
         (&"dock".into(), &0.99.into())
     );
     assert_eq!(info["site_digest"], built["site_digest"]);
+    assert_eq!(info["parts"], serde_json::json!(["cells"]));
     // The table's own bound on the instructions of a decision.
     let bytes = std::fs::read(folder.path().join("dock.posegate")).unwrap();
     let worst = posegate::table::Table::parse(&bytes).unwrap().worst_case();
@@ -94,6 +95,7 @@ fn the_whole_road() {
     let info: serde_json::Value = serde_json::from_str(&out).unwrap();
     let sight = &info["sight"];
     assert_eq!((&sight["tag"], &sight["d_max"]), (&7.into(), &5.5.into()));
+    assert_eq!(info["parts"], serde_json::json!(["headings", "sight"]));
     assert_eq!(sight["tag_position"], serde_json::json!([4.0, 0.0, 0.5]));
     assert_eq!(sight["camera"]["fx"], 615.0);
     assert!((sight["phi_max_deg"].as_f64().unwrap() - 25.0).abs() < 1e-6);
@@ -471,6 +473,7 @@ fn exported_arrays_hold_the_bytes() {
         let worst = posegate::table::Table::parse(&bytes).unwrap().worst_case();
         let bound = format!("at most {} instructions", worst.instructions_m4f());
         assert!(text.contains(&bound), "{text}");
+        assert!(text.contains("headings, sight"), "{text}");
     }
 }
 

@@ -13,6 +13,7 @@ use super::believed::{Ellipsoid, Question};
 use super::bits::{Short, quotient, short_by, wide, word16, word32};
 use super::spots::{FINER, outermost_hold};
 use super::turn::cosine_and_sine;
+use crate::parts;
 use crate::set::Uncertainty;
 
 const HEAD: usize = 12;
@@ -525,7 +526,7 @@ pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Opti
     if in_one(table, &layout, question) == Some(true) {
         return Some(true);
     }
-    if layout.pieces.len() < 2 {
+    if !parts::UNIONS || layout.pieces.len() < 2 {
         return Some(false);
     }
     let place = Place {
@@ -649,7 +650,7 @@ fn piece_holds(body: &Body, frames: &[[u8; 6]], mut facets: &[Facet]) -> Option<
         let is_linear = !turns || body.whole_reach <= LARGEST_TURN;
         let holds = |facet: &Facet| {
             is_linear && body.admits(facet, &seen)
-                || turns && body.sections_hold(facet, axes, point)
+                || parts::HEADINGS && turns && body.sections_hold(facet, axes, point)
         };
         if !mine.iter().all(holds) {
             return Some(false);

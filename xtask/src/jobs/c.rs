@@ -101,7 +101,6 @@ fn emulated(machine: &str, elf: &Path) -> Result<String> {
 }
 
 /// Links every function of the header without a C library: no symbol is undefined, and no panic, allocator or defmt can be reached.
-/// Prints the flash that a gate takes.
 fn archive(target: &str, out: &Path, report: &Report) -> Result {
     let archive = target_folder()
         .join(target)
@@ -158,29 +157,6 @@ fn archive(target: &str, out: &Path, report: &Report) -> Result {
         functions.len(),
         "functions",
     );
-    let gate = link(
-        "gate.elf",
-        &[
-            "posegate_gate_init",
-            "posegate_gate_step",
-            "posegate_gate_tick",
-            "posegate_permission_is_permit",
-        ],
-    )?;
-    let sizes = cmd("arm-none-eabi-size").arg(gate).read()?;
-    // Code and variables with a value.
-    let numbers = sizes
-        .lines()
-        .nth(1)
-        .unwrap_or_default()
-        .split_whitespace()
-        .take(2)
-        .map(str::parse::<u64>);
-    let flash: u64 = numbers
-        .collect::<std::result::Result<Vec<_>, _>>()?
-        .iter()
-        .sum();
-    report.note(&format!("flash of a gate in C, {target}"), flash, "B");
     Ok(())
 }
 

@@ -32,6 +32,11 @@ pub fn clippy(given: &Arguments) -> Result {
     for features in FEATURES {
         lint(&format!("-p posegate --lib --features={features}"))?;
     }
+    for parts in ["", "cells", "headings,unions"] {
+        lint(&format!(
+            "-p posegate-c --lib --no-default-features --features={parts}"
+        ))?;
+    }
     for target in THUMBS {
         lint(&format!("-p posegate-c --lib --target {target}"))?;
     }

@@ -1,0 +1,18 @@
+//! The parts that this build contains.
+//!
+//! A part that is left out takes no flash, and only makes the gate deny more: without it there is one way less to show that a
+//! pose-set is inside. Each part is a constant, so every build compiles and checks all code, and the compiler drops what
+//! cannot be reached.
+
+/// Cells decide, where a table has them (feature `cells`). Without it, a table with cells alone is refused.
+pub(crate) const CELLS: bool = cfg!(feature = "cells");
+
+/// Facets on points that turn with the robot are evaluated heading by heading (feature `headings`). Without it, such facets are
+/// evaluated to second order, which denies every set that turns by more than half a radian.
+pub(crate) const HEADINGS: bool = cfg!(feature = "headings");
+
+/// Several pieces of facets may contain a pose-set together (feature `unions`). Without it, one piece must contain it.
+pub(crate) const UNIONS: bool = cfg!(feature = "unions");
+
+/// Sight records are read (feature `sight`). Without it, no table has one.
+pub(crate) const SIGHT: bool = cfg!(feature = "sight");

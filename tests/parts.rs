@@ -1,0 +1,102 @@
+//! A build without some parts of the gate (features `cells`, `headings`, `unions`, `sight`) denies more and never less.
+//!
+//! In every build: the decisions of the vector file, which were made with all parts, are those of this build, except that
+//! denials may take the place of permits. `./ci.sh parts` builds the sets of features.
+
+#[path = "../crates/posegate-testkit/src/replay.rs"]
+mod replay;
+
+use posegate::gate::Verdict;
+use posegate::recordings::Evaluator;
+use posegate::table::{Table, TableError};
+use posegate::wire::Reply;
+use replay::{MAXIMUM_AGE_MS, Records, answer, reply};
+use std::path::Path;
+
+/// The tables in the order of `examples/vectors.rs`.
+const TABLES: [&str; 7] = [
+    "examples/tables/dock.posegate",
+    "examples/tables/see-t7.posegate",
+    "examples/tables/see-t7-grid.posegate",
+    "tests/data/whole-circle.posegate",
+    "tests/data/turning.posegate",
+    "tests/data/over-180.posegate",
+    "tests/data/corner.posegate",
+];
+/// The table of cells alone.
+const CELLS_ALONE: usize = 2;
+const HAS_ALL: bool = cfg!(all(
+    feature = "cells",
+    feature = "headings",
+    feature = "unions"
+));
+
+fn read(path: &str) -> Vec<u8> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn permitted(verdict: Verdict) -> Option<u32> {
+    match verdict {
+        Verdict::Permit { margin } => Some(margin.q16()),
+        Verdict::Deny { .. } => None,
+    }
+}
+
+#[test]
+fn fewer_parts_never_permit_more() {
+    let gates = TABLES.map(|path| {
+        Evaluator::new(read(path).leak(), MAXIMUM_AGE_MS).expect("a valid maximum age")
+    });
+    let file = read("tests/data/vectors.bin");
+    let (mut permits, mut kept, mut lost_on) = (0_u32, 0_u32, [0_u32; TABLES.len()]);
+    for record in Records::of(&file).expect("a vector file") {
+        let record = record.expect("a record");
+        let table = usize::from(record.request.table);
+        let here = answer(&record.request, &gates).expect("a table of the list");
+        if record.answer == 0 {
+            permits += 1;
+            kept += u32::from(here == 0);
+            lost_on[table] += u32::from(here != 0);
+        } else {
+            assert_ne!(here, 0, "{:?}", record.request);
+        }
+        let Some(with_all) = record.reply else {
+            continue;
+        };
+        let with_all = Reply::from_body(with_all).expect("a reply").verdict;
+        let here = reply(&record.request, &gates).verdict;
+        if let (Ok(with_all), Ok(here)) = (with_all, here)
+            && let Some(margin) = permitted(here)
+        {
+            let most = permitted(with_all).expect("a permit with all parts");
+            assert!(margin <= most, "{:?}", record.request);
+        }
+    }
+    println!("{kept} of {permits} permits; lost by table {lost_on:?}");
+    assert!(permits > 4_000);
+    if HAS_ALL {
+        assert_eq!(kept, permits);
+    }
+    // Facets that do not turn decide the dock in every build, and most of the tag's sets.
+    assert_eq!(lost_on[0], 0);
+    assert!(kept * 4 > permits, "{kept} of {permits}");
+    if cfg!(not(feature = "cells")) {
+        assert!(lost_on[CELLS_ALONE] > 500, "{lost_on:?}");
+    }
+}
+
+#[test]
+fn a_table_of_cells_alone_is_refused_without_cells() {
+    let bytes = read(TABLES[CELLS_ALONE]);
+    let refused = Table::parse(&bytes).err();
+    let expected = cfg!(not(feature = "cells")).then_some(TableError::NoCells);
+    assert_eq!(refused, expected);
+}
+
+#[test]
+fn a_sight_record_is_read_with_the_feature_alone() {
+    let bytes = read("examples/tables/see-t7.posegate");
+    let table = Table::parse(&bytes).expect("a table with facets");
+    assert_eq!(table.sight_record().is_some(), cfg!(feature = "sight"));
+}

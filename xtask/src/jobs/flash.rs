@@ -1,0 +1,202 @@
+//! `flash` and `parts`: a gate with all of its parts, and without some.
+
+use crate::arguments::Arguments;
+use crate::board;
+use crate::files::{Scratch, target_folder};
+use crate::jobs::test::ran;
+use crate::need;
+use crate::report::Report;
+use crate::shell::{Result, cmd, program_at};
+use std::path::{Path, PathBuf};
+
+const ALL_PARTS: &str = "cells,headings,sight,unions";
+/// Sets of parts, as a firmware chooses them for its tables.
+const PARTS: [(&str, &str); 5] = [
+    ("facets alone", ""),
+    ("facets that turn", "headings"),
+    ("facets and cells", "cells"),
+    ("facets in several pieces that turn", "headings,unions"),
+    ("all parts", ALL_PARTS),
+];
+/// What a gate of C calls, and what one with a tracker calls besides.
+const GATE: [&str; 4] = [
+    "posegate_gate_init",
+    "posegate_gate_step",
+    "posegate_gate_tick",
+    "posegate_permission_is_permit",
+];
+const TRACKER: [&str; 4] = [
+    "posegate_tracker_init",
+    "posegate_tracker_odometry",
+    "posegate_tracker_fix",
+    "posegate_gate_step_on",
+];
+/// Everything that takes flash, one behind the other.
+const LAYOUT: &str = "SECTIONS {
+    . = 0;
+    .flash : { *(.text .text.*) *(.rodata .rodata.* .srodata .srodata.*) *(.data .data.* .sdata .sdata.*) }
+    .bss (NOLOAD) : { *(.bss .bss.* .sbss .sbss.* COMMON) }
+    /DISCARD/ : { *(.ARM.exidx .ARM.exidx.* .ARM.extab .ARM.extab.* .ARM.attributes .eh_frame .llvmbc .llvmcmd) }
+}
+";
+/// A core, a level of optimization, and how many bytes facets alone and all parts may take.
+const CEILINGS: [(&str, &str, u64, u64); 6] = [
+    ("thumbv7em-none-eabihf", "s", 43_000, 83_000),
+    ("thumbv7em-none-eabihf", "3", 56_500, 102_000),
+    ("thumbv6m-none-eabi", "s", 47_000, 91_000),
+    ("thumbv6m-none-eabi", "3", 57_500, 109_000),
+    ("riscv32imc-unknown-none-elf", "s", 57_000, 115_000),
+    ("riscv32imc-unknown-none-elf", "3", 73_000, 139_000),
+];
+
+/// Builds a gate without some of its parts and checks it against the decisions of one that has all.
+pub fn parts(_: &Arguments) -> Result {
+    for (_, features) in PARTS {
+        let test = cmd("cargo test -p posegate --no-default-features --test parts");
+        ran(test.arg(format!("--features={features}")), 3)?;
+    }
+    Ok(())
+}
+
+/// Prints the bytes of flash of a whole gate in C, without its table: by part, core and level of optimization; and on a Cortex-M4F
+/// the bytes of code of a decision: on facets, including the reason of a denial, and the walk of a grid.
+pub fn flash(_: &Arguments) -> Result {
+    let mut report = Report::default();
+    of_gates(&mut report, &CEILINGS)?;
+    of_decisions(&mut report)?;
+    report.finish()
+}
+
+/// Prints what all of [`flash`] prints of a Cortex-M4F.
+pub fn brief(_: &Arguments) -> Result {
+    let mut report = Report::default();
+    let [m4f_small, m4f_fast, ..] = CEILINGS;
+    of_gates(&mut report, &[m4f_small, m4f_fast])?;
+    of_decisions(&mut report)?;
+    report.finish()
+}
+
+fn of_gates(report: &mut Report, ceilings: &[(&str, &str, u64, u64)]) -> Result {
+    let folder = Scratch::new()?;
+    let image = folder.join("gate.bin");
+    let layout = folder.join("layout.ld");
+    std::fs::write(&layout, LAYOUT)?;
+    for &(target, level, alone, all) in ceilings {
+        need::targets(&[target])?;
+        // One core tells what each part takes; the ends are enough for the others.
+        let shows_each = target.starts_with("thumbv7em") && level == "s";
+        for (name, features) in PARTS {
+            let is_end = features.is_empty() || features == ALL_PARTS;
+            if !is_end && !shows_each {
+                continue;
+            }
+            let archive = archive(target, level, features)?;
+            let bytes = linked(&archive, &GATE, &layout, &image)?;
+            let name = format!("flash of a gate in C, {name}, {target}, opt-level {level}");
+            match features {
+                "" => report.at_most(&name, bytes, "B", alone),
+                ALL_PARTS => report.at_most(&name, bytes, "B", all),
+                _ => report.note(&name, bytes, "B"),
+            }
+            if features.is_empty() {
+                let functions: Vec<&str> = GATE.into_iter().chain(TRACKER).collect();
+                let more = linked(&archive, &functions, &layout, &image)? - bytes;
+                report.note(&format!("{name}: its tracker"), more, "B");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Builds the archive with some parts and returns its path.
+fn archive(target: &str, level: &str, features: &str) -> Result<PathBuf> {
+    // Other jobs use the archive with all parts at level 3, and must not find another one in its place.
+    let folder = target_folder().join("flash");
+    let level = match level {
+        "3" => "3".to_owned(),
+        named => format!("\"{named}\""),
+    };
+    cmd("cargo build -p posegate-c --profile firmware --no-default-features --target")
+        .arg(target)
+        .arg("--target-dir")
+        .arg(&folder)
+        .arg(format!("--features={features}"))
+        .arg("--config")
+        .arg(format!("profile.firmware.opt-level={level}"))
+        .run()?;
+    Ok(folder.join(target).join("firmware/libposegate_c.a"))
+}
+
+/// Returns the bytes of code, constants and initial values of a program that contains these functions and what they call.
+fn linked(archive: &Path, functions: &[&str], layout: &Path, image: &Path) -> Result<u64> {
+    let sysroot = cmd("rustc --print sysroot").read()?;
+    let host = cmd("rustc --print host-tuple").read()?;
+    let linker = Path::new(sysroot.trim())
+        .join("lib/rustlib")
+        .join(host.trim())
+        .join("bin/rust-lld");
+    program_at(&linker)
+        .words("-flavor gnu --oformat=binary --gc-sections --entry=posegate_abi_version -T")
+        .arg(layout)
+        .args(
+            functions
+                .iter()
+                .map(|function| format!("--undefined={function}")),
+        )
+        .arg(archive)
+        .arg("-o")
+        .arg(image)
+        .run()?;
+    Ok(std::fs::metadata(image)
+        .map_err(|error| format!("{}: {error}", image.display()))?
+        .len())
+}
+
+fn of_decisions(report: &mut Report) -> Result {
+    need::command("arm-none-eabi-nm", "binutils-arm-none-eabi")?;
+    let elf = board::build("thumbv7em-none-eabihf", "flash")?;
+    let symbols = cmd("arm-none-eabi-nm -C -S").arg(elf).read()?;
+    let (facets, grid) = sizes(&symbols);
+    report.at_most("m4f flash of the decision on facets", facets, "B", 4_000);
+    report.note("m4f flash of the walk of a grid", grid, "B");
+    report.require(facets > 1_000, "no symbols of the decision were found");
+    Ok(())
+}
+
+/// Returns the bytes of functions that decide on facets, and of the others of containment.
+fn sizes(symbols: &str) -> (u64, u64) {
+    let (mut facets, mut grid) = (0, 0);
+    for line in symbols.lines() {
+        // Address, size, kind, and a name that may contain spaces.
+        let mut words = line.splitn(4, ' ');
+        let (Some(_), Some(size), Some("t" | "T"), Some(name)) =
+            (words.next(), words.next(), words.next(), words.next())
+        else {
+            continue;
+        };
+        let Ok(size) = u64::from_str_radix(size, 16) else {
+            continue;
+        };
+        if name.starts_with("posegate::contain::facets::")
+            || name.starts_with("posegate::contain::decide")
+        {
+            facets += size;
+        } else if name.contains("posegate::contain::") {
+            grid += size;
+        }
+    }
+    (facets, grid)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sizes;
+
+    #[test]
+    fn sizes_are_summed_by_the_names_of_functions() {
+        let symbols = "00000400 00000010 T posegate::contain::decide\n00000410 00000020 t posegate::contain::facets::a<b, c>\n\
+                       00000430 00000008 t <posegate::contain::grid::Walk as Iterator>::next\n20000000 00000100 B posegate::contain::X\n\
+                       00000000 a posegate::contain::y\n";
+        assert_eq!(sizes(symbols), (0x30, 8));
+    }
+}
