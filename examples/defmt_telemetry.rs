@@ -97,6 +97,7 @@ mod firmware {
             inhibit_hold_ms: 20,
             permits_in_a_row: 3,
             restart: Restart::Automatic,
+            most_runs: 1_000,
             look_at: Some(7),
         };
         defmt::info!("{}", settings);

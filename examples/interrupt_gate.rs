@@ -100,6 +100,7 @@ mod firmware {
         inhibit_hold_ms: 200,
         permits_in_a_row: 3,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: Some(7),
     };
 

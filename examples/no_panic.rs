@@ -101,6 +101,7 @@ mod controller {
             inhibit_hold_ms: 1,
             permits_in_a_row: 1,
             restart: Restart::Automatic,
+            most_runs: 1_000,
             look_at: None,
         });
         let (Ok(mut gate), Ok(interlock)) = (

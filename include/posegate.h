@@ -49,6 +49,11 @@
 #define POSEGATE_JUDGE_POINTERS 12U
 
 /**
+ * Words of a `posegate_monitor`.
+ */
+#define POSEGATE_MONITOR_WORDS 5U
+
+/**
  * The verdict byte of a permit. No other byte permits.
  */
 #define POSEGATE_PERMIT 165U
@@ -81,7 +86,7 @@
 /**
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
-#define POSEGATE_ABI_VERSION 4U
+#define POSEGATE_ABI_VERSION 5U
 
 /**
  * Words of a `posegate_tracker`.
@@ -424,6 +429,14 @@ enum posegate_reason
      * The hypotheses of a report leave out more than the confidence allows.
      */
     POSEGATE_REASON_ELSEWHERE_TOO_LIKELY = 41,
+    /**
+     * The cells were walked as far as the settings allow, without an answer.
+     */
+    POSEGATE_REASON_TOO_COSTLY = 42,
+    /**
+     * The fixes contradict the errors that the source claims.
+     */
+    POSEGATE_REASON_MODEL_CONTRADICTED = 43,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -967,9 +980,11 @@ typedef struct posegate_settings {
      */
     uint32_t look_at_tag;
     /**
-     * Reserved: 0.
+     * The most runs of cells that a decision looks at (a row without a run counts as one), of a table that has cells; 0 stands for 1,000.
+     * A pose-set that needs more is denied: `POSEGATE_REASON_TOO_COSTLY`. A run takes at most 2,500 instructions on a Cortex-M4F.
+     * Facets are not affected.
      */
-    uint32_t reserved;
+    uint32_t most_runs;
 } posegate_settings;
 
 /**
@@ -1234,6 +1249,19 @@ typedef struct posegate_estimate {
      */
     uint32_t reserved;
 } posegate_estimate;
+
+/**
+ * Storage of a monitor, which compares the fixes of a source with predictions, and tells when they contradict the errors that it claims: a
+ * camera was knocked, or a tag has moved.
+ *
+ * `posegate_monitor_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
+ */
+typedef struct posegate_monitor {
+    /**
+     * Private.
+     */
+    uint64_t words[POSEGATE_MONITOR_WORDS];
+} posegate_monitor;
 
 /**
  * The header data of a table.
@@ -1720,6 +1748,42 @@ posegate_status posegate_judge_permits(const struct posegate_judge *judge,
 posegate_status posegate_judge_examine(const struct posegate_judge *judge,
                                        const struct posegate_estimate *estimate,
                                        struct posegate_verdict *verdict);
+
+/**
+ * Initialises a monitor that contradicts a model that holds once in `fixes_between_false_alarms` fixes on average, or less often: at least
+ * 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` for fewer.
+ *
+ * # Safety
+ * The pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_monitor_init(struct posegate_monitor *monitor,
+                                      uint32_t fixes_between_false_alarms);
+
+/**
+ * Takes an accepted fix and its prediction for the same time: with a tracker, `posegate_tracker_tracked` before `posegate_tracker_fix`, and
+ * the report after it. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+ *
+ * Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if one of both has no valid covariance or the dependence is no such number. The
+ * fix then counts for nothing, and `POSEGATE_MODEL_CONTRADICTED` is written.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_monitor_fix(struct posegate_monitor *monitor,
+                                     const struct posegate_report *fix,
+                                     const struct posegate_evidence *prediction,
+                                     uint32_t dependence,
+                                     uint32_t *model);
+
+/**
+ * Starts a monitor anew, after a person has looked at the cause.
+ *
+ * # Safety
+ * The pointer is null, misaligned, or points to what its type says.
+ */
+posegate_status posegate_monitor_reset(struct posegate_monitor *monitor);
 
 /**
  * Returns `POSEGATE_PERMIT` if the interlock may open in the cycle whose step or tick was given the time

@@ -25,12 +25,16 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `cells`, `headings`, `sight`, `unions` (on by default) | decisions on the cells of a table; on facets that turn, heading by heading; what the camera sees; pose-sets that only several pieces contain together. Without one, firmware is smaller and the gate denies more, never less (`./ci.sh flash`) |
+//! | `cells` | on by default: decisions on the cells of a table |
+//! | `headings` | on by default: facets that turn with the robot are decided heading by heading: wide turns, and tight decisions |
+//! | `sight` | on by default: what the camera sees from a pose, of the table of a tag |
+//! | `unions` | on by default: pose-sets that only several pieces contain together, such as a lane and a bay |
 //! | `std` | lookup tables on a PC: success sets (`shape`), tables (`bake`) and their proofs (`verify`) |
 //! | `defmt` | `defmt::Format` on every public type of the core |
 //! | `firmware` | nothing for users: the project's own Cortex-M examples |
 //!
-//! Without `std` this is the core for a motion controller: `no_std`, no heap, no float on the decision path.
+//! Without `std` this is the core for a motion controller: `no_std`, no heap, no float on the decision path. Without one of the features that
+//! are on by default firmware is smaller, and the gate denies more, never less (`./ci.sh flash`).
 //!
 //! Related packages: `posegate-host` (site files, plans, placement of tags, learning, replay), `posegate-cli` (the program
 //! `posegate`) and `posegate-c` (the C boundary, `include/posegate.h`).

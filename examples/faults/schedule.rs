@@ -29,6 +29,7 @@ pub static SETTINGS: Settings<'static> = Settings {
     inhibit_hold_ms: 20,
     permits_in_a_row: 2,
     restart: Restart::Automatic,
+    most_runs: 1_000,
     look_at: Some(7),
 };
 

@@ -138,6 +138,7 @@ impl Failure {
             Self::NotContained(Cause::TooLarge) => "pose_set_too_large",
             Self::NotContained(Cause::OffTable) => "outside_table",
             Self::NotContained(Cause::NotContained) => "not_contained",
+            Self::NotContained(Cause::TooCostly) => "too_costly",
             Self::StartTooFar => "start_too_far",
             Self::BeyondNumbers => "beyond_numbers",
         }

@@ -19,16 +19,33 @@ use crate::table::{Cells, Grid, Run, Slab};
 const FARTHEST: i64 = (1 << 31) + SLACK_Q24 * crate::num::ANGLE_UNITS_PER_Q24;
 const TURN: i64 = 1 << 32;
 
-/// Returns `Ok` if every pose of the set lies in a covered cell, otherwise the offset of a pose that
-/// does not.
+/// Why a walk does not show that a set is covered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// The offset of a pose that lies in no covered cell.
+    NotCovered(Offset),
+    /// The walk reached the most runs that it may look at. It says nothing about the set.
+    TooCostly,
+}
+
+impl From<Offset> for Stop {
+    fn from(offset: Offset) -> Self {
+        Self::NotCovered(offset)
+    }
+}
+
+/// Returns `Ok` if every pose of the set lies in a covered cell.
 ///
-/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn.
+/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn. `most_runs` bounds the runs and the
+/// rows without a run that are looked at.
 pub(super) fn covers<S: Section>(
     grid: &Grid<'_>,
     cells: &Cells,
     mean: [i64; 3],
     section: &S,
-) -> Result<(), Offset> {
+    most_runs: u32,
+) -> Result<(), Stop> {
+    let mut left = most_runs;
     let [x, y, yaw] = mean;
     let reach = section
         .yaw_q24()
@@ -38,10 +55,10 @@ pub(super) fn covers<S: Section>(
     let (low, high) = (yaw.wrapping_sub(reach), yaw.wrapping_add(reach));
     if !cells.is_whole_circle() {
         if low < 0 {
-            return Err(section.yaw_end(false));
+            return Err(section.yaw_end(false).into());
         }
         if high.unsigned_abs() > cells.yaw_span {
-            return Err(section.yaw_end(true));
+            return Err(section.yaw_end(true).into());
         }
     }
     // On the whole circle the range may begin one turn early or end one turn late.
@@ -60,7 +77,7 @@ pub(super) fn covers<S: Section>(
             section.yaw_q24(),
         );
         if let Some(window) = window {
-            covers_slab(&grid.slab(k), cells, [x, y], section, window)?;
+            covers_slab(&grid.slab(k), cells, [x, y], section, window, &mut left)?;
         }
         k = k.saturating_add(1);
         if k >= cells.slabs {
@@ -94,19 +111,20 @@ fn covers_slab<S: Section>(
     [x, y]: [i64; 2],
     section: &S,
     yaw: [i64; 2],
-) -> Result<(), Offset> {
+    left: &mut u32,
+) -> Result<(), Stop> {
     let cut = section.cut(yaw);
     let step = i64::from(cells.step_um);
     let Some(by_step) = Divisor::new(step) else {
-        return Err(Offset::default());
+        return Err(Offset::default().into());
     };
     let bottom = y.wrapping_sub(cut.bottom).wrapping_sub(SLACK_UM);
     let top = y.wrapping_add(cut.top).wrapping_add(SLACK_UM);
     if bottom < 0 {
-        return Err(section.y_end(false, yaw));
+        return Err(section.y_end(false, yaw).into());
     }
     if top > step.wrapping_mul(i64::from(cells.rows)) {
-        return Err(section.y_end(true, yaw));
+        return Err(section.y_end(true, yaw).into());
     }
     // Columns that a run must cover: from the column with the left end to the column with the right
     // end (or that ends at it).
@@ -145,16 +163,23 @@ fn covers_slab<S: Section>(
             }
             Ok(())
         };
-        let mut answer = Err(Side::Right);
+        let mut answer = None;
         let number = u16::try_from(row).unwrap_or(u16::MAX);
         for run in slab.runs(number) {
-            answer = fits(run);
-            if answer.is_ok() {
+            *left = left.checked_sub(1).ok_or(Stop::TooCostly)?;
+            let fit = fits(run);
+            answer = Some(fit);
+            if fit.is_ok() {
                 break;
             }
         }
-        if let Err(side) = answer {
-            return Err(section.row_end(side, &window));
+        match answer {
+            Some(Ok(())) => {}
+            Some(Err(side)) => return Err(section.row_end(side, &window).into()),
+            None => {
+                *left = left.checked_sub(1).ok_or(Stop::TooCostly)?;
+                return Err(section.row_end(Side::Right, &window).into());
+            }
         }
         row = row.wrapping_add(1);
     }

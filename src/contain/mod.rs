@@ -53,6 +53,7 @@ use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Cells, Grid, Table};
 
+use self::grid::Stop;
 use self::section::{Disc, Ellipsoid, Offset, Section};
 
 pub use self::facets::clearance_q14 as facet_clearance_q14;
@@ -100,12 +101,15 @@ pub enum Cause {
     OffTable,
     /// Some pose of the pose-set lies in no covered cell.
     NotContained,
+    /// The cells were walked as far as the table's limit allows ([`Table::within`]), without an answer.
+    TooCostly,
 }
 
 crate::messages::messages!(Cause {
     TooLarge => "the pose-set is wider than the whole table on some axis, for every estimate",
     OffTable => "the estimate is not on the table",
     NotContained => "some pose of the pose-set is not proven inside the success set",
+    TooCostly => "the cells were walked as far as the limit allows, without an answer",
 });
 
 /// A factor by which a pose-set can be scaled and still be inside: a lower bound on s*, unit 2^-16.
@@ -190,6 +194,7 @@ fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
             .map(|grid| placed.walked(grid, table, placed.extent))
         {
             Some(Ok(())) => Decision::Inside,
+            Some(Err(Stop::TooCostly)) => Decision::Outside(Cause::TooCostly),
             _ => Decision::Outside(Cause::NotContained),
         },
     }
@@ -347,10 +352,10 @@ impl<'s> GoalFramePoseSet<'s> {
             return Offset::default();
         };
         match (table.grid(), table.facets()) {
-            (Some(grid), _) => self
-                .walked_turned(grid, table, extent)
-                .err()
-                .unwrap_or_default(),
+            (Some(grid), _) => match self.walked_turned(grid, table, extent) {
+                Err(Stop::NotCovered(offset)) => offset,
+                _ => Offset::default(),
+            },
             (None, Some(layout)) => {
                 let goal = table.goal();
                 let set = PoseSet::of(self.set.mean(), extent);
@@ -371,27 +376,34 @@ impl<'s> GoalFramePoseSet<'s> {
         grid: &Grid<'_>,
         table: &Table<'_>,
         extent: Extent,
-    ) -> Result<(), Offset> {
+    ) -> Result<(), Stop> {
         self.walked(grid, table, turned(table, extent))
     }
 
-    /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, otherwise the offset of a pose that is
-    /// not covered.
-    fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Offset> {
+    /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, as a walk within the table's limit tells.
+    fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
+        let (cells, most_runs) = (table.cells(), table.most_runs());
         match extent {
-            Extent::Gaussian(factor) => self.walk(grid, table.cells(), &Ellipsoid::new(factor)),
+            Extent::Gaussian(factor) => self.walk(grid, cells, &Ellipsoid::new(factor), most_runs),
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
-            } => self.walk(grid, table.cells(), &Disc::new(translation_um, yaw_q24)),
+            } => self.walk(grid, cells, &Disc::new(translation_um, yaw_q24), most_runs),
             Extent::Grown { factor, by } => {
-                self.walk(grid, table.cells(), &Disc::around(&factor, by))
+                self.walk(grid, cells, &Disc::around(&factor, by), most_runs)
             }
         }
     }
 
-    fn walk<S: Section>(&self, grid: &Grid<'_>, cells: &Cells, section: &S) -> Result<(), Offset> {
-        grid::covers(grid, cells, [self.x_um, self.y_um, self.yaw], section)
+    fn walk<S: Section>(
+        &self,
+        grid: &Grid<'_>,
+        cells: &Cells,
+        section: &S,
+        most_runs: u32,
+    ) -> Result<(), Stop> {
+        let mean = [self.x_um, self.y_um, self.yaw];
+        grid::covers(grid, cells, mean, section, most_runs)
     }
 
     /// Narrows the interval between a scale that is covered and one that is not to 2^-10 of the larger. Returns both.

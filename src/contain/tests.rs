@@ -505,7 +505,17 @@ fn bytes_of(cells: &Cells, slabs: Vec<Vec<Runs>>) -> Vec<u8> {
 
 fn walk<S: Section>(bytes: &[u8], mean: [i64; 3], section: &S) -> Result<(), Offset> {
     let table = Table::parse(bytes).unwrap();
-    grid::covers(table.grid().unwrap(), table.cells(), mean, section)
+    match grid::covers(
+        table.grid().unwrap(),
+        table.cells(),
+        mean,
+        section,
+        u32::MAX,
+    ) {
+        Ok(()) => Ok(()),
+        Err(grid::Stop::NotCovered(offset)) => Err(offset),
+        Err(grid::Stop::TooCostly) => unreachable!("a walk without a limit"),
+    }
 }
 
 fn walk_disc(bytes: &[u8], mean: [i64; 3]) -> Result<(), Offset> {
@@ -948,4 +958,50 @@ fn an_estimate_outside_is_its_own_worst_pose() {
         assert_eq!(examination.margin, Margin::default());
         assert_eq!(examination.worst_pose, Some(set.mean()));
     }
+}
+
+/// A limit only ever turns an answer into [`Cause::TooCostly`], and from the number of runs that the walk needs on nothing changes.
+#[test]
+fn a_walk_beyond_its_limit_says_that_it_is_too_costly() {
+    let bytes = include_bytes!("../../examples/tables/see-t7-grid.posegate");
+    let table = Table::parse(bytes).unwrap();
+    let worst = table.worst_case();
+    let mut needed_at_most = 0;
+    for (x_m, sigma, expected) in [
+        (0.0, 0.01, Decision::Inside),
+        (0.0, 0.1, Decision::Inside),
+        (0.0, 0.25, Decision::Inside),
+        (1.5, 0.25, Decision::Outside(Cause::NotContained)),
+        (0.0, 0.35, Decision::Inside),
+    ] {
+        let at = Estimate {
+            x_m,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        let variance: f64 = sigma * sigma;
+        let covariance = [
+            [variance, 0.0, 0.0],
+            [0.0, variance, 0.0],
+            [0.0, 0.0, 0.01 * variance],
+        ];
+        let set = PoseSet::gaussian(at, covariance, table.radius_squared()).unwrap();
+        assert_eq!(decide(&table, &set), expected, "{x_m} {sigma}");
+        let too_costly = Decision::Outside(Cause::TooCostly);
+        let needed = (0..=worst.runs)
+            .find(|most| decide(&table.within(*most), &set) != too_costly)
+            .unwrap();
+        assert!(needed > 0);
+        for most in [needed, needed + 1, worst.runs, u32::MAX] {
+            assert_eq!(decide(&table.within(most), &set), expected, "{most}");
+        }
+        for most in 0..needed {
+            assert_eq!(decide(&table.within(most), &set), too_costly, "{most}");
+        }
+        needed_at_most = needed.max(needed_at_most);
+    }
+    assert!(needed_at_most > 100, "{needed_at_most}");
+    assert_eq!(table.within(100).worst_case().runs, 100);
+    assert!(table.within(100).worst_case().instructions_m4f() < worst.instructions_m4f());
+    assert_eq!(table.within(u32::MAX).worst_case(), worst);
 }

@@ -881,7 +881,7 @@ fn first_opinion(
     }
 }
 
-/// Parses a table and checks that it is for the task and site that the controller expects.
+/// Parses a table, checks that it is for the task and site that the controller expects, and limits its walks.
 fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Reason> {
     let table = Table::parse(bytes).map_err(|_| Reason::TableInvalid)?;
     if table.task() != settings.task {
@@ -890,7 +890,7 @@ fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Re
     if table.site_digest() != settings.site_digest {
         return Err(Reason::WrongSite);
     }
-    Ok(table)
+    Ok(table.within(settings.most_runs))
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@
 //!     inhibit_hold_ms: 500,
 //!     permits_in_a_row: 3,
 //!     restart: Restart::Automatic,
+//!     most_runs: 1_000,
 //!     look_at: Some(7),
 //! };
 //! let mut gate = Gate::new(table, &settings, now_ms).expect("no parameter switches a check off");
@@ -39,6 +40,7 @@ use crate::table::Table;
 pub use self::evidence::{Evidence, MOST_HYPOTHESES};
 pub use self::interlock::{Interlock, InterlockFault, NoPin};
 pub use self::machine::{Gate, State, Step};
+pub use self::monitor::{Innovation, ModelStanding, Monitor};
 pub use self::permission::{DENY, PERMIT, Permission};
 pub use self::reason::{Advice, Reason};
 pub use self::scrub::{Scrub, ScrubProgress};
@@ -51,6 +53,7 @@ mod elsewhere;
 mod evidence;
 mod interlock;
 mod machine;
+mod monitor;
 mod permission;
 mod reason;
 mod scrub;
@@ -124,6 +127,7 @@ impl From<Cause> for Reason {
             Cause::TooLarge => Self::PoseSetTooLarge,
             Cause::OffTable => Self::OutsideTable,
             Cause::NotContained => Self::NotContained,
+            Cause::TooCostly => Self::TooCostly,
         }
     }
 }

@@ -105,11 +105,15 @@ pub enum Reason {
     OdometryTooShort = 40,
     /// The hypotheses of a report leave out more than the confidence allows.
     ElsewhereTooLikely = 41,
+    /// The cells were walked as far as the settings allow, without an answer.
+    TooCostly = 42,
+    /// The fixes contradict the errors that the source claims.
+    ModelContradicted = 43,
 }
 
 impl Reason {
     /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 41] = [
+    pub const ALL: [Self; 43] = [
         Self::NotContained,
         Self::PoseSetTooLarge,
         Self::OutsideTable,
@@ -151,6 +155,8 @@ impl Reason {
         Self::OdometryBackwards,
         Self::OdometryTooShort,
         Self::ElsewhereTooLikely,
+        Self::TooCostly,
+        Self::ModelContradicted,
     ];
 
     /// Returns the code of the reason on the wire. No reason has the code 0.
@@ -211,6 +217,8 @@ impl Reason {
             Self::OdometryBackwards => "odometry_backwards",
             Self::OdometryTooShort => "odometry_too_short",
             Self::ElsewhereTooLikely => "elsewhere_too_likely",
+            Self::TooCostly => "too_costly",
+            Self::ModelContradicted => "model_contradicted",
         }
     }
 
@@ -331,6 +339,12 @@ impl Reason {
             Self::ElsewhereTooLikely => {
                 "The robot may be at none of the report's hypotheses, with a probability that the confidence does not allow."
             }
+            Self::TooCostly => {
+                "The table's cells were looked up as often as the settings allow, without an answer: the pose-set is wide, or the cells are fine."
+            }
+            Self::ModelContradicted => {
+                "The fixes differ from the predictions by more than the errors that the source claims: a camera was knocked, a tag has moved, or the claimed covariance is too small."
+            }
         }
     }
 
@@ -442,6 +456,12 @@ impl Reason {
             Self::ElsewhereTooLikely => {
                 "Improve the estimate first; or report more hypotheses, at most eight."
             }
+            Self::TooCostly => {
+                "Relocalise: a smaller pose-set takes fewer look-ups. If it comes back: build the table with facets or coarser cells, or raise most_runs and response_ms."
+            }
+            Self::ModelContradicted => {
+                "Service: check camera, tags and calibration, and learn the error model again; then reset the monitor."
+            }
         }
     }
 
@@ -453,7 +473,8 @@ impl Reason {
             Self::NotContained
             | Self::PoseSetTooLarge
             | Self::CovarianceTooLarge
-            | Self::ElsewhereTooLikely => match look_at {
+            | Self::ElsewhereTooLikely
+            | Self::TooCostly => match look_at {
                 Some(tag) => Advice::LookAtTag(tag),
                 None => Advice::Relocalise,
             },
@@ -492,7 +513,8 @@ impl Reason {
             | Self::MemoryDamaged
             | Self::EvaluationsDisagree
             | Self::InterlockFault
-            | Self::SelfTestFailed => Advice::Service,
+            | Self::SelfTestFailed
+            | Self::ModelContradicted => Advice::Service,
         }
     }
 }
@@ -531,6 +553,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(42), None);
+        assert_eq!(Reason::from_code(44), None);
     }
 }

@@ -100,7 +100,7 @@ pub struct Settings<'a> {
     /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
     /// control cycle, the longest duration of a step and the delay of the output. A step takes two evaluations and
     /// the conversion of the estimate: about 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and up
-    /// to eleven times the bound of `posegate table info` with cells. If a later cycle finds the gate open, the gate
+    /// to eleven times the bound of `posegate table info` with cells ([`Settings::most_runs`] lowers that bound). If a later cycle finds the gate open, the gate
     /// closes ([`super::Reason::CycleLate`]).
     pub response_ms: u32,
     /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. A step does not use it. Settings with
@@ -115,6 +115,10 @@ pub struct Settings<'a> {
     pub permits_in_a_row: u16,
     /// Whether a gate whose permit has ended needs a reset.
     pub restart: Restart,
+    /// The most runs of cells that a decision looks at (a row without a run counts as one), of a table that has cells. A pose-set that
+    /// needs more is denied with [`super::Reason::TooCostly`]. `Table::within(most_runs).worst_case()` bounds the instructions: a run takes
+    /// at most 2,500 on a Cortex-M4F. Facets are not affected. Zero: cells permit nothing. Read once, when the gate is made or reset.
+    pub most_runs: u32,
     /// The tag that the robot should look at to relocalise for this task. Only [`super::Advice`] uses it.
     pub look_at: Option<u32>,
 }
@@ -227,6 +231,7 @@ impl Settings<'static> {
     /// - `maximum_age_ms` adds two, since the age counts up to the end of the permission.
     /// - `inhibit_hold_ms` is this time: after a denial at least one further report is evaluated before the gate opens.
     /// - `permits_in_a_row` is 3.
+    /// - `most_runs` is 1,000: a set of 0.5 m and 10 deg on cells of 2 cm and 1 deg.
     ///
     /// One lost report closes the gate. To bear one, give twice the period. Longer times cost margin, since a robot that moves is
     /// granted what it can move in them ([`Source::motion`]); odometry makes the times short ([`crate::track`]): then the period is
@@ -246,6 +251,7 @@ impl Settings<'static> {
             inhibit_hold_ms: apart,
             permits_in_a_row: 3,
             restart: Restart::Automatic,
+            most_runs: 1_000,
             look_at: None,
         }
     }

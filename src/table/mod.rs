@@ -257,6 +257,8 @@ pub struct Table<'a> {
     grid: Option<Grid<'a>>,
     facets: Option<Facets<'a>>,
     sight: Option<&'a sight::Words>,
+    /// Of the grid, that a decision looks at.
+    most_runs: u32,
 }
 
 #[cfg(feature = "defmt")]
@@ -388,7 +390,21 @@ impl<'a> Table<'a> {
             grid,
             facets,
             sight,
+            most_runs: u32::MAX,
         }))
+    }
+
+    /// Returns the same table, on which a decision looks at no more than `most_runs` runs of cells (a row without a run counts as one).
+    /// A walk that would look at more ends with [`crate::contain::Cause::TooCostly`]. Facets are not affected. A table that was parsed has no
+    /// limit.
+    #[must_use]
+    pub const fn within(self, most_runs: u32) -> Self {
+        Self { most_runs, ..self }
+    }
+
+    /// Returns the most runs of cells that a decision looks at.
+    pub(crate) const fn most_runs(&self) -> u32 {
+        self.most_runs
     }
 
     /// Returns the task's goal pose with its cosine and sine.

@@ -70,7 +70,7 @@ impl WorstCase {
 }
 
 impl Table<'_> {
-    /// Returns the largest number of steps of a decision on this table. Reads the whole table: for start-up, or
+    /// Returns the largest number of steps of a decision on this table, within its limit ([`Table::within`]). Reads the whole table: for start-up, or
     /// for the host.
     #[must_use]
     pub fn worst_case(&self) -> WorstCase {
@@ -110,6 +110,7 @@ impl Table<'_> {
             let again = if cells.is_whole_circle() { 2 } else { 0 };
             worst.slabs = u32::from(cells.slabs).saturating_add(again);
             worst.runs = worst.runs.saturating_add(fullest.saturating_mul(again));
+            worst.runs = worst.runs.min(self.most_runs());
         }
         worst
     }

@@ -251,6 +251,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
         inhibit_hold_ms,
         permits_in_a_row,
         restart,
+        most_runs,
         look_at,
     } = settings;
     let numbers = [
@@ -261,6 +262,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
         *inhibit_hold_ms,
         u32::from(*permits_in_a_row),
         u32::from(*restart == Restart::OnReset),
+        *most_runs,
         look_at.unwrap_or(POSEGATE_NO_TAG),
     ];
     let of_settings = [
@@ -337,6 +339,7 @@ unsafe fn fill(
             inhibit_hold_ms: given.inhibit_hold_ms,
             permits_in_a_row,
             restart,
+            most_runs: given.most_runs(),
             look_at,
         });
         let settings: &'static Settings<'static> = &(*held).settings;

@@ -58,6 +58,8 @@ pub use self::evidence::*;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::gate::*;
 pub use self::judge::*;
+#[cfg(not(target_arch = "wasm32"))]
+pub use self::monitor::*;
 pub use self::permission::*;
 pub use self::reason::*;
 pub use self::report::*;
@@ -76,6 +78,8 @@ mod evidence;
 mod gate;
 mod judge;
 mod memory;
+#[cfg(not(target_arch = "wasm32"))]
+mod monitor;
 #[cfg(any(target_os = "none", target_arch = "wasm32"))]
 mod panic;
 mod permission;

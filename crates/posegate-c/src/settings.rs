@@ -127,8 +127,10 @@ pub struct posegate_settings {
     /// The tag that the robot should look at to relocalise for this task, or `POSEGATE_NO_TAG`. Only the advice
     /// uses it.
     pub look_at_tag: u32,
-    /// Reserved: 0.
-    pub reserved: u32,
+    /// The most runs of cells that a decision looks at (a row without a run counts as one), of a table that has cells; 0 stands for 1,000.
+    /// A pose-set that needs more is denied: `POSEGATE_REASON_TOO_COSTLY`. A run takes at most 2,500 instructions on a Cortex-M4F.
+    /// Facets are not affected.
+    pub most_runs: u32,
 }
 
 // SAFETY: numbers.
@@ -162,7 +164,7 @@ impl posegate_settings {
         permits_in_a_row: 0,
         restart: 0,
         look_at_tag: POSEGATE_NO_TAG,
-        reserved: 0,
+        most_runs: 0,
     };
 }
 
@@ -193,6 +195,7 @@ pub unsafe extern "C" fn posegate_settings_for_source(
         inhibit_hold_ms: times.inhibit_hold_ms,
         permits_in_a_row: u32::from(times.permits_in_a_row),
         restart: posegate_restart::Automatic as u32,
+        most_runs: times.most_runs,
         ..posegate_settings::NONE
     };
     // SAFETY: the caller's promise.
@@ -267,6 +270,13 @@ impl posegate_settings {
             AUTOMATIC => Ok(Restart::Automatic),
             ON_RESET => Ok(Restart::OnReset),
             _ => Err(posegate_status::Restart),
+        }
+    }
+
+    pub(super) const fn most_runs(&self) -> u32 {
+        match self.most_runs {
+            0 => Settings::for_source(0, 0).most_runs,
+            runs => runs,
         }
     }
 

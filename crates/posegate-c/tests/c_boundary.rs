@@ -128,7 +128,7 @@ fn settings() -> posegate_settings {
         permits_in_a_row: 3,
         restart: posegate_restart::Automatic as u32,
         look_at_tag: 7,
-        reserved: 0,
+        most_runs: 0,
     }
 }
 
@@ -160,6 +160,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
         inhibit_hold_ms: 40,
         permits_in_a_row: 3,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: Some(7),
     }))
 }
@@ -851,7 +852,8 @@ fn an_inhibited_gate_qualifies_again() {
     for (reason, kind, status) in [
         (35, posegate_state_kind::Inhibited, posegate_status::Ok),
         (0, posegate_state_kind::Latched, posegate_status::BadValue),
-        (42, posegate_state_kind::Latched, posegate_status::BadValue),
+        (43, posegate_state_kind::Inhibited, posegate_status::Ok),
+        (44, posegate_state_kind::Latched, posegate_status::BadValue),
         (291, posegate_state_kind::Latched, posegate_status::BadValue),
     ] {
         let gate = open_gate();

@@ -631,3 +631,79 @@ fn fitting_settings_are_those_of_rust() {
         assert_ne!(status, posegate_status::Ok);
     }
 }
+
+/// A monitor in C says what the one in Rust says, fix by fix, refuses what is none, and stays contradicted until its reset.
+#[test]
+fn a_monitor_says_what_that_of_rust_says() {
+    use posegate::gate::{Innovation, ModelStanding, Monitor};
+    // SAFETY: storage and values of their types, which stay where they are.
+    unsafe {
+        let mut monitor: posegate_monitor = core::mem::zeroed();
+        assert_eq!(
+            posegate_monitor_init(&mut monitor, 99),
+            posegate_status::BadValue
+        );
+        assert_eq!(
+            posegate_monitor_init(&mut monitor, 10_000),
+            posegate_status::Ok
+        );
+        let mut of_rust = Monitor::new(10_000).unwrap();
+        let mut prediction: posegate_evidence = core::mem::zeroed();
+        prediction.report = report_of_c(1, 20, belief_of_c(0.0, 0.0, 0.0));
+        prediction.beside_um = 1_000;
+        let mut seen = [0_u32; 3];
+        let known = [
+            posegate_dependence::Independent,
+            posegate_dependence::Unknown,
+        ];
+        for at in 0..60 {
+            // Good fixes, then some that are far off.
+            let x_m = if at < 30 { 0.004 } else { 0.09 };
+            let fix = report_of_c(2 + at, 40, belief_of_c(x_m, 0.0, 0.0));
+            let mut model = 9;
+            let dependence = known[at as usize % 2];
+            let status = posegate_monitor_fix(
+                &mut monitor,
+                &fix,
+                &prediction,
+                dependence as u32,
+                &mut model,
+            );
+            assert_eq!(status, posegate_status::Ok);
+            let of = if at % 2 == 0 {
+                Innovation::of_independent
+            } else {
+                Innovation::of_dependent
+            };
+            let (fix, from) = (belief(x_m, 0.0, 0.0), belief(0.0, 0.0, 0.0));
+            let innovation = of(&fix, &from, posegate::set::Growth::new(1_000, 0)).unwrap();
+            let expected = match of_rust.fix(&innovation).unwrap() {
+                ModelStanding::Holds => 0,
+                ModelStanding::InDoubt => 1,
+                ModelStanding::Contradicted => 2,
+            };
+            assert_eq!(model, expected, "{at}");
+            seen[expected as usize] += 1;
+        }
+        assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+        let contradicted = posegate_model::Contradicted as u32;
+        let good = report_of_c(99, 40, belief_of_c(0.0, 0.0, 0.0));
+        let fix = |monitor: &mut posegate_monitor, fix: &posegate_report, dependence| {
+            let mut model = 0;
+            let status = posegate_monitor_fix(monitor, fix, &prediction, dependence, &mut model);
+            (status, model)
+        };
+        let ok = posegate_status::Ok;
+        assert_eq!(fix(&mut monitor, &good, 1), (ok, contradicted));
+        assert_eq!(posegate_monitor_reset(&mut monitor), ok);
+        assert_eq!(fix(&mut monitor, &good, 1), (ok, 0));
+        let refused = (posegate_status::BadValue, contradicted);
+        assert_eq!(fix(&mut monitor, &good, 0), refused);
+        assert_eq!(fix(&mut monitor, &good, 3), refused);
+        let mut moved = posegate_monitor {
+            words: monitor.words,
+        };
+        let status = posegate_monitor_reset(&mut moved);
+        assert_eq!(status, posegate_status::NotInitialised);
+    }
+}

@@ -26,9 +26,10 @@ enum Kind {
     Output,
     /// Read and written: the counter of a gate.
     Word,
-    /// A gate, a tracker, a judge, a receiver; `posegate_request_judge` has two judges.
+    /// A gate, a tracker, a monitor, a judge, a receiver; `posegate_request_judge` has two judges.
     Gate,
     Tracker,
+    Monitor,
     Judge,
     Judges,
     Receiver,
@@ -42,8 +43,11 @@ struct Argument {
 
 impl Argument {
     fn is_storage(&self) -> bool {
-        use Kind::{Gate, Judge, Judges, Receiver, Tracker};
-        matches!(self.kind, Gate | Tracker | Judge | Judges | Receiver)
+        use Kind::{Gate, Judge, Judges, Monitor, Receiver, Tracker};
+        matches!(
+            self.kind,
+            Gate | Tracker | Monitor | Judge | Judges | Receiver
+        )
     }
 }
 
@@ -129,7 +133,7 @@ fn settings() -> posegate_settings {
         permits_in_a_row: 3,
         restart: posegate_restart::Automatic as u32,
         look_at_tag: 7,
-        reserved: 0,
+        most_runs: 0,
     }
 }
 
@@ -269,6 +273,10 @@ fn set_up(kind: Kind, at: *mut u8) {
                 set_up_gate(at.cast());
             }
             Kind::Tracker => set_up_tracker(at.cast()),
+            Kind::Monitor => {
+                let status = posegate_monitor_init(at.cast(), 1_000_000);
+                assert_eq!(status, posegate_status::Ok);
+            }
             Kind::Judge | Kind::Judges => {
                 let count = if kind == Kind::Judges { 2 } else { 1 };
                 for k in 0..count {
@@ -296,6 +304,7 @@ fn is_in_use(kind: Kind, at: *mut u8) -> bool {
                 let tracked = memory(size_of::<posegate_tracked>());
                 posegate_tracker_tracked(at.cast(), 76, tracked.cast())
             }
+            Kind::Monitor => posegate_monitor_reset(at.cast()),
             Kind::Judge | Kind::Judges => {
                 let estimate = estimate();
                 posegate_judge_permits(at.cast(), &estimate, memory(64).cast())
@@ -390,6 +399,7 @@ fn functions() -> Vec<Function> {
     let judge = || storage::<posegate_judge>(Kind::Judge, 1);
     let gate = || storage::<posegate_gate>(Kind::Gate, 1);
     let tracker = || storage::<posegate_tracker>(Kind::Tracker, 1);
+    let monitor = || storage::<posegate_monitor>(Kind::Monitor, 1);
     let word = || Argument {
         kind: Kind::Word,
         align: 4,
@@ -517,6 +527,20 @@ fn functions() -> Vec<Function> {
         |p| p[0].cast(),
         70,
         p[1].cast()
+    );
+    function!(
+        posegate_monitor_fix,
+        [
+            monitor(),
+            input(report(2, 40, 0.01, 0.0)),
+            input(evidence(report(1, 40, 0.0, 0.0))),
+            output::<u32>()
+        ],
+        |p| p[0].cast(),
+        p[1].cast(),
+        p[2].cast(),
+        posegate_dependence::Independent as u32,
+        p[3].cast()
     );
     function!(
         posegate_gate_tick,

@@ -73,6 +73,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         inhibit_hold_ms: arguments.inhibit_hold_ms,
         permits_in_a_row: arguments.permits_in_a_row,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: None,
     };
     let setup = ReplayConfig {

@@ -229,6 +229,7 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         inhibit_hold_ms: 500,
         permits_in_a_row: 3,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: None,
     };
     let setup = ReplayConfig {

@@ -87,6 +87,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
         inhibit_hold_ms: 1,
         permits_in_a_row: drive.permits_in_a_row,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: None,
     };
     // Near the wrap of the clock.

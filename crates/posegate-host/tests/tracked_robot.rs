@@ -314,6 +314,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
         inhibit_hold_ms: 1,
         permits_in_a_row: 1 + rng.below(2) as u16,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: None,
     };
     let tracker = TrackerSettings {

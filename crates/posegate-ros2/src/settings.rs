@@ -288,6 +288,8 @@ impl NodeSettings {
             inhibit_hold_ms: self.inhibit_hold_ms,
             permits_in_a_row: self.permits_in_a_row,
             restart: self.restart,
+            // A PC walks all cells of a table within a cycle.
+            most_runs: u32::MAX,
             look_at: self.look_at,
         }
     }

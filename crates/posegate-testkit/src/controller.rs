@@ -166,6 +166,7 @@ impl Controller {
             inhibit_hold_ms: INHIBIT_HOLD_MS,
             permits_in_a_row: PERMITS as u16,
             restart: Restart::Automatic,
+            most_runs: 1_000,
             look_at: Some(7),
         };
         let settings = Box::leak(Box::new(settings));

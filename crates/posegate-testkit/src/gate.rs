@@ -37,6 +37,7 @@ pub fn settings() -> Settings<'static> {
         inhibit_hold_ms: INHIBIT_HOLD_MS,
         permits_in_a_row: PERMITS,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: Some(7),
     }
 }

@@ -67,6 +67,7 @@ fn evaluations_that_disagree_are_latched() {
         inhibit_hold_ms: 1,
         permits_in_a_row: 1,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: None,
     };
     let wide = wider();
@@ -98,6 +99,7 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
         inhibit_hold_ms: 25,
         permits_in_a_row,
         restart: Restart::Automatic,
+        most_runs: 1_000,
         look_at: None,
     }
 }
@@ -601,3 +603,26 @@ fn a_shorter_table_in_the_same_place_is_refused() {
 
 mod aging;
 mod hypotheses;
+
+/// Cells are walked no farther than the settings allow; facets do not ask.
+#[test]
+fn a_set_that_takes_too_many_runs_is_denied_for_that() {
+    for (bytes, has_cells) in [(SEE_T7_GRID, true), (SEE_T7, false)] {
+        let table = Table::parse(bytes).unwrap();
+        for (most_runs, is_enough) in [(0, false), (3, false), (1_000, true), (u32::MAX, true)] {
+            let settings = Settings {
+                most_runs,
+                ..settings(&table, 1)
+            };
+            let mut gate = Gate::new(bytes, &settings, 900).unwrap();
+            let step = gate.step(1010, &report(1, 0.0));
+            let expected = if is_enough || !has_cells {
+                Ok(())
+            } else {
+                Err(Reason::TooCostly)
+            };
+            assert_eq!(step.verdict, expected, "{most_runs}");
+            assert_eq!(step.permission.is_permit(), expected.is_ok());
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Whether the errors that a source claims still hold: every accepted fix against its prediction.
+
+use super::evidence::Read;
+use super::memory::{Storage, close, open, read, separate, take, write};
+use super::{posegate_evidence, posegate_report, posegate_status};
+use posegate::gate::{Innovation, ModelStanding, Monitor};
+
+/// Words of a `posegate_monitor`.
+pub const POSEGATE_MONITOR_WORDS: usize = 5;
+
+/// Storage of a monitor, which compares the fixes of a source with predictions, and tells when they contradict the errors that it claims: a
+/// camera was knocked, or a tag has moved.
+///
+/// `posegate_monitor_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
+#[repr(C)]
+pub struct posegate_monitor {
+    /// Private.
+    pub words: [u64; POSEGATE_MONITOR_WORDS],
+}
+
+// SAFETY: integers.
+unsafe impl Storage for posegate_monitor {
+    type Held = Monitor;
+    const MARK: u32 = 0x6d6f_6e69;
+}
+
+/// How the errors of a fix and of its prediction depend on each other. 0 is not a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_dependence {
+    /// Not at all: a tag that is seen, against a pose that odometry carried from an earlier tag.
+    Independent = 1,
+    /// In any way, as where a filter shares its past with the prediction. A wrong model is found later.
+    Unknown = 2,
+}
+
+/// What a monitor thinks of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_model {
+    /// Nothing speaks against it.
+    Holds = 0,
+    /// Evidence is coming together: time to look at camera and tags.
+    InDoubt = 1,
+    /// It is contradicted: keep the gate closed (`posegate_gate_inhibit` with `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until a
+    /// person has looked and `posegate_monitor_reset` was called.
+    Contradicted = 2,
+}
+
+const CONTRADICTED: u32 = posegate_model::Contradicted as u32;
+
+fn model(standing: ModelStanding) -> u32 {
+    let model = match standing {
+        ModelStanding::Holds => posegate_model::Holds,
+        ModelStanding::InDoubt => posegate_model::InDoubt,
+        ModelStanding::Contradicted => posegate_model::Contradicted,
+    };
+    model as u32
+}
+
+/// Initialises a monitor that contradicts a model that holds once in `fixes_between_false_alarms` fixes on average, or less often: at least
+/// 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` for fewer.
+///
+/// # Safety
+/// The pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_monitor_init(
+    monitor: *mut posegate_monitor,
+    fixes_between_false_alarms: u32,
+) -> posegate_status {
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe {
+        let held = take(monitor)?;
+        let made = Monitor::new(fixes_between_false_alarms);
+        held.write(made.ok_or(posegate_status::BadValue)?);
+        close(monitor);
+        Ok(())
+    })
+}
+
+/// Takes an accepted fix and its prediction for the same time: with a tracker, `posegate_tracker_tracked` before `posegate_tracker_fix`, and
+/// the report after it. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+///
+/// Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if one of both has no valid covariance or the dependence is no such number. The
+/// fix then counts for nothing, and `POSEGATE_MODEL_CONTRADICTED` is written.
+///
+/// # Safety
+/// Each pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_monitor_fix(
+    monitor: *mut posegate_monitor,
+    fix: *const posegate_report,
+    prediction: *const posegate_evidence,
+    dependence: u32,
+    model: *mut u32,
+) -> posegate_status {
+    const INDEPENDENT: u32 = posegate_dependence::Independent as u32;
+    const UNKNOWN: u32 = posegate_dependence::Unknown as u32;
+    // SAFETY: the caller's promise; what is sealed has been written.
+    posegate_status::of(|| unsafe {
+        let apart = separate(monitor, fix)
+            .and(separate(monitor, prediction))
+            .and(separate(monitor, model));
+        let fix = read(fix).and_then(|report| report.report());
+        let prediction = Read::from(prediction);
+        write(model, CONTRADICTED)?;
+        apart?;
+        let monitor = &mut *open(monitor)?;
+        let (fix, prediction) = (fix?, prediction?);
+        let prediction = prediction.evidence();
+        let (belief, beside) = (&prediction.report.belief, prediction.beside);
+        let innovation = match dependence {
+            INDEPENDENT => Innovation::of_independent(&fix.belief, belief, beside),
+            UNKNOWN => Innovation::of_dependent(&fix.belief, belief, beside),
+            _ => return Err(posegate_status::BadValue),
+        };
+        let standing = innovation.and_then(|innovation| monitor.fix(&innovation));
+        write(
+            model,
+            self::model(standing.map_err(|_| posegate_status::BadValue)?),
+        )
+    })
+}
+
+/// Starts a monitor anew, after a person has looked at the cause.
+///
+/// # Safety
+/// The pointer is null, misaligned, or points to what its type says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_monitor_reset(monitor: *mut posegate_monitor) -> posegate_status {
+    // SAFETY: the caller's promise; what is sealed has been written.
+    posegate_status::of(|| unsafe {
+        let monitor = &mut *open(monitor)?;
+        monitor.reset();
+        Ok(())
+    })
+}
