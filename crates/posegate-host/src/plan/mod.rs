@@ -51,6 +51,8 @@ mod map;
 mod planned;
 mod planner;
 mod plans;
+mod proofs;
+mod rescue;
 mod rule_bytes;
 mod rules;
 mod search;

@@ -1,25 +1,25 @@
 //! Planning: the cheapest chain of looks and drives after which a work task is certain to succeed.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::certificate::is_certain;
+use super::backward::Horizons;
 use super::costs::Costs;
 use super::library::Library;
 use super::map::{self, Roadmap};
-use super::search::{Action, Answer, SearchOutcome, SearchProblem};
+use super::proofs::{Proofs, Sharpness};
+use super::rescue::Rescues;
+use super::search::{Action, Answer, SearchOutcome, SearchProblem, Wanted};
 use super::walk::{Walk, world};
 use super::{
     BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
     StepKind, StepReport, StopSignal, TaskTable,
 };
 use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
-use posegate::certify::Prover;
 use posegate::chain::StartAssumption;
-use posegate::contain::Margin;
 use posegate::set::Estimate;
-use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::task::Leg;
 
@@ -39,6 +39,7 @@ pub struct Prepared<'a> {
     prices: [f64; 2],
     /// `true` if contingencies are searched for even if no option requires them.
     tells_other_ways: bool,
+    proofs: Arc<Proofs>,
 }
 
 /// The places of a planning problem, with the successors and the predecessors of each.
@@ -87,30 +88,6 @@ pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
 const FALLBACK_DIVISOR: usize = 10;
 const FALLBACK_LIMIT: usize = 4_000;
 
-/// Shares of a table's margin for which a proof is tried.
-const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
-
-/// Proves that the set a step relies on lies inside its success set, scaled by a share of the table's margin. The
-/// reported margin is then the proven one.
-fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
-    let margin = report.margin.map_or(0.0, crate::log::factor);
-    let prover = Prover::new(success);
-    let mut tried = f64::INFINITY;
-    for share in SHARES {
-        let scale = (share * margin).clamp(1.0, 8.0);
-        if scale >= tried {
-            break;
-        }
-        if is_certain(&prover, success, &report.before, scale) {
-            let q16 = libm::floor(scale * 65_536.0) as u32;
-            report.margin = Some(Margin::from_q16(q16));
-            return true;
-        }
-        tried = scale;
-    }
-    false
-}
-
 pub(super) fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
     let tables = library.looks.iter();
     tables.map(|look| look.table.table()).collect()
@@ -155,6 +132,7 @@ impl<'a> Prepared<'a> {
             model_from: model_from.unwrap_or_default(),
             prices: [site.planner.metre, site.planner.look_cost],
             tells_other_ways: true,
+            proofs: Arc::default(),
         }
     }
 
@@ -164,6 +142,11 @@ impl<'a> Prepared<'a> {
         self.prices = [0.0, 1.0];
         self.tells_other_ways = false;
         self
+    }
+
+    /// Shares proofs with other plans of the same task and library.
+    pub(super) fn with_proofs(self, proofs: Arc<Proofs>) -> Self {
+        Self { proofs, ..self }
     }
 
     /// The library.
@@ -203,6 +186,7 @@ impl<'a> Prepared<'a> {
             limit: 0,
             stop: &StopSignal::default(),
             prunes_dominated: true,
+            horizons: &Horizons::default(),
         };
         let leads = (0..places.len())
             .into_par_iter()
@@ -351,6 +335,12 @@ impl<'a> Prepared<'a> {
                 }
             };
             let (mut changed, mut lacks) = (false, false);
+            let proofs = self.proofs.clone();
+            let sharpness = if self.tells_other_ways {
+                Sharpness::Margin
+            } else {
+                Sharpness::Holds
+            };
             for step in planned.steps_mut() {
                 let name = step.report.task.as_deref();
                 let table = match step.report.kind {
@@ -365,7 +355,10 @@ impl<'a> Prepared<'a> {
                     }
                 };
                 let failed = step.report.failure.is_some();
-                if table.is_proven() || failed || certify(&mut step.report, &table.success) {
+                if table.is_proven()
+                    || failed
+                    || proofs.certify(&mut step.report, &table.success, sharpness)
+                {
                     continue;
                 }
                 match lacking {
@@ -431,6 +424,7 @@ impl<'a> Prepared<'a> {
             limit: 0,
             stop: &StopSignal::default(),
             prunes_dominated: true,
+            horizons: &Horizons::default(),
         };
         let (leads, led) = map.with_dynamic(&question);
         Ok(RouteGraph { map, leads, led })
@@ -467,40 +461,22 @@ impl<'a> Prepared<'a> {
             limit: options.limit,
             stop: &options.stop,
             prunes_dominated: true,
+            horizons: &Horizons::default(),
         };
         let belief = BeliefStateF64::at_start(begin, start.spread, &start.known);
-        // `true` if a search for a contingency ended at its limit.
-        let unsure = core::cell::Cell::new(false);
-        let without =
-            |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| -> Option<Answer> {
-                match question.search(belief, place, risk, Some(look), &mut |_, _, _, _| true) {
-                    SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
-                        Some(answer)
-                    }
-                    SearchOutcome::Infeasible(_) => None,
-                    SearchOutcome::Open(_) => {
-                        unsure.set(true);
-                        None
-                    }
-                }
-            };
-        // A look that needs no tag cannot lose one.
-        let mut known: Vec<(BeliefStateF64, usize, f64, usize, bool)> = vec![];
+        let rescues = Rescues::default();
         let mut rescue = |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| {
-            if !options.survive_a_lost_tag || self.library.looks[look].tags.is_empty() {
-                return true;
-            }
-            let found = known
-                .iter()
-                .find(|(b, p, r, l, _)| (*p, *r, *l) == (place, risk, look) && b == belief);
-            if let Some((.., answer)) = found {
-                return *answer;
-            }
-            let answer = without(belief, place, risk, look).is_some();
-            known.push((belief.clone(), place, risk, look, answer));
-            answer
+            // A look that needs no tag cannot lose one.
+            !options.survive_a_lost_tag
+                || self.library.looks[look].tags.is_empty()
+                || rescues.exists(&question, (belief, place, risk), look)
         };
-        let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
+        let end = question.search(
+            (&belief, map.start, 0.0),
+            None,
+            Wanted::Cheapest,
+            &mut rescue,
+        );
         // A smaller set may fail a facet's lever although a larger set passes, so dominance pruning may lose a plan.
         let end = match end {
             SearchOutcome::Infeasible(miss) if self.tells_other_ways => {
@@ -509,7 +485,8 @@ impl<'a> Prepared<'a> {
                     limit: (options.limit / FALLBACK_DIVISOR).min(FALLBACK_LIMIT),
                     ..question
                 };
-                match thorough.search(&belief, map.start, 0.0, None, &mut rescue) {
+                let begin = (&belief, map.start, 0.0);
+                match thorough.search(begin, None, Wanted::Cheapest, &mut rescue) {
                     SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
                         SearchOutcome::Feasible(answer, 0.0)
                     }
@@ -532,7 +509,7 @@ impl<'a> Prepared<'a> {
             SearchOutcome::Open(miss) => (Status::Limit, None, None, miss),
         };
         // A plan that was excluded for lack of a contingency may have one.
-        let (status, bound) = match (status, unsure.get()) {
+        let (status, bound) = match (status, rescues.is_unsure()) {
             (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
             (Status::Infeasible, true) => (Status::Limit, None),
             (status, _) => (status, bound),
@@ -564,7 +541,8 @@ impl<'a> Prepared<'a> {
                     let before = &plan.steps[step].report.before;
                     let spent = plan.steps[..step].iter();
                     let risk_before = spent.map(|step| step.report.risk).sum();
-                    if let Some(other) = without(before, place, risk_before, *look) {
+                    let begin = (before, place, risk_before);
+                    if let Some(other) = rescues.cheapest(&question, begin, *look) {
                         let mut walk = Walk::start(self.site, start, StartAssumption::General)?;
                         self.replay(&mut walk, &answer.actions[..step], map)?;
                         let plan = self.told(walk, &other, map, work)?;
