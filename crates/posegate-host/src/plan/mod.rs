@@ -28,6 +28,7 @@ pub use self::costs::costs;
 pub(crate) use self::endpoint::TaskPlanner;
 pub use self::error::PlanError;
 pub use self::library::{Library, Look, Viewpoint};
+pub use self::nearby::plan_near;
 pub use self::planned::{Contingency, Nearest, Options, Plan, PlanResult, PlanStep, Status};
 pub use self::planner::Prepared;
 pub use self::plans::Plans;
@@ -40,14 +41,17 @@ pub mod language {}
 
 mod backward;
 mod belief;
+mod bound;
 mod certificate;
 mod chain;
 mod costs;
 mod endpoint;
 mod error;
+mod fewer;
 mod json;
 mod library;
 mod map;
+mod nearby;
 mod planned;
 mod planner;
 mod plans;

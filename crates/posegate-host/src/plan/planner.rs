@@ -6,7 +6,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::backward::Horizons;
+use super::bound::EveryChain;
 use super::costs::Costs;
+use super::fewer::FewerLooks;
 use super::library::Library;
 use super::map::{self, Roadmap};
 use super::proofs::{Proofs, Sharpness};
@@ -15,7 +17,7 @@ use super::search::{Action, Answer, SearchOutcome, SearchProblem, Wanted};
 use super::walk::{Walk, world};
 use super::{
     BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
-    StepKind, StepReport, StopSignal, TaskTable,
+    StepKind, StepReport, StopSignal, TaskTable, Viewpoint,
 };
 use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
 use posegate::chain::StartAssumption;
@@ -157,12 +159,20 @@ impl<'a> Prepared<'a> {
 
     /// Computes the looks and the successors of each place.
     pub(super) fn connect(&mut self) -> Result<(), PlanError> {
+        self.link(0)
+    }
+
+    /// Computes the looks and the successors of the places from a number on, and adds them to the successors of the
+    /// others.
+    fn link(&mut self, first: usize) -> Result<(), PlanError> {
         let tables = parsed(&self.library)?;
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
-        let seen: Vec<Vec<usize>> = places
-            .par_iter()
-            .map(|pose| map::seen(&self.library, &tables, *pose))
-            .collect();
+        let mut seen = self.seen.clone();
+        seen.par_extend(
+            places[first..]
+                .par_iter()
+                .map(|pose| map::seen(&self.library, &tables, *pose)),
+        );
         let costs = Costs::default();
         let Some(any) = tables.first() else {
             return Ok(());
@@ -191,9 +201,12 @@ impl<'a> Prepared<'a> {
         let leads = (0..places.len())
             .into_par_iter()
             .map(|from| {
-                (0..places.len())
-                    .filter(|to| question.arrives(from, *to))
-                    .collect()
+                let (mut known, new) = match self.leads.get(from) {
+                    Some(known) => (known.clone(), first),
+                    None => (vec![], 0),
+                };
+                known.extend((new..places.len()).filter(|to| question.arrives(from, *to)));
+                known
             })
             .collect();
         drop(tables);
@@ -227,11 +240,66 @@ impl<'a> Prepared<'a> {
         let task = self.site.tasks.get(work);
         let task = task.filter(|task| task.kind == TaskKind::Work);
         let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
-        let mut work_table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
+        let table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
         let start = start.toward(task.success.goal);
-        let planned = self.plan_laid(&start, &mut work_table, options, None);
+        let planned = self.plan_laid(&start, &mut table.clone(), options, None);
         self.relax();
-        planned
+        let mut planned = planned?;
+        let priced = !options.costs.is_empty();
+        let every = EveryChain::of(self.site, &start, &table.success, self.model, priced);
+        let bound = every.bound();
+        let may_be_less = |plan: &Plan| plan.cost > bound * (1.0 + 1e-9);
+        if let Some(plan) = planned.plan.as_ref().filter(|plan| may_be_less(plan))
+            && !priced
+            && !options.survive_a_lost_tag
+            && let Some(cheaper) = self.with_fewer_looks(&start, &table, options, plan)?
+        {
+            planned = cheaper;
+        }
+        Ok(PlanResult {
+            bound_of_all: bound,
+            ..planned
+        })
+    }
+
+    /// Plans again with places for chains with fewer looks than a plan's. Returns a plan that costs less, if there is one.
+    fn with_fewer_looks(
+        &self,
+        start: &ChainStart,
+        work: &TaskTable,
+        options: &Options,
+        plan: &Plan,
+    ) -> Result<Option<PlanResult>, PlanError> {
+        let places = FewerLooks {
+            site: self.site,
+            library: &self.library,
+            tables: &parsed(&self.library)?,
+            work: &work.table()?,
+            model: self.model,
+            start,
+            begin: world(start.pose),
+            goal: world(work.success.goal),
+            options,
+        }
+        .places(plan);
+        if places.is_empty() {
+            return Ok(None);
+        }
+        let mut more = self.clone();
+        let known = more.library.views.len();
+        for (look, pose) in places {
+            let own = more.library.views.iter().filter(|view| view.look == look);
+            let name = std::format!(
+                "{}#{}",
+                self.library.looks[look].table.name,
+                own.count() + 1
+            );
+            more.library.views.push(Viewpoint { pose, name, look });
+        }
+        more.link(known)?;
+        let again = more.plan_laid(start, &mut work.clone(), options, None)?;
+        let costs_less = |other: &Plan| other.cost < plan.cost * (1.0 - 1e-9);
+        Ok(again.plan.as_ref().is_some_and(costs_less).then_some(again))
     }
 
     /// Goes back to the tables as baked, so that an answer does not depend on earlier problems.
@@ -311,6 +379,7 @@ impl<'a> Prepared<'a> {
             bound,
             contingencies: vec![],
             nearest: None,
+            bound_of_all: 0.0,
             model_from: self.model_from(),
         })
     }
@@ -575,6 +644,7 @@ impl<'a> Prepared<'a> {
             bound,
             contingencies,
             nearest,
+            bound_of_all: 0.0,
             model_from: self.model_from(),
         };
         Ok(planned)

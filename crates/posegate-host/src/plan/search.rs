@@ -185,18 +185,13 @@ impl SearchProblem<'_> {
     }
 
     pub(super) fn drive(&self, belief: &BeliefStateF64, to: usize) -> Option<BeliefStateF64> {
-        let model = self.model.as_ref()?;
-        let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
-        let from = pose(belief.pose);
-        let legs = [Leg::Straight(pose(self.places[to]))];
-        Some(belief.driven(
-            &from,
-            &legs,
-            model,
+        drive_to(
+            belief,
+            self.places[to],
+            self.model.as_ref(),
+            self.navigation,
             self.epsilon,
-            belief.spread,
-            self.navigation.controller,
-        ))
+        )
     }
 
     /// Returns `true` if a look needs none of the tags of the banned look.
@@ -503,6 +498,25 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
                 a.belief == b.belief
             }
     }
+}
+
+/// Returns the belief after a straight drive to a place; `None` without a drive model.
+pub(super) fn drive_to(
+    belief: &BeliefStateF64,
+    to: [f64; 3],
+    model: Option<&DriveModel>,
+    navigation: &Navigation,
+    epsilon: f64,
+) -> Option<BeliefStateF64> {
+    let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
+    Some(belief.driven(
+        &pose(belief.pose),
+        &[Leg::Straight(pose(to))],
+        model?,
+        epsilon,
+        belief.spread,
+        navigation.controller,
+    ))
 }
 
 /// Returns `true` if a belief is at least as good as another one at the same place in every respect.
