@@ -4,7 +4,7 @@ use crate::chain::{failure, sentences};
 use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate_host::draw::chain_picture;
 use posegate_host::files::{Files, Input, Output};
-use posegate_host::plan::{Options, PlanError, Prepared, Status};
+use posegate_host::plan::{Options, PlanError, Status, plan_near};
 use std::collections::BTreeMap;
 
 /// Finds the cheapest chain of looks and drives after which a work task is certain to succeed
@@ -75,10 +75,8 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         ),
         other => failure(&arguments.site, other),
     };
-    let mut prepared = Prepared::of(&site, Some(from)).map_err(failed)?;
-    let planned = prepared
-        .plan(&chain.start, &arguments.to, &options)
-        .map_err(failed)?;
+    let planned =
+        plan_near(&site, Some(from), &chain.start, &arguments.to, &options).map_err(failed)?;
     if let (Some(path), Some(_)) = (&arguments.rules, &planned.plan) {
         let bytes = planned.rules(&site).ok_or_else(|| {
             Failure::usage(
@@ -106,15 +104,17 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                     print(&line)?;
                 }
                 print(&format_args!(
-                    "cost {:.3}, {}",
+                    "cost {:.3}, {}; no chain at all costs less than {:.3} (gap {:.1} %)",
                     plan.cost,
                     match planned.status {
                         Status::Optimal => "optimal among the chains of the library".to_owned(),
                         _ => format!(
-                            "no plan is cheaper than {:.3}",
+                            "no chain of the library is cheaper than {:.3}",
                             planned.bound.unwrap_or(0.0)
                         ),
-                    }
+                    },
+                    planned.bound_of_all,
+                    100.0 * planned.gap().unwrap_or(0.0)
                 ))?;
                 for other in &planned.contingencies {
                     print(&format_args!(

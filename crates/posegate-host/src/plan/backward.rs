@@ -1,6 +1,7 @@
 //! Backward pass from the work task: the places that can lead to it, and a lower bound of the cost from each.
 
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::sync::{Arc, Mutex};
 
 use super::BeliefStateF64;
 use super::costs::way;
@@ -11,6 +12,25 @@ use posegate::table::Table;
 
 /// Scale factors for a belief's set. A larger set is tried if the set itself does not fit.
 const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
+
+/// The costs to go of one problem, by the look that is not allowed: many searches ask for the same.
+#[derive(Debug, Default)]
+pub(super) struct Horizons {
+    known: Mutex<BTreeMap<Option<usize>, Arc<Vec<f64>>>>,
+}
+
+impl Horizons {
+    /// Returns the known costs to go without a look, or makes them.
+    pub fn of(&self, banned: Option<usize>, make: impl FnOnce() -> Vec<f64>) -> Arc<Vec<f64>> {
+        let Ok(mut known) = self.known.lock() else {
+            return Arc::new(make());
+        };
+        known
+            .entry(banned)
+            .or_insert_with(|| Arc::new(make()))
+            .clone()
+    }
+}
 
 impl SearchProblem<'_> {
     /// Returns a belief that is exact at a place, after a look. No belief there is better.

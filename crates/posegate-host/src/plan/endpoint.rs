@@ -1,9 +1,11 @@
 //! One work task and its start, prepared for plans with any subset of the tags near them.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use super::map;
 use super::planner::{Prepared, RouteGraph, WIDER};
+use super::proofs::Proofs;
 use super::walk::world;
 use super::{Library, Options, PlanError, PlanResult, TaskTable};
 use crate::site::{ChainStart, Site, TaskKind};
@@ -17,6 +19,7 @@ pub struct TaskPlanner<'a> {
     site: &'a Site,
     library: Library,
     laid: RouteGraph,
+    proofs: Arc<Proofs>,
     start: ChainStart,
     work: TaskTable,
     tags: BTreeSet<String>,
@@ -54,6 +57,7 @@ impl<'a> TaskPlanner<'a> {
         Ok(Self {
             site,
             tags: tags.cloned().collect(),
+            proofs: Arc::default(),
             library,
             laid,
             start,
@@ -109,8 +113,9 @@ impl<'a> TaskPlanner<'a> {
             .library
             .only(|look| look.tags.iter().all(|tag| has(tag)));
         let laid = self.laid.only(&self.library, &number);
-        let mut prepared =
-            Prepared::unconnected(self.site, self.chain.as_deref(), part).with_fewest_looks();
+        let mut prepared = Prepared::unconnected(self.site, self.chain.as_deref(), part)
+            .with_fewest_looks()
+            .with_proofs(self.proofs.clone());
         prepared.plan_laid(&self.start, &mut self.work.clone(), options, Some(laid))
     }
 }

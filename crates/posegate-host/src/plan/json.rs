@@ -97,7 +97,9 @@ impl Plan {
 }
 
 impl PlanResult {
-    /// `{"status", "success", "cost", "cost_bound", "risk", "steps", "contingencies", "nearest_miss"}`.
+    /// `{"status", "success", "cost", "cost_bound", "library_bound", "gap", "risk", "steps", "contingencies",
+    /// "nearest_miss"}`. `cost_bound` holds for every chain, `library_bound` for the chains of the library; `gap` is the
+    /// part of the cost above `cost_bound`.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let mut whole = match &self.plan {
@@ -110,7 +112,9 @@ impl PlanResult {
             Status::Infeasible => "infeasible",
             Status::Limit => "limit",
         });
-        whole["cost_bound"] = json!(self.bound);
+        whole["cost_bound"] = json!(self.bound_of_all);
+        whole["library_bound"] = json!(self.bound);
+        whole["gap"] = json!(self.gap());
         whole["model_from"] = json!(self.model_from);
         let others: Vec<Value> = self
             .contingencies

@@ -58,7 +58,18 @@ impl Library {
     /// [`PlanError::NoLooks`] if the site has no look, [`PlanError::Table`] if a set has no table, and
     /// [`PlanError::BoundTooLarge`] if a look's error bound does not fit into its own success set.
     pub fn of(site: &Site) -> Result<Self, PlanError> {
-        Self::with(site, false)
+        Self::with(site, false, &|_| true)
+    }
+
+    /// Like [`Library::of`], with only those looks of whose success sets `keeps` returns `true`.
+    ///
+    /// # Errors
+    /// Those of [`Library::of`].
+    pub(super) fn part(
+        site: &Site,
+        keeps: &dyn Fn(&SuccessSet) -> bool,
+    ) -> Result<Self, PlanError> {
+        Self::with(site, false, keeps)
     }
 
     /// Like [`Library::of`], with the looks that `[planner]` makes for every candidate. Omits candidates' looks that
@@ -67,10 +78,14 @@ impl Library {
     /// # Errors
     /// Those of [`Library::of`].
     pub fn with_candidates(site: &Site) -> Result<Self, PlanError> {
-        Self::with(site, true)
+        Self::with(site, true, &|_| true)
     }
 
-    fn with(site: &Site, candidates: bool) -> Result<Self, PlanError> {
+    fn with(
+        site: &Site,
+        candidates: bool,
+        keeps: &dyn Fn(&SuccessSet) -> bool,
+    ) -> Result<Self, PlanError> {
         let own = site.tasks.iter().filter_map(|(name, task)| {
             let bound = task.error_bound?;
             let tags = tags(site, &task.success.shape);
@@ -94,7 +109,8 @@ impl Library {
                 TableOverrides::default(),
             )
         });
-        let orders: Vec<_> = own.chain(made).collect();
+        let orders = own.chain(made).filter(|(_, _, success, ..)| keeps(success));
+        let orders: Vec<_> = orders.collect();
         if orders.is_empty() {
             return Err(PlanError::NoLooks(site.tags.len()));
         }
@@ -186,13 +202,7 @@ fn look(
     tags: Vec<String>,
     bound: ErrorBound,
 ) -> Result<(Look, Vec<Viewpoint>), PlanError> {
-    let (centre, radius) = match farthest_view(&table.success.shape) {
-        Some(view) => {
-            let arm = libm::hypot(view.mount.x, view.mount.y);
-            ([view.tag.pose.x, view.tag.pose.y], view.d_max + arm)
-        }
-        None => ([table.success.goal.x, table.success.goal.y], 134.0),
-    };
+    let (centre, radius) = region(&table.success);
     let most = site.planner.views as usize;
     let places = places(
         &table.success,
@@ -224,6 +234,25 @@ fn look(
         radius,
     };
     Ok((look, views))
+}
+
+/// Returns the position of a look's tag (or its goal), and the largest distance from it at which the look may be of use,
+/// metres.
+pub(super) fn region(success: &SuccessSet) -> ([f64; 2], f64) {
+    match farthest_view(&success.shape) {
+        Some(view) => {
+            let arm = libm::hypot(view.mount.x, view.mount.y);
+            ([view.tag.pose.x, view.tag.pose.y], view.d_max + arm)
+        }
+        None => ([success.goal.x, success.goal.y], 134.0),
+    }
+}
+
+/// Returns the pose of a robot at a position whose camera faces a look's tag. `None` if the look is not at one tag.
+pub(super) fn facing(success: &SuccessSet, [x, y]: [f64; 2]) -> Option<[f64; 3]> {
+    let view = farthest_view(&success.shape)?;
+    let bearing = libm::atan2(view.tag.pose.y - y, view.tag.pose.x - x);
+    Some([x, y, wrapped(bearing - view.mount.yaw_deg.to_radians())])
 }
 
 /// Returns the view with the largest range, if all views are of one tag by one camera. A learnt model makes several

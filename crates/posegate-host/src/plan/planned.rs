@@ -98,8 +98,11 @@ pub struct PlanResult {
     pub status: Status,
     /// The plan.
     pub plan: Option<Plan>,
-    /// A lower bound of the cost of every plan.
+    /// A lower bound of the cost of every chain of the library.
     pub bound: Option<f64>,
+    /// A lower bound of the cost of every chain, whatever places it looks from: the straight way, and the least number
+    /// of looks that any chain needs.
+    pub bound_of_all: f64,
     /// Plans for failed looks; with [`Options::survive_a_lost_tag`] for every look at a tag.
     pub contingencies: Vec<Contingency>,
     /// The nearest miss, if there is no plan.
@@ -113,6 +116,18 @@ impl PlanResult {
         let others = self.contingencies.iter_mut();
         let own = self.plan.iter_mut().flat_map(|plan| plan.steps.iter_mut());
         own.chain(others.flat_map(|other| other.plan.steps.iter_mut()))
+    }
+
+    /// Returns the part of the plan's cost that lies above [`Self::bound_of_all`], 0 to 1; `None` without a plan.
+    #[must_use]
+    pub fn gap(&self) -> Option<f64> {
+        let cost = self.plan.as_ref()?.cost;
+        let gap = if cost > 0.0 {
+            ((cost - self.bound_of_all) / cost).max(0.0)
+        } else {
+            0.0
+        };
+        Some(gap)
     }
 
     /// Returns `true` if the core's evaluation satisfies the options.

@@ -1,25 +1,27 @@
 //! Planning: the cheapest chain of looks and drives after which a work task is certain to succeed.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::certificate::is_certain;
+use super::backward::Horizons;
+use super::bound::EveryChain;
 use super::costs::Costs;
+use super::fewer::FewerLooks;
 use super::library::Library;
 use super::map::{self, Roadmap};
-use super::search::{Action, Answer, SearchOutcome, SearchProblem};
+use super::proofs::{Proofs, Sharpness};
+use super::rescue::Rescues;
+use super::search::{Action, Answer, SearchOutcome, SearchProblem, Wanted};
 use super::walk::{Walk, world};
 use super::{
     BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
-    StepKind, StepReport, StopSignal, TaskTable,
+    StepKind, StepReport, StopSignal, TaskTable, Viewpoint,
 };
 use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
-use posegate::certify::Prover;
 use posegate::chain::StartAssumption;
-use posegate::contain::Margin;
 use posegate::set::Estimate;
-use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::task::Leg;
 
@@ -39,6 +41,7 @@ pub struct Prepared<'a> {
     prices: [f64; 2],
     /// `true` if contingencies are searched for even if no option requires them.
     tells_other_ways: bool,
+    proofs: Arc<Proofs>,
 }
 
 /// The places of a planning problem, with the successors and the predecessors of each.
@@ -87,30 +90,6 @@ pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
 const FALLBACK_DIVISOR: usize = 10;
 const FALLBACK_LIMIT: usize = 4_000;
 
-/// Shares of a table's margin for which a proof is tried.
-const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
-
-/// Proves that the set a step relies on lies inside its success set, scaled by a share of the table's margin. The
-/// reported margin is then the proven one.
-fn certify(report: &mut StepReport, success: &SuccessSet) -> bool {
-    let margin = report.margin.map_or(0.0, crate::log::factor);
-    let prover = Prover::new(success);
-    let mut tried = f64::INFINITY;
-    for share in SHARES {
-        let scale = (share * margin).clamp(1.0, 8.0);
-        if scale >= tried {
-            break;
-        }
-        if is_certain(&prover, success, &report.before, scale) {
-            let q16 = libm::floor(scale * 65_536.0) as u32;
-            report.margin = Some(Margin::from_q16(q16));
-            return true;
-        }
-        tried = scale;
-    }
-    false
-}
-
 pub(super) fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
     let tables = library.looks.iter();
     tables.map(|look| look.table.table()).collect()
@@ -155,6 +134,7 @@ impl<'a> Prepared<'a> {
             model_from: model_from.unwrap_or_default(),
             prices: [site.planner.metre, site.planner.look_cost],
             tells_other_ways: true,
+            proofs: Arc::default(),
         }
     }
 
@@ -166,6 +146,11 @@ impl<'a> Prepared<'a> {
         self
     }
 
+    /// Shares proofs with other plans of the same task and library.
+    pub(super) fn with_proofs(self, proofs: Arc<Proofs>) -> Self {
+        Self { proofs, ..self }
+    }
+
     /// The library.
     #[must_use]
     pub const fn library(&self) -> &Library {
@@ -174,12 +159,20 @@ impl<'a> Prepared<'a> {
 
     /// Computes the looks and the successors of each place.
     pub(super) fn connect(&mut self) -> Result<(), PlanError> {
+        self.link(0)
+    }
+
+    /// Computes the looks and the successors of the places from a number on, and adds them to the successors of the
+    /// others.
+    fn link(&mut self, first: usize) -> Result<(), PlanError> {
         let tables = parsed(&self.library)?;
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
-        let seen: Vec<Vec<usize>> = places
-            .par_iter()
-            .map(|pose| map::seen(&self.library, &tables, *pose))
-            .collect();
+        let mut seen = self.seen.clone();
+        seen.par_extend(
+            places[first..]
+                .par_iter()
+                .map(|pose| map::seen(&self.library, &tables, *pose)),
+        );
         let costs = Costs::default();
         let Some(any) = tables.first() else {
             return Ok(());
@@ -203,13 +196,17 @@ impl<'a> Prepared<'a> {
             limit: 0,
             stop: &StopSignal::default(),
             prunes_dominated: true,
+            horizons: &Horizons::default(),
         };
         let leads = (0..places.len())
             .into_par_iter()
             .map(|from| {
-                (0..places.len())
-                    .filter(|to| question.arrives(from, *to))
-                    .collect()
+                let (mut known, new) = match self.leads.get(from) {
+                    Some(known) => (known.clone(), first),
+                    None => (vec![], 0),
+                };
+                known.extend((new..places.len()).filter(|to| question.arrives(from, *to)));
+                known
             })
             .collect();
         drop(tables);
@@ -243,11 +240,66 @@ impl<'a> Prepared<'a> {
         let task = self.site.tasks.get(work);
         let task = task.filter(|task| task.kind == TaskKind::Work);
         let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
-        let mut work_table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
+        let table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
         let start = start.toward(task.success.goal);
-        let planned = self.plan_laid(&start, &mut work_table, options, None);
+        let planned = self.plan_laid(&start, &mut table.clone(), options, None);
         self.relax();
-        planned
+        let mut planned = planned?;
+        let priced = !options.costs.is_empty();
+        let every = EveryChain::of(self.site, &start, &table.success, self.model, priced);
+        let bound = every.bound();
+        let may_be_less = |plan: &Plan| plan.cost > bound * (1.0 + 1e-9);
+        if let Some(plan) = planned.plan.as_ref().filter(|plan| may_be_less(plan))
+            && !priced
+            && !options.survive_a_lost_tag
+            && let Some(cheaper) = self.with_fewer_looks(&start, &table, options, plan)?
+        {
+            planned = cheaper;
+        }
+        Ok(PlanResult {
+            bound_of_all: bound,
+            ..planned
+        })
+    }
+
+    /// Plans again with places for chains with fewer looks than a plan's. Returns a plan that costs less, if there is one.
+    fn with_fewer_looks(
+        &self,
+        start: &ChainStart,
+        work: &TaskTable,
+        options: &Options,
+        plan: &Plan,
+    ) -> Result<Option<PlanResult>, PlanError> {
+        let places = FewerLooks {
+            site: self.site,
+            library: &self.library,
+            tables: &parsed(&self.library)?,
+            work: &work.table()?,
+            model: self.model,
+            start,
+            begin: world(start.pose),
+            goal: world(work.success.goal),
+            options,
+        }
+        .places(plan);
+        if places.is_empty() {
+            return Ok(None);
+        }
+        let mut more = self.clone();
+        let known = more.library.views.len();
+        for (look, pose) in places {
+            let own = more.library.views.iter().filter(|view| view.look == look);
+            let name = std::format!(
+                "{}#{}",
+                self.library.looks[look].table.name,
+                own.count() + 1
+            );
+            more.library.views.push(Viewpoint { pose, name, look });
+        }
+        more.link(known)?;
+        let again = more.plan_laid(start, &mut work.clone(), options, None)?;
+        let costs_less = |other: &Plan| other.cost < plan.cost * (1.0 - 1e-9);
+        Ok(again.plan.as_ref().is_some_and(costs_less).then_some(again))
     }
 
     /// Goes back to the tables as baked, so that an answer does not depend on earlier problems.
@@ -327,6 +379,7 @@ impl<'a> Prepared<'a> {
             bound,
             contingencies: vec![],
             nearest: None,
+            bound_of_all: 0.0,
             model_from: self.model_from(),
         })
     }
@@ -351,6 +404,12 @@ impl<'a> Prepared<'a> {
                 }
             };
             let (mut changed, mut lacks) = (false, false);
+            let proofs = self.proofs.clone();
+            let sharpness = if self.tells_other_ways {
+                Sharpness::Margin
+            } else {
+                Sharpness::Holds
+            };
             for step in planned.steps_mut() {
                 let name = step.report.task.as_deref();
                 let table = match step.report.kind {
@@ -365,7 +424,10 @@ impl<'a> Prepared<'a> {
                     }
                 };
                 let failed = step.report.failure.is_some();
-                if table.is_proven() || failed || certify(&mut step.report, &table.success) {
+                if table.is_proven()
+                    || failed
+                    || proofs.certify(&mut step.report, &table.success, sharpness)
+                {
                     continue;
                 }
                 match lacking {
@@ -431,6 +493,7 @@ impl<'a> Prepared<'a> {
             limit: 0,
             stop: &StopSignal::default(),
             prunes_dominated: true,
+            horizons: &Horizons::default(),
         };
         let (leads, led) = map.with_dynamic(&question);
         Ok(RouteGraph { map, leads, led })
@@ -467,40 +530,22 @@ impl<'a> Prepared<'a> {
             limit: options.limit,
             stop: &options.stop,
             prunes_dominated: true,
+            horizons: &Horizons::default(),
         };
         let belief = BeliefStateF64::at_start(begin, start.spread, &start.known);
-        // `true` if a search for a contingency ended at its limit.
-        let unsure = core::cell::Cell::new(false);
-        let without =
-            |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| -> Option<Answer> {
-                match question.search(belief, place, risk, Some(look), &mut |_, _, _, _| true) {
-                    SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
-                        Some(answer)
-                    }
-                    SearchOutcome::Infeasible(_) => None,
-                    SearchOutcome::Open(_) => {
-                        unsure.set(true);
-                        None
-                    }
-                }
-            };
-        // A look that needs no tag cannot lose one.
-        let mut known: Vec<(BeliefStateF64, usize, f64, usize, bool)> = vec![];
+        let rescues = Rescues::default();
         let mut rescue = |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| {
-            if !options.survive_a_lost_tag || self.library.looks[look].tags.is_empty() {
-                return true;
-            }
-            let found = known
-                .iter()
-                .find(|(b, p, r, l, _)| (*p, *r, *l) == (place, risk, look) && b == belief);
-            if let Some((.., answer)) = found {
-                return *answer;
-            }
-            let answer = without(belief, place, risk, look).is_some();
-            known.push((belief.clone(), place, risk, look, answer));
-            answer
+            // A look that needs no tag cannot lose one.
+            !options.survive_a_lost_tag
+                || self.library.looks[look].tags.is_empty()
+                || rescues.exists(&question, (belief, place, risk), look)
         };
-        let end = question.search(&belief, map.start, 0.0, None, &mut rescue);
+        let end = question.search(
+            (&belief, map.start, 0.0),
+            None,
+            Wanted::Cheapest,
+            &mut rescue,
+        );
         // A smaller set may fail a facet's lever although a larger set passes, so dominance pruning may lose a plan.
         let end = match end {
             SearchOutcome::Infeasible(miss) if self.tells_other_ways => {
@@ -509,7 +554,8 @@ impl<'a> Prepared<'a> {
                     limit: (options.limit / FALLBACK_DIVISOR).min(FALLBACK_LIMIT),
                     ..question
                 };
-                match thorough.search(&belief, map.start, 0.0, None, &mut rescue) {
+                let begin = (&belief, map.start, 0.0);
+                match thorough.search(begin, None, Wanted::Cheapest, &mut rescue) {
                     SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
                         SearchOutcome::Feasible(answer, 0.0)
                     }
@@ -532,7 +578,7 @@ impl<'a> Prepared<'a> {
             SearchOutcome::Open(miss) => (Status::Limit, None, None, miss),
         };
         // A plan that was excluded for lack of a contingency may have one.
-        let (status, bound) = match (status, unsure.get()) {
+        let (status, bound) = match (status, rescues.is_unsure()) {
             (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
             (Status::Infeasible, true) => (Status::Limit, None),
             (status, _) => (status, bound),
@@ -564,7 +610,8 @@ impl<'a> Prepared<'a> {
                     let before = &plan.steps[step].report.before;
                     let spent = plan.steps[..step].iter();
                     let risk_before = spent.map(|step| step.report.risk).sum();
-                    if let Some(other) = without(before, place, risk_before, *look) {
+                    let begin = (before, place, risk_before);
+                    if let Some(other) = rescues.cheapest(&question, begin, *look) {
                         let mut walk = Walk::start(self.site, start, StartAssumption::General)?;
                         self.replay(&mut walk, &answer.actions[..step], map)?;
                         let plan = self.told(walk, &other, map, work)?;
@@ -597,6 +644,7 @@ impl<'a> Prepared<'a> {
             bound,
             contingencies,
             nearest,
+            bound_of_all: 0.0,
             model_from: self.model_from(),
         };
         Ok(planned)

@@ -13,11 +13,14 @@
 //! best-first. The first plan taken from the queue is the cheapest of the library. If the queue becomes empty, there is
 //! no plan.
 
+use core::cell::RefCell;
 use std::cmp;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::sync::Arc;
 
 use super::BeliefStateF64;
 use super::StopSignal;
+use super::backward::Horizons;
 use super::costs::{Costs, way};
 use super::library::{Library, needed};
 use crate::site::{DriveModel, ErrorBound, Navigation};
@@ -55,6 +58,44 @@ pub(super) struct SearchProblem<'a> {
     pub stop: &'a StopSignal,
     /// `true` if dominated labels are dropped; else only equal labels are dropped.
     pub prunes_dominated: bool,
+    /// The costs to go that are known already.
+    pub horizons: &'a Horizons,
+}
+
+/// What a search is for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Wanted<'d> {
+    /// The cheapest plan.
+    Cheapest,
+    /// Any plan, no matter its cost: the search ends with the first one. It adds no label that an earlier search with
+    /// the same banned look showed to lead nowhere.
+    Any(&'d RefCell<DeadEnds>),
+}
+
+/// Labels from which there is no plan, by place. No drive without a look follows them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct DeadEnds {
+    places: BTreeMap<usize, Vec<(BeliefStateF64, f64)>>,
+}
+
+impl DeadEnds {
+    /// Returns `true` if a label with less uncertainty and less risk leads nowhere.
+    fn imply(&self, label: &Label) -> bool {
+        self.places.get(&label.place).is_some_and(|known| {
+            let mut known = known.iter();
+            known.any(|(belief, risk)| *risk <= label.risk && is_within(belief, &label.belief))
+        })
+    }
+
+    fn add(&mut self, label: &Label) {
+        if !self.imply(label) {
+            let known = self.places.entry(label.place).or_default();
+            known.retain(|(belief, risk)| {
+                !(label.risk <= *risk && is_within(&label.belief, belief))
+            });
+            known.push((label.belief.clone(), label.risk));
+        }
+    }
 }
 
 /// One action of a plan.
@@ -144,18 +185,13 @@ impl SearchProblem<'_> {
     }
 
     pub(super) fn drive(&self, belief: &BeliefStateF64, to: usize) -> Option<BeliefStateF64> {
-        let model = self.model.as_ref()?;
-        let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
-        let from = pose(belief.pose);
-        let legs = [Leg::Straight(pose(self.places[to]))];
-        Some(belief.driven(
-            &from,
-            &legs,
-            model,
+        drive_to(
+            belief,
+            self.places[to],
+            self.model.as_ref(),
+            self.navigation,
             self.epsilon,
-            belief.spread,
-            self.navigation.controller,
-        ))
+        )
     }
 
     /// Returns `true` if a look needs none of the tags of the banned look.
@@ -170,13 +206,12 @@ impl SearchProblem<'_> {
     /// from there.
     pub fn search(
         &self,
-        start: &BeliefStateF64,
-        place: usize,
-        risk: f64,
+        (start, place, risk): (&BeliefStateF64, usize, f64),
         banned: Option<usize>,
+        wanted: Wanted<'_>,
         rescue: &mut Rescue<'_>,
     ) -> SearchOutcome {
-        let mut search = Search::new(self, banned);
+        let mut search = Search::new(self, banned, wanted);
         search.add(
             Label {
                 place,
@@ -206,12 +241,13 @@ pub(super) type Rescue<'r> = dyn FnMut(&BeliefStateF64, usize, f64, usize) -> bo
 const STOP_EVERY: usize = 16;
 
 /// A running search: all labels, and the queue of those that may be extended.
-struct Search<'s, 'p> {
+struct Search<'s, 'p, 'd> {
     problem: &'s SearchProblem<'p>,
     /// The look that must not be used, nor another look at its tags.
     banned: Option<usize>,
+    wanted: Wanted<'d>,
     /// A lower bound of the cost from each place to the work.
-    to_go: Vec<f64>,
+    to_go: Arc<Vec<f64>>,
     labels: Vec<Label>,
     queue: BinaryHeap<Queued>,
     /// The labels of each place that no other label dominates.
@@ -221,12 +257,13 @@ struct Search<'s, 'p> {
     miss: Option<NearMiss>,
 }
 
-impl<'s, 'p> Search<'s, 'p> {
-    fn new(problem: &'s SearchProblem<'p>, banned: Option<usize>) -> Self {
+impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
+    fn new(problem: &'s SearchProblem<'p>, banned: Option<usize>, wanted: Wanted<'d>) -> Self {
         Self {
             problem,
             banned,
-            to_go: problem.to_go(banned),
+            wanted,
+            to_go: problem.horizons.of(banned, || problem.to_go(banned)),
             labels: vec![],
             queue: BinaryHeap::new(),
             at_place: vec![vec![]; problem.places.len()],
@@ -254,6 +291,15 @@ impl<'s, 'p> Search<'s, 'p> {
                 };
             }
             self.extend(label, rescue);
+            if let (Wanted::Any(_), Some((_, last))) = (self.wanted, self.best) {
+                return SearchOutcome::Feasible(answer(&self.labels, last), bound);
+            }
+        }
+        if let (Wanted::Any(dead), true) = (self.wanted, self.problem.prunes_dominated) {
+            let mut dead = dead.borrow_mut();
+            // From the first label the robot may also drive without a look, so it is worth more than others there.
+            let others = self.at_place.iter().flatten().filter(|number| **number > 0);
+            others.for_each(|number| dead.add(&self.labels[*number]));
         }
         SearchOutcome::Infeasible(self.miss)
     }
@@ -399,7 +445,13 @@ impl<'s, 'p> Search<'s, 'p> {
                 self.best = Some((label.cost, number));
             }
         } else {
-            if self.is_beaten(&label) {
+            let is_dead = match self.wanted {
+                Wanted::Any(dead) if self.problem.prunes_dominated && label.parent.is_some() => {
+                    dead.borrow().imply(&label)
+                }
+                _ => false,
+            };
+            if is_dead || self.is_beaten(&label) {
                 return;
             }
             self.beat(&label);
@@ -416,40 +468,64 @@ impl<'s, 'p> Search<'s, 'p> {
     /// Returns `true` if a label of the same place makes this one useless.
     fn is_beaten(&self, label: &Label) -> bool {
         let mut here = self.at_place[label.place].iter();
-        here.any(|other| self.problem.beats(&self.labels[*other], label))
+        here.any(|other| self.beats(&self.labels[*other], label))
     }
 
     /// Drops the labels of its place that a label makes useless.
     fn beat(&mut self, label: &Label) {
-        let (problem, labels) = (self.problem, &mut self.labels);
-        self.at_place[label.place].retain(|other| {
-            let stays = !problem.beats(label, &labels[*other]);
-            labels[*other].beaten = !stays;
-            stays
-        });
-    }
-}
-
-impl SearchProblem<'_> {
-    /// Returns `true` if a label makes another label of its place useless.
-    fn beats(&self, a: &Label, b: &Label) -> bool {
-        if self.prunes_dominated {
-            beats(a, b)
-        } else {
-            a.cost <= b.cost && a.risk <= b.risk && a.belief == b.belief
+        let here = core::mem::take(&mut self.at_place[label.place]);
+        let (beaten, stays) = here
+            .into_iter()
+            .partition(|other| self.beats(label, &self.labels[*other]));
+        self.at_place[label.place] = stays;
+        let beaten: Vec<usize> = beaten;
+        for other in beaten {
+            self.labels[other].beaten = true;
         }
     }
+
+    /// Returns `true` if a label makes another label of its place useless.
+    fn beats(&self, a: &Label, b: &Label) -> bool {
+        let is_no_dearer = match self.wanted {
+            Wanted::Cheapest => a.cost <= b.cost,
+            Wanted::Any(_) => true,
+        };
+        is_no_dearer
+            && a.risk <= b.risk
+            && if self.problem.prunes_dominated {
+                is_within(&a.belief, &b.belief)
+            } else {
+                a.belief == b.belief
+            }
+    }
 }
 
-/// Returns `true` if a label is at least as good as another label of its place in every respect.
-fn beats(a: &Label, b: &Label) -> bool {
+/// Returns the belief after a straight drive to a place; `None` without a drive model.
+pub(super) fn drive_to(
+    belief: &BeliefStateF64,
+    to: [f64; 3],
+    model: Option<&DriveModel>,
+    navigation: &Navigation,
+    epsilon: f64,
+) -> Option<BeliefStateF64> {
+    let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
+    Some(belief.driven(
+        &pose(belief.pose),
+        &[Leg::Straight(pose(to))],
+        model?,
+        epsilon,
+        belief.spread,
+        navigation.controller,
+    ))
+}
+
+/// Returns `true` if a belief is at least as good as another one at the same place in every respect.
+pub(super) fn is_within(a: &BeliefStateF64, b: &BeliefStateF64) -> bool {
     let within = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1];
-    a.cost <= b.cost
-        && within(a.belief.certain, b.belief.certain)
-        && within(a.belief.spread, b.belief.spread)
-        && a.risk <= b.risk
-        && a.belief.risk() <= b.belief.risk()
-        && match (&a.belief.random, &b.belief.random) {
+    within(a.certain, b.certain)
+        && within(a.spread, b.spread)
+        && a.risk() <= b.risk()
+        && match (&a.random, &b.random) {
             (None, _) => true,
             (Some(a), Some(b)) => {
                 let more = b.covariance - a.covariance;

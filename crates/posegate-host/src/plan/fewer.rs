@@ -1,0 +1,260 @@
+//! Chains with fewer looks than the plan that a search found: their places are not those of the library.
+//!
+//! The library has a few places of each look, where the look has the most slack. A chain with fewer looks may need other
+//! places, for example where two bounds are just kept. For the plan's looks without one of them, and for single looks near
+//! the way, a pattern search looks for such places. It only proposes: the places are added to the library, and the plan
+//! is made again, with its proofs.
+
+use super::costs::way;
+use super::library::{facing, needed};
+use super::search::drive_to;
+use super::{BeliefStateF64, Library, Options, Plan, StepKind};
+use crate::site::{ChainStart, DriveModel, Site};
+use posegate::contain::{Decision, decide, examine};
+use posegate::table::Table;
+
+/// A look, by number, and the place from which it is taken.
+type PlacedLook = (usize, [f64; 3]);
+
+/// The problem of which a plan is known.
+pub(super) struct FewerLooks<'a> {
+    pub site: &'a Site,
+    pub library: &'a Library,
+    pub tables: &'a [Table<'a>],
+    pub work: &'a Table<'a>,
+    pub model: Option<DriveModel>,
+    pub start: &'a ChainStart,
+    pub begin: [f64; 3],
+    pub goal: [f64; 3],
+    pub options: &'a Options,
+}
+
+/// The scale at which sets must fit: the proofs and the core's integers need a little more than 1.
+const SCALE: f64 = 1.02;
+
+/// A value above all costs, for each set that does not fit.
+const MISFIT: f64 = 1e6;
+
+/// Places at which a pattern search begins.
+const BEGINNINGS: usize = 3;
+
+/// Single looks that are tried.
+const SINGLES: usize = 6;
+
+/// First steps of a pattern search, metres and radians, and how often they are halved.
+const STEPS: [f64; 2] = [0.4, 0.2];
+const HALVINGS: u32 = 7;
+
+impl FewerLooks<'_> {
+    /// Returns places from which cheaper chains with fewer looks than the plan's may succeed, with their looks.
+    pub fn places(&self, plan: &Plan) -> Vec<PlacedLook> {
+        let looks = self.looks_of(plan);
+        if looks.len() < 2 {
+            return vec![];
+        }
+        let mut chains: Vec<Vec<usize>> = (0..looks.len())
+            .map(|removed| {
+                let others = looks.iter().enumerate();
+                let others = others.filter(|(number, _)| *number != removed);
+                others.map(|(_, (look, _))| *look).collect()
+            })
+            .collect();
+        chains.extend(self.singles(plan.cost).into_iter().map(|look| vec![look]));
+        let mut tried: Vec<Vec<usize>> = vec![];
+        let mut found: Vec<(f64, Vec<PlacedLook>)> = vec![];
+        for chain in chains {
+            if tried.contains(&chain) {
+                continue;
+            }
+            let (value, places) = self.best(&chain, &looks);
+            if value < plan.cost * (1.0 - 1e-6) {
+                found.push((value, chain.iter().copied().zip(places).collect()));
+            }
+            tried.push(chain);
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.into_iter().flat_map(|(_, places)| places).collect()
+    }
+
+    /// The looks of a plan and their places.
+    fn looks_of(&self, plan: &Plan) -> Vec<PlacedLook> {
+        let looks = plan.steps.iter().map(|step| &step.report);
+        let looks = looks.filter(|report| report.kind == StepKind::Localization);
+        let looks = looks.filter_map(|report| {
+            let known = self.library.looks.iter();
+            let number = known
+                .clone()
+                .position(|look| Some(&look.table.name) == report.task.as_ref())?;
+            Some((number, report.before.pose))
+        });
+        looks.collect()
+    }
+
+    /// The looks of which one alone may be cheaper than a cost, those nearest to the way first.
+    fn singles(&self, cost: f64) -> Vec<usize> {
+        let [begin, goal] = [self.begin, self.goal];
+        let looks = self.library.looks.iter().enumerate();
+        let mut near: Vec<(f64, usize)> = looks
+            .map(|(number, look)| {
+                let centre = [look.centre[0], look.centre[1], 0.0];
+                let by = way(begin, centre) + way(centre, goal);
+                ((by - 2.0 * look.radius).max(way(begin, goal)), by, number)
+            })
+            .filter(|(least, ..)| self.price(*least, 1) < cost)
+            .map(|(_, by, number)| (by, number))
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.truncate(SINGLES);
+        near.into_iter().map(|(_, look)| look).collect()
+    }
+
+    fn price(&self, metres: f64, looks: usize) -> f64 {
+        self.site.planner.metre * metres + self.site.planner.look_cost * looks as f64
+    }
+
+    /// Returns the best places found for a chain of looks, and the cost; at least [`MISFIT`] if the chain fails.
+    fn best(&self, chain: &[usize], known: &[PlacedLook]) -> (f64, Vec<[f64; 3]>) {
+        let mut begun: Vec<(f64, Vec<[f64; 3]>)> = self
+            .beginnings(chain, known)
+            .into_iter()
+            .map(|places| (self.value(chain, &places), places))
+            .collect();
+        begun.sort_by(|a, b| a.0.total_cmp(&b.0));
+        begun.truncate(BEGINNINGS);
+        let ends = begun.into_iter().map(|(value, mut places)| {
+            let value = self.descend(chain, &mut places, value);
+            (value, places)
+        });
+        let best = ends.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.unwrap_or((f64::INFINITY, vec![]))
+    }
+
+    /// Returns places to begin with: those of the plan, and for a single look also those of the library and some on the
+    /// straight way.
+    fn beginnings(&self, chain: &[usize], known: &[PlacedLook]) -> Vec<Vec<[f64; 3]>> {
+        let place = |look: &usize| {
+            let own = known.iter().find(|(own, _)| own == look);
+            let view = || self.library.views.iter().find(|view| view.look == *look);
+            own.map(|(_, pose)| *pose)
+                .or_else(|| view().map(|view| view.pose))
+        };
+        let all: Option<Vec<[f64; 3]>> = chain.iter().map(place).collect();
+        let mut beginnings: Vec<Vec<[f64; 3]>> = all.into_iter().collect();
+        let [look] = chain else {
+            return beginnings;
+        };
+        let views = self.library.views.iter().filter(|view| view.look == *look);
+        beginnings.extend(views.map(|view| vec![view.pose]));
+        beginnings.extend(known.iter().map(|(_, pose)| vec![*pose]));
+        let success = &self.library.looks[*look].table.success;
+        for share in [0.0, 0.25, 0.5, 0.75, 0.9] {
+            let along =
+                |axis: usize| self.begin[axis] + share * (self.goal[axis] - self.begin[axis]);
+            let pose = facing(success, [along(0), along(1)]);
+            beginnings.extend(pose.map(|pose| vec![pose]));
+        }
+        beginnings
+    }
+
+    /// Moves the places, one axis at a time, while the value becomes less.
+    fn descend(&self, chain: &[usize], places: &mut [[f64; 3]], mut best: f64) -> f64 {
+        let mut scale = 1.0;
+        for _ in 0..HALVINGS {
+            for _ in 0..6 {
+                let before = best;
+                for number in 0..places.len() {
+                    for moved in self.moves(chain[number], places[number], scale) {
+                        let kept = core::mem::replace(&mut places[number], moved);
+                        let value = self.value(chain, places);
+                        if value < best {
+                            best = value;
+                        } else {
+                            places[number] = kept;
+                        }
+                    }
+                }
+                if best >= before - 1e-9 {
+                    break;
+                }
+            }
+            scale *= 0.5;
+        }
+        best
+    }
+
+    /// Returns poses near a pose: moved with its heading, moved so that the tag stays where it is in the image, turned.
+    fn moves(&self, look: usize, pose: [f64; 3], scale: f64) -> Vec<[f64; 3]> {
+        let success = &self.library.looks[look].table.success;
+        let faced = |at: [f64; 3]| facing(success, [at[0], at[1]]);
+        let mut moves = vec![];
+        for sign in [-scale, scale] {
+            for axis in 0..2 {
+                let mut moved = pose;
+                moved[axis] += sign * STEPS[0];
+                moves.push(moved);
+                if let (Some(before), Some(after)) = (faced(pose), faced(moved)) {
+                    moved[2] += after[2] - before[2];
+                    moves.push(moved);
+                }
+            }
+            moves.push([pose[0], pose[1], pose[2] + sign * STEPS[1]]);
+        }
+        moves
+    }
+
+    /// Returns the cost of a chain. If sets do not fit or the risk is too high: more than any cost, and less the nearer
+    /// the sets are to fitting.
+    fn value(&self, chain: &[usize], places: &[[f64; 3]]) -> f64 {
+        let mut belief = BeliefStateF64::at_start(self.begin, self.start.spread, &self.start.known);
+        let (mut metres, mut risk, mut misfit) = (0.0, 0.0, 0.0);
+        let targets = chain
+            .iter()
+            .zip(places)
+            .map(|(look, place)| (Some(*look), *place));
+        for (look, place) in targets.chain([(None, self.goal)]) {
+            let length = way(belief.pose, place);
+            if belief.pose != place {
+                if length > self.site.planner.range {
+                    return f64::INFINITY;
+                }
+                let navigation = &self.site.navigation;
+                let epsilon = self.start.epsilon(self.site);
+                let Some(there) =
+                    drive_to(&belief, place, self.model.as_ref(), navigation, epsilon)
+                else {
+                    return f64::INFINITY;
+                };
+                belief = there;
+            }
+            metres += length;
+            let table = look.map_or(self.work, |look| &self.tables[look]);
+            misfit += lacking(table, &belief);
+            risk += belief.risk();
+            if let Some(look) = look {
+                let bound = self.library.looks[look].bound;
+                risk += 1.0 - bound.coverage;
+                belief = belief.localized(bound.metres_radians());
+            }
+        }
+        let cost = self.price(metres, chain.len());
+        if risk > self.options.most_risk {
+            f64::INFINITY
+        } else if misfit > 0.0 {
+            MISFIT * (1.0 + misfit) + cost
+        } else {
+            cost
+        }
+    }
+}
+
+/// Returns how much of the wanted scale a belief's set lacks to fit; 0 if it fits.
+fn lacking(table: &Table<'_>, belief: &BeliefStateF64) -> f64 {
+    let Some(set) = needed(belief, SCALE) else {
+        return 2.0;
+    };
+    if decide(table, &set) == Decision::Inside {
+        return 0.0;
+    }
+    let fits = f64::from(examine(table, &set).margin.q16()) / 65_536.0;
+    (1.0 - fits).max(1e-3)
+}
