@@ -190,6 +190,12 @@ impl SeparatingHalfPlane {
 }
 
 impl Line<f64> {
+    /// Returns `false` if a pose-independent number is negative: no pose is in such a half-plane.
+    pub(super) fn is_possible(&self) -> bool {
+        let mut constants = self.constants.iter();
+        !constants.any(|constant| constant.is_finite() && *constant < 0.0)
+    }
+
     /// Returns the least slack of the points; minus infinity if a pose-independent number is negative.
     pub fn room(&self, pose: &Planar<f64>) -> f64 {
         if self.constants.iter().any(|constant| *constant < 0.0) {
@@ -201,7 +207,8 @@ impl Line<f64> {
 }
 
 impl<S: Scalar> Line<S> {
-    fn of_point(&self, pose: &Planar<S>, point: [S; 2]) -> S {
+    /// Returns the slack of a point at a pose.
+    pub(super) fn of_point(&self, pose: &Planar<S>, point: [S; 2]) -> S {
         let [x, y] = match self.binds {
             Binds::Robot => pose.to_goal(point),
             Binds::Goal => pose.to_robot_level(point),

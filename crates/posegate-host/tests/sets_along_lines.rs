@@ -40,7 +40,7 @@ success = SET
 "#;
 
 /// A set of each kind, with the lens and the tolerance of its site.
-const SETS: [(&str, &str, &str); 13] = [
+const SETS: [(&str, &str, &str); 14] = [
     ("{ VIEW }", "", ""),
     (
         "{ VIEW }",
@@ -74,6 +74,12 @@ const SETS: [(&str, &str, &str); 13] = [
     ("{ all = [{ VIEW }, { VIEW8 }] }", "", ""),
     (
         "{ shape = \"footprint\", footprint = [[0.4, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.4, -0.2]], region = [[1.5, 1.0], [-1.5, 1.0], [-1.0, -1.0], [1.5, -1.0]] }",
+        "",
+        "",
+    ),
+    // More pairs of corners and edges than are evaluated at a time.
+    (
+        "{ shape = \"footprint\", footprint = [[0.4, 0.1], [0.3, 0.2], [-0.3, 0.2], [-0.4, 0.1], [-0.4, -0.2], [0.4, -0.2]], region = [[1.5, 0.8], [1.2, 1.0], [-1.2, 1.0], [-1.5, 0.8], [-1.2, -0.8], [-1.0, -1.0], [1.5, -1.0]] }",
         "",
         "",
     ),
@@ -141,6 +147,14 @@ fn walks_agree_with_membership() {
             };
             let headed = along.at(yaw);
             let stretches = headed.stretches(&walk);
+            // Views that are intersected once give the same intervals, bit for bit, with the same numbers.
+            let (same, seen) = headed.stretches_and_seen(&walk);
+            assert_eq!(same, stretches, "{text}");
+            for view in 0..along.views() {
+                let own = seen.iter().filter(|(of, _)| *of == view);
+                let own: Vec<_> = own.map(|(_, interval)| *interval).collect();
+                assert_eq!(own, headed.seen(view, &walk), "{text}: view {view}");
+            }
             let mut places: Vec<f64> = (0..20).map(|_| within(0.0, walk.length)).collect();
             for stretch in &stretches {
                 for end in [stretch.from, stretch.to] {

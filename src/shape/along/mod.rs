@@ -7,7 +7,7 @@
 pub use self::stretch::{LineInterval, OPEN};
 pub use self::view::ViewAlongLine;
 
-use self::stretch::{both, either, roots};
+use self::stretch::{intersect, roots, unite};
 use self::view::{ViewAt, cone, length, moved, sphere};
 use super::boxed::is_whole_circle;
 use super::scalar::{ALL, dot};
@@ -61,8 +61,8 @@ enum Node {
     Near(Box<Resolved<f64>>, f64, u32),
     /// Outside of a cone about the tag's normal: cosine, and distance of its tip behind the tag.
     Square(Box<Resolved<f64>>, [f64; 2], u32),
-    /// In at least one of these half-planes.
-    Sides(Vec<Line<f64>>, u32),
+    /// In at least one of these half-planes, each with its number. Those that no pose is in are left out.
+    Sides(Vec<(u32, Line<f64>)>, u32),
     Any(Vec<Self>),
     All(Vec<Self>),
 }
@@ -147,7 +147,12 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
         }
         Shape::Apart(set) => {
             let sides = set.sides(goal).into_iter();
-            Node::Sides(sides.map(|side| side.resolve(goal)).collect(), own)
+            let lines = sides.map(|side| side.resolve::<f64>(goal));
+            let numbered = (0..).zip(lines);
+            Node::Sides(
+                numbered.filter(|(_, line)| line.is_possible()).collect(),
+                own,
+            )
         }
         Shape::Any(sets) | Shape::All(sets) => {
             let nodes = sets.iter().map(|set| node(set, goal, views, number));
@@ -174,12 +179,37 @@ pub struct Headed<'a> {
 impl Headed<'_> {
     /// Returns the intervals of a line segment that lie in the set, in order.
     pub fn stretches(&self, walk: &LineSegment) -> Vec<LineInterval> {
-        self.of_node(&self.all.node, walk)
+        let mut all = Vec::new();
+        self.stretches_into(walk, &mut all);
+        all
+    }
+
+    /// Like [`Self::stretches`], into a list that is cleared first: many line segments need one allocation.
+    pub fn stretches_into(&self, walk: &LineSegment, into: &mut Vec<LineInterval>) {
+        into.clear();
+        self.of_node(&self.all.node, walk, None, into);
+    }
+
+    /// Returns the intervals as [`Self::stretches`], and those from which each view sees its tag: the view's number,
+    /// and an interval as in [`Self::seen`]. Each view is intersected once.
+    pub fn stretches_and_seen(
+        &self,
+        walk: &LineSegment,
+    ) -> (Vec<LineInterval>, Vec<(usize, LineInterval)>) {
+        let mut seen = Vec::with_capacity(self.views.len());
+        for view in 0..self.views.len() {
+            self.of_view(view, 0, walk, |interval| seen.push((view, interval)));
+        }
+        let mut all = Vec::new();
+        self.of_node(&self.all.node, walk, Some(&seen), &mut all);
+        (all, seen)
     }
 
     /// Returns the intervals of a line segment from which a view sees its tag.
     pub fn seen(&self, view: usize, walk: &LineSegment) -> Vec<LineInterval> {
-        self.of_view(view, 0, walk)
+        let mut all = Vec::new();
+        self.of_view(view, 0, walk, |interval| all.push(interval));
+        all
     }
 
     /// Returns the number of views of tags in the set.
@@ -230,24 +260,38 @@ impl Headed<'_> {
         }
     }
 
-    fn of_node(&self, node: &Node, walk: &LineSegment) -> Vec<LineInterval> {
+    /// Appends the intervals of a line segment that lie in a node's set, in order. `seen` has the intervals of every
+    /// view if they are known.
+    fn of_node(
+        &self,
+        node: &Node,
+        walk: &LineSegment,
+        seen: Option<&[(usize, LineInterval)]>,
+        all: &mut Vec<LineInterval>,
+    ) {
         let whole = LineInterval::of(walk.length);
-        let mut all = Vec::new();
+        let from = all.len();
         match node {
             Node::Box(set, number) => all.extend(self.of_box(set, *number, walk)),
             Node::Footprint(set, number) => {
-                let slacks = |t: f64, note: &mut dyn FnMut(f64)| {
+                let slacks = |t: f64, note: &mut dyn FnMut(usize, f64)| {
                     let pose = self.pose(walk, t);
-                    set.slacks(&pose, ALL, 0, &mut |_, _, slack| note(slack));
+                    set.slacks(&pose, ALL, 0, &mut |index, _, slack| note(index, slack));
                 };
                 all.extend(affine(whole, *number, slacks));
             }
-            Node::View(view, number) => all = self.of_view(*view, *number, walk),
+            Node::View(view, number) => match seen {
+                Some(seen) => {
+                    let own = seen.iter().filter(|(of, _)| of == view);
+                    all.extend(own.map(|(_, interval)| interval.numbered(*number)));
+                }
+                None => self.of_view(*view, *number, walk, |interval| all.push(interval)),
+            },
             Node::Limit(view, limit, number) => {
-                let seen = self.sight(*view, walk);
+                let sight = self.sight(*view, walk);
                 let set = &self.all.views[*view].set;
                 let slack = |t: f64| {
-                    let [d, phi, psi] = seen.at(t);
+                    let [d, phi, psi] = sight.at(t);
                     let corners_px = [None; 4];
                     let sight = Sight {
                         d,
@@ -258,13 +302,18 @@ impl Headed<'_> {
                     limit.slack(set, &sight)
                 };
                 let mut ends = roots(&whole, SAMPLES, slack);
-                whole.parts(&mut ends, *number, |t| slack(t) >= 0.0, &mut all);
+                whole.parts(
+                    &mut ends,
+                    *number,
+                    |t| slack(t) >= 0.0,
+                    |part| all.push(part),
+                );
             }
             Node::Near(view, least, number) => {
                 let [at, way] = self.back(view.tag_to_camera(&self.origin), walk);
                 let mut ends = sphere(at, way, *least);
                 let far = |t: f64| length(at, way, t) >= *least;
-                whole.parts(&mut ends, *number, far, &mut all);
+                whole.parts(&mut ends, *number, far, |part| all.push(part));
             }
             Node::Square(view, [cosine, behind], number) => {
                 let back = view.tag_to_camera(&self.origin);
@@ -273,33 +322,42 @@ impl Headed<'_> {
                 let along = [dot(view.normal, at), dot(view.normal, way)];
                 let mut ends = cone(at, way, along, *cosine);
                 let outside = |t: f64| cosine * length(at, way, t) >= along[0] + t * along[1];
-                whole.parts(&mut ends, *number, outside, &mut all);
+                whole.parts(&mut ends, *number, outside, |part| all.push(part));
             }
             Node::Sides(sides, number) => {
-                for (index, side) in sides.iter().enumerate() {
-                    let slacks = |t: f64, note: &mut dyn FnMut(f64)| {
-                        let pose = self.pose(walk, t);
-                        side.slacks(&pose, ALL, 0, &mut |_, _, slack| note(slack));
-                    };
-                    let number = number.wrapping_add(64 * (index as u32 % 64));
-                    all.extend(affine(whole, number, slacks));
+                let (start, end) = (self.pose(walk, 0.0), self.pose(walk, whole.to));
+                for (index, side) in sides {
+                    let number = number.wrapping_add(64 * (index % 64));
+                    let mut left = Some(whole);
+                    for (index, point) in (0..).zip(&side.points) {
+                        let at = side.of_point(&start, *point);
+                        let slope = (side.of_point(&end, *point) - at) / whole.to;
+                        left = left.and_then(|left| left.clipped(at, slope, number + index % 64));
+                    }
+                    if let Some(left) = left {
+                        all.push(left);
+                    }
                 }
-                all = either(all);
+                unite(all, from);
             }
             Node::Any(nodes) => {
-                let stretches = nodes.iter().flat_map(|node| self.of_node(node, walk));
-                all = either(stretches.collect());
+                for node in nodes {
+                    self.of_node(node, walk, seen, all);
+                }
+                unite(all, from);
             }
             Node::All(nodes) => {
                 all.push(whole);
                 for node in nodes {
-                    if !all.is_empty() {
-                        all = both(&all, &self.of_node(node, walk));
+                    let middle = all.len();
+                    if middle == from {
+                        break;
                     }
+                    self.of_node(node, walk, seen, all);
+                    intersect(all, from, middle);
                 }
             }
         }
-        all
     }
 
     fn of_box(&self, set: &BoxSet, number: u32, walk: &LineSegment) -> Option<LineInterval> {
@@ -325,20 +383,39 @@ fn unit([x, y]: [f64; 2]) -> Option<[f64; 2]> {
     (length > 1e-9).then(|| [x / length, y / length])
 }
 
-/// Returns the interval in which slacks that are affine along a line segment are at least 0.
+/// The number of slacks that [`affine`] keeps at a time.
+const AT_A_TIME: usize = 32;
+
+/// Returns the interval in which slacks that are affine along a line segment are at least 0. Each slack is reported with
+/// its number, from 0.
 fn affine(
     whole: LineInterval,
     number: u32,
-    slacks: impl Fn(f64, &mut dyn FnMut(f64)),
+    slacks: impl Fn(f64, &mut dyn FnMut(usize, f64)),
 ) -> Option<LineInterval> {
-    let mut start = Vec::new();
-    slacks(0.0, &mut |slack| start.push(slack));
-    // Evaluated at both ends, so that the difference is as exact as the slacks.
-    let mut end = Vec::with_capacity(start.len());
-    slacks(whole.to, &mut |slack| end.push(slack));
     let mut left = whole;
-    for (index, (start, end)) in start.iter().zip(&end).enumerate() {
-        left = left.clipped(*start, (end - start) / whole.to, number + index as u32 % 64)?;
+    let mut start = [0.0; AT_A_TIME];
+    let mut first = 0;
+    loop {
+        let mut count = 0;
+        slacks(0.0, &mut |index, slack| {
+            count = index + 1;
+            if let Some(kept) = start.get_mut(index.wrapping_sub(first)) {
+                *kept = slack;
+            }
+        });
+        // Evaluated at both ends, so that the difference is as exact as the slacks.
+        let mut rest = Some(left);
+        slacks(whole.to, &mut |index, end| {
+            if let (Some(part), Some(start)) = (rest, start.get(index.wrapping_sub(first))) {
+                let slope = (end - start) / whole.to;
+                rest = part.clipped(*start, slope, number + index as u32 % 64);
+            }
+        });
+        left = rest?;
+        first += AT_A_TIME;
+        if first >= count {
+            return Some(left);
+        }
     }
-    Some(left)
 }

@@ -45,14 +45,14 @@ impl LineInterval {
         (left.from < left.to).then_some(left)
     }
 
-    /// Appends the parts where a function is at least zero. The function changes its sign only at
-    /// these roots.
+    /// Reports the parts where a function is at least zero, in order. The function changes its sign only at these
+    /// roots.
     pub(crate) fn parts(
         self,
         roots: &mut [f64],
         number: u32,
         holds: impl Fn(f64) -> bool,
-        into: &mut Vec<Self>,
+        mut note: impl FnMut(Self),
     ) {
         roots.sort_by(f64::total_cmp);
         let mut part: Option<Self> = None;
@@ -83,19 +83,29 @@ impl LineInterval {
                     ended_by: [before.ended_by[0], next.ended_by[1]],
                 }));
             } else if from < to {
-                into.extend(part.take());
+                part.take().into_iter().for_each(&mut note);
             }
             from = to;
         }
-        into.extend(part);
+        part.into_iter().for_each(note);
+    }
+
+    /// Returns the interval with a number added to those of its constraints.
+    pub(crate) fn numbered(self, from: u32) -> Self {
+        let ended_by = self
+            .ended_by
+            .map(|by| if by == OPEN { OPEN } else { from + by });
+        Self { ended_by, ..self }
     }
 }
 
-/// Returns the intersection of two lists of intervals; both are in order, and so is the result.
-pub(crate) fn both(a: &[LineInterval], b: &[LineInterval]) -> Vec<LineInterval> {
-    let mut all = Vec::new();
-    let (mut i, mut j) = (0, 0);
-    while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+/// Replaces the two lists at the end of a list, `from..middle` and `middle..`, by their intersection. Both are in order,
+/// and so is the result.
+pub(crate) fn intersect(all: &mut Vec<LineInterval>, from: usize, middle: usize) {
+    let end = all.len();
+    let (mut i, mut j) = (from, middle);
+    while i < middle && j < end {
+        let (x, y) = (all[i], all[j]);
         let first = if x.from >= y.from { x } else { y };
         let last = if x.to <= y.to { x } else { y };
         if first.from < last.to {
@@ -111,25 +121,29 @@ pub(crate) fn both(a: &[LineInterval], b: &[LineInterval]) -> Vec<LineInterval> 
             j += 1;
         }
     }
-    all
+    all.drain(from..end);
 }
 
-/// Returns the union of intervals in any order.
-pub(crate) fn either(mut all: Vec<LineInterval>) -> Vec<LineInterval> {
-    all.sort_by(|a, b| a.from.total_cmp(&b.from));
-    let mut union: Vec<LineInterval> = Vec::new();
-    for stretch in all {
-        match union.last_mut() {
-            Some(last) if stretch.from <= last.to => {
-                if stretch.to > last.to {
-                    last.to = stretch.to;
-                    last.ended_by[1] = stretch.ended_by[1];
+/// Replaces the intervals from an index on, in any order, by their union in order.
+pub(crate) fn unite(all: &mut Vec<LineInterval>, from: usize) {
+    all[from..].sort_by(|a, b| a.from.total_cmp(&b.from));
+    let mut end = from;
+    for index in from..all.len() {
+        let next = all[index];
+        match all[from..end].last_mut() {
+            Some(last) if next.from <= last.to => {
+                if next.to > last.to {
+                    last.to = next.to;
+                    last.ended_by[1] = next.ended_by[1];
                 }
             }
-            _ => union.push(stretch),
+            _ => {
+                all[end] = next;
+                end += 1;
+            }
         }
     }
-    union
+    all.truncate(end);
 }
 
 /// Returns the real roots of `a t^2 + 2 b t + c`; NaN if there are none.
@@ -197,16 +211,40 @@ mod tests {
             &mut [5.0, f64::NAN, 3.0, -7.0],
             9,
             |t| (t - 4.0).abs() > 1.0,
-            &mut parts,
+            |part| parts.push(part),
         );
         let outer = [stretch(0.0, 3.0, OPEN, 9), stretch(5.0, 10.0, 9, OPEN)];
         assert_eq!(parts, outer);
+        // What comes before the lists stays.
+        let before = stretch(7.0, 8.0, 1, 2);
+        let mut all = std::vec![before];
+        all.extend(&parts);
+        all.push(stretch(1.0, 6.0, 4, 5));
+        intersect(&mut all, 1, 3);
+        let common = [stretch(1.0, 3.0, 4, 9), stretch(5.0, 6.0, 9, 5)];
+        assert_eq!(all, [before, common[0], common[1]]);
+        intersect(&mut all, 1, 3);
+        assert_eq!(all, [before]);
+        all.push(stretch(2.0, 5.0, 7, 8));
+        all.extend(&parts);
+        unite(&mut all, 1);
+        assert_eq!(all, [before, whole]);
         assert_eq!(
-            both(&parts, &[stretch(1.0, 6.0, 4, 5)]),
-            [stretch(1.0, 3.0, 4, 9), stretch(5.0, 6.0, 9, 5)]
+            outer.map(|part| part.numbered(100)),
+            [stretch(0.0, 3.0, OPEN, 109), stretch(5.0, 10.0, 109, OPEN)]
         );
-        parts.push(stretch(2.0, 5.0, 7, 8));
-        assert_eq!(either(parts), [whole]);
+    }
+
+    #[test]
+    fn gaps_stay_in_a_union() {
+        let mut all = std::vec![
+            stretch(6.0, 7.0, 1, 2),
+            stretch(0.0, 2.0, 3, 4),
+            stretch(1.0, 3.0, 5, 6),
+            stretch(1.5, 2.5, 7, 8),
+        ];
+        unite(&mut all, 0);
+        assert_eq!(all, [stretch(0.0, 3.0, 3, 6), stretch(6.0, 7.0, 1, 2)]);
     }
 
     #[test]

@@ -82,29 +82,29 @@ impl ViewAlongLine {
 }
 
 impl Headed<'_> {
+    /// Reports the intervals from which a view sees its tag.
     pub(super) fn of_view(
         &self,
         view: usize,
         number: u32,
         walk: &LineSegment,
-    ) -> Vec<LineInterval> {
+        mut note: impl FnMut(LineInterval),
+    ) {
         let resolved = &self.all.views[view];
         let at = &self.views[view];
         let Some(left) = self.of_convex_view(resolved, at, number, walk) else {
-            return Vec::new();
+            return;
         };
-        let mut all = Vec::new();
         if at.through_lens {
             let slack = |t: f64| {
                 let pose = self.pose(walk, t);
                 resolved.image_slack(&pose).unwrap_or(f64::NEG_INFINITY)
             };
             let mut ends = roots(&left, SAMPLES, slack);
-            left.parts(&mut ends, number + 63, |t| slack(t) >= 0.0, &mut all);
+            left.parts(&mut ends, number + 63, |t| slack(t) >= 0.0, note);
         } else {
-            all.push(left);
+            note(left);
         }
-        all
     }
 
     /// Clips to all constraints of a view except a lens's image: they are convex at a heading.
@@ -121,44 +121,56 @@ impl Headed<'_> {
             let slope = x * wx + y * wy;
             left = left.clipped(slack + x * fx + y * fy, slope, number + index as u32)?;
         }
-        let mut scratch = Vec::with_capacity(2);
-        let mut within =
-            |left: LineInterval, mut ends: [f64; 2], index, holds: &dyn Fn(f64) -> bool| {
-                scratch.clear();
-                left.parts(&mut ends, number + index, holds, &mut scratch);
-                // The slack is concave, so parts that rounding separates belong together.
-                let (first, last) = (scratch.first()?, scratch.last()?);
-                Some(LineInterval {
-                    from: first.from,
-                    to: last.to,
-                    ended_by: [first.ended_by[0], last.ended_by[1]],
-                })
-            };
         let [ray, ray_way] = moved(&at.ray, walk);
         let d = view.set.d_max - view.less.ray;
-        left = within(left, sphere(ray, ray_way, d), 32, &|t| {
+        left = within(left, sphere(ray, ray_way, d), number + 32, |t| {
             length(ray, ray_way, t) <= d
         })?;
         let ray = [ray[0] - view.less.phi, ray[1], ray[2]];
         let ahead = [ray[0], ray_way[0]];
-        left = within(left, cone(ray, ray_way, ahead, view.cos_phi), 33, &|t| {
-            ahead[0] + t * ahead[1] >= view.cos_phi * length(ray, ray_way, t)
-        })?;
+        left = within(
+            left,
+            cone(ray, ray_way, ahead, view.cos_phi),
+            number + 33,
+            |t| ahead[0] + t * ahead[1] >= view.cos_phi * length(ray, ray_way, t),
+        )?;
         let [back, back_way] = self.back(at.back, walk);
         let before = |by: f64| [0, 1, 2].map(|i| back[i] - by * view.normal[i]);
         let off = before(view.less.psi);
         let facing = [dot(view.normal, off), dot(view.normal, back_way)];
-        left = within(left, cone(off, back_way, facing, view.cos_psi), 34, &|t| {
-            facing[0] + t * facing[1] >= view.cos_psi * length(off, back_way, t)
-        })?;
+        left = within(
+            left,
+            cone(off, back_way, facing, view.cos_psi),
+            number + 34,
+            |t| facing[0] + t * facing[1] >= view.cos_psi * length(off, back_way, t),
+        )?;
         if let Some([middle, radius]) = view.ball {
             let off = before(middle);
-            left = within(left, sphere(off, back_way, radius), 35, &|t| {
+            left = within(left, sphere(off, back_way, radius), number + 35, |t| {
                 length(off, back_way, t) <= radius
             })?;
         }
         Some(left)
     }
+}
+
+/// Returns the part of an interval in which a concave slack is at least zero; its sign changes only at these ends.
+fn within(
+    left: LineInterval,
+    mut ends: [f64; 2],
+    number: u32,
+    holds: impl Fn(f64) -> bool,
+) -> Option<LineInterval> {
+    let mut all: Option<LineInterval> = None;
+    // The slack is concave, so parts that rounding separates belong together.
+    left.parts(&mut ends, number, holds, |part| {
+        all = Some(all.map_or(part, |first| LineInterval {
+            from: first.from,
+            to: part.to,
+            ended_by: [first.ended_by[0], part.ended_by[1]],
+        }));
+    });
+    all
 }
 
 pub(super) fn length(at: Vector<f64>, way: Vector<f64>, t: f64) -> f64 {

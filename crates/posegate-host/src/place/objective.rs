@@ -66,6 +66,11 @@ pub trait ViewCost: Sync {
     /// The cost of a pose outside S.
     fn of_miss(&self) -> f64;
 
+    /// Returns `true` if the cost of every view is known to be finite.
+    fn is_finite(&self) -> bool {
+        false
+    }
+
     /// Returns the quadrature to use if `wanted` is asked for: coarser if a cost is expensive or has kinks.
     fn quadrature(&self, wanted: Quadrature) -> Quadrature {
         wanted
@@ -79,6 +84,13 @@ impl ViewCost for Cost {
 
     fn of_miss(&self) -> f64 {
         self.c_high
+    }
+
+    fn is_finite(&self) -> bool {
+        // The squares of distances and angles are below 1e100.
+        [self.c1, self.c2, self.c3]
+            .into_iter()
+            .all(|factor| factor <= 1e200)
     }
 }
 
@@ -178,6 +190,26 @@ struct Expected {
     unknown: f64,
 }
 
+/// The sums of a quick estimate: the integral of the cost inside, and the masses outside and of the views without a
+/// known cost.
+struct QuickSums {
+    seen: f64,
+    outside: f64,
+    unknown: f64,
+}
+
+/// The quick estimate of a place for [`Objective::ContainedCost`].
+enum QuickAnswer {
+    /// The set contains the pose-set: the expected cost.
+    Mean(f64),
+    /// Views of this mass have no known cost.
+    Unknown(f64),
+    /// The set does not contain the pose-set: the largest scale at which it does.
+    Beyond(f64),
+    /// The set has no view of a tag.
+    NoView,
+}
+
 /// A scale from this value on counts as contained. It is above 1, so that containment can be proven.
 pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 
@@ -221,11 +253,18 @@ impl Question<'_> {
                 if worst < 0.0 {
                     return unseen();
                 }
+                if self.quadrature.is_none() {
+                    let found = self.quick_if_contained(&set, &reserved, &belief);
+                    return match found {
+                        QuickAnswer::Mean(mean) => mean,
+                        QuickAnswer::Unknown(mass) => bad(1.0 + mass),
+                        QuickAnswer::Beyond(scale) => bad(1.0 - scale),
+                        QuickAnswer::NoView => unseen(),
+                    };
+                }
                 match self.expected(&set, &belief) {
                     Some(Expected { unknown, .. }) if unknown > 0.0 => bad(1.0 + unknown),
-                    Some(Expected { mean, p_miss, .. })
-                        if p_miss <= 0.0 || self.quadrature.is_none() =>
-                    {
+                    Some(Expected { mean, p_miss, .. }) if p_miss <= 0.0 => {
                         let scale = scale::largest(&reserved, &belief, self.fineness);
                         if scale >= CONTAINED {
                             mean
@@ -312,32 +351,9 @@ impl Question<'_> {
     fn expected(&self, set: &SuccessSet, belief: &Gaussian) -> Option<Expected> {
         let miss = self.cost.of_miss();
         let Some(quadrature) = &self.quadrature else {
-            let along = LineClipper::of(set);
-            if along.views() == 0 {
-                return None;
-            }
-            let met_unknown = Cell::new(false);
-            let of_view = |view| {
-                let cost = self.cost.of_view(view);
-                met_unknown.set(met_unknown.get() || !cost.is_finite());
-                cost
-            };
-            let white = belief.at(set.goal);
-            let [seen, outside] = rough::sums(&along, &white, &of_view);
-            let mut unknown = 0.0;
-            if met_unknown.get() {
-                let of_view = |view| cost::unknown(self.cost.of_view(view));
-                [unknown, _] = rough::sums(&along, &white, &of_view);
-            }
-            // A quick estimate misses parts between its rays. The mass outside is at least that of a cap.
+            let sums = self.quick_sums(set, belief)?;
             let scale = scale::largest(set, belief, self.fineness);
-            let outside = outside.max(belief.cap(scale));
-            let missed = outside + unknown;
-            return Some(Expected {
-                mean: (seen + miss * missed) / belief.mass(),
-                p_miss: (missed / belief.mass()).min(1.0),
-                unknown,
-            });
+            return Some(self.quick(&sums, belief, scale));
         };
         let of_view = |view| self.cost.of_view(view);
         let found = expected_cost_of(set, belief, miss, &of_view, quadrature).ok()?;
@@ -346,6 +362,78 @@ impl Question<'_> {
             p_miss: found.p_miss.value,
             unknown: found.unknown_mass.value,
         })
+    }
+
+    /// Returns the sums of a quick estimate; `None` without a view.
+    fn quick_sums(&self, set: &SuccessSet, belief: &Gaussian) -> Option<QuickSums> {
+        let along = LineClipper::of(set);
+        if along.views() == 0 {
+            return None;
+        }
+        let met_unknown = Cell::new(false);
+        let of_view = |view| {
+            let cost = self.cost.of_view(view);
+            met_unknown.set(met_unknown.get() || !cost.is_finite());
+            cost
+        };
+        let white = belief.at(set.goal);
+        let [seen, outside] = rough::sums(&along, &white, &of_view);
+        let mut unknown = 0.0;
+        if met_unknown.get() {
+            let of_view = |view| cost::unknown(self.cost.of_view(view));
+            [unknown, _] = rough::sums(&along, &white, &of_view);
+        }
+        Some(QuickSums {
+            seen,
+            outside,
+            unknown,
+        })
+    }
+
+    /// Returns the quick estimate from its sums and the largest scale at which the set contains the pose-set.
+    fn quick(&self, sums: &QuickSums, belief: &Gaussian, scale: f64) -> Expected {
+        // A quick estimate misses parts between its rays. The mass outside is at least that of a cap.
+        let outside = sums.outside.max(belief.cap(scale));
+        let missed = outside + sums.unknown;
+        Expected {
+            mean: (sums.seen + self.cost.of_miss() * missed) / belief.mass(),
+            p_miss: (missed / belief.mass()).min(1.0),
+            unknown: sums.unknown,
+        }
+    }
+
+    /// Returns the quick estimate of the cost of a place at which the reserved set contains the pose-set. Sums that the
+    /// answer does not depend on are left out.
+    fn quick_if_contained(
+        &self,
+        set: &SuccessSet,
+        reserved: &SuccessSet,
+        belief: &Gaussian,
+    ) -> QuickAnswer {
+        let within = || scale::largest(reserved, belief, self.fineness);
+        if LineClipper::of(set).views() == 0 {
+            return QuickAnswer::NoView;
+        }
+        let early = self.cost.is_finite().then(within);
+        if let Some(scale) = early.filter(|scale| !(*scale >= CONTAINED)) {
+            return QuickAnswer::Beyond(scale);
+        }
+        let Some(sums) = self.quick_sums(set, belief) else {
+            return QuickAnswer::NoView;
+        };
+        if sums.unknown > 0.0 {
+            return QuickAnswer::Unknown(sums.unknown);
+        }
+        let scale = early.unwrap_or_else(within);
+        if !(scale >= CONTAINED) {
+            return QuickAnswer::Beyond(scale);
+        }
+        let own = if set == reserved {
+            scale
+        } else {
+            scale::largest(set, belief, self.fineness)
+        };
+        QuickAnswer::Mean(self.quick(&sums, belief, own).mean)
     }
 
     /// Returns the smallest size with which S contains the pose-set, searched upwards from 1/8 of the tag's own size.

@@ -27,8 +27,8 @@ pub(super) struct Ray {
     pub radius: f64,
     /// The intervals inside the set, within the disc.
     pub stretches: Vec<LineInterval>,
-    /// Where the set of visible views changes; empty with a single view.
-    changes: Vec<LineInterval>,
+    /// The intervals from which each view sees its tag, with the view's number; empty with a single view.
+    seen: Vec<(usize, LineInterval)>,
     /// Where the ray leaves the set for the first time, at most the line's length; `None` if its start is outside.
     pub leaves: Option<f64>,
 }
@@ -36,7 +36,11 @@ pub(super) struct Ray {
 impl Ray {
     /// Clips a line that reaches a little beyond the disc.
     pub(super) fn cast(headed: &Headed<'_>, views: usize, walk: LineSegment, radius: f64) -> Self {
-        let mut stretches = headed.stretches(&walk);
+        let (mut stretches, seen) = if views > 1 {
+            headed.stretches_and_seen(&walk)
+        } else {
+            (headed.stretches(&walk), Vec::new())
+        };
         let leaves = stretches.first().filter(|first| first.from <= 0.0);
         let leaves = leaves.map(|first| first.to);
         stretches.retain(|stretch| stretch.from < radius);
@@ -46,17 +50,11 @@ impl Ray {
             last.to = radius;
             last.ended_by[1] = OPEN;
         }
-        let mut changes = Vec::new();
-        if views > 1 {
-            for view in 0..views {
-                changes.extend(headed.seen(view, &walk));
-            }
-        }
         Self {
             walk,
             radius,
             stretches,
-            changes,
+            seen,
             leaves,
         }
     }
@@ -70,7 +68,7 @@ impl Ray {
         for stretch in &self.stretches {
             hash = mix(mix(hash, stretch.ended_by[0]), stretch.ended_by[1]);
         }
-        for stretch in &self.changes {
+        for (_, stretch) in &self.seen {
             for (at, by) in [
                 (stretch.from, stretch.ended_by[0]),
                 (stretch.to, stretch.ended_by[1]),
@@ -153,29 +151,30 @@ impl Ray {
             }
             return all;
         }
-        let sights: Vec<(ViewAlongLine, Vec<LineInterval>)> = (0..views)
-            .map(|view| {
-                (
-                    headed.sight(view, &self.walk),
-                    headed.seen(view, &self.walk),
-                )
-            })
+        let sights: Vec<ViewAlongLine> = (0..views)
+            .map(|view| headed.sight(view, &self.walk))
             .collect();
+        let mut ends: Vec<f64> = Vec::new();
+        let mut seeing: Vec<ViewAlongLine> = Vec::with_capacity(views);
         for stretch in &self.stretches {
-            let ends = self.changes.iter().flat_map(|s| [s.from, s.to]);
-            let inner = ends.filter(|end| *end > stretch.from && *end < stretch.to);
-            let mut ends: Vec<f64> = inner.chain([stretch.from, stretch.to]).collect();
+            let changes = self.seen.iter().flat_map(|(_, s)| [s.from, s.to]);
+            let inner = changes.filter(|end| *end > stretch.from && *end < stretch.to);
+            ends.clear();
+            ends.extend(inner.chain([stretch.from, stretch.to]));
             ends.sort_by(f64::total_cmp);
             for pair in ends.windows(2) {
                 let middle = 0.5 * (pair[0] + pair[1]);
-                let sees = |(_, seen): &&(ViewAlongLine, Vec<LineInterval>)| {
-                    seen.iter().any(|s| s.from <= middle && middle <= s.to)
+                let sees = |view: usize| {
+                    let mut own = self.seen.iter().filter(|(of, _)| *of == view);
+                    own.any(|(_, s)| s.from <= middle && middle <= s.to)
                 };
-                let seeing: Vec<ViewAlongLine> =
-                    sights.iter().filter(sees).map(|(s, _)| *s).collect();
+                let of_those = sights.iter().enumerate().filter(|(view, _)| sees(*view));
+                seeing.clear();
+                seeing.extend(of_those.map(|(_, sight)| *sight));
                 // In the set without a view, as in a union with a box: use the views of all tags.
-                let all: Vec<ViewAlongLine> = sights.iter().map(|(s, _)| *s).collect();
-                let seeing = if seeing.is_empty() { &all } else { &seeing };
+                if seeing.is_empty() {
+                    seeing.extend(&sights);
+                }
                 let cost = |t: f64| {
                     let costs = seeing.iter().map(|sight| of_view(sight.at(t)));
                     costs.fold(f64::INFINITY, f64::min)

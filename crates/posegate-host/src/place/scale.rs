@@ -108,13 +108,14 @@ fn room(
             .map(f64::abs)
             .iter()
             .fold(1e-12, |a, b| f64::max(a, *b));
-    let leaves = |angle: f64| {
+    let mut stretches = Vec::new();
+    let mut leaves = |angle: f64| {
         let walk = LineSegment {
             from: white.middle(u1),
             way: white.way([libm::cos(angle), libm::sin(angle)]),
             length,
         };
-        let stretches = headed.stretches(&walk);
+        headed.stretches_into(&walk, &mut stretches);
         match stretches.first() {
             Some(first) if first.from <= 0.0 && first.ended_by[1] == OPEN => f64::INFINITY,
             Some(first) if first.from <= 0.0 => first.to,
@@ -142,13 +143,18 @@ fn room(
         return room;
     }
     for (_, angle) in least {
-        room = room.min(golden(angle - step, angle + step, fineness.steps, leaves));
+        room = room.min(golden(
+            angle - step,
+            angle + step,
+            fineness.steps,
+            &mut leaves,
+        ));
     }
     room
 }
 
 /// Returns the least value that a golden-section search meets.
-fn golden(from: f64, to: f64, steps: u32, value: impl Fn(f64) -> f64) -> f64 {
+fn golden(from: f64, to: f64, steps: u32, mut value: impl FnMut(f64) -> f64) -> f64 {
     const SHARE: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (from, to);
     let (mut a, mut b) = (high - SHARE * (high - low), low + SHARE * (high - low));

@@ -51,14 +51,8 @@ impl Rescues {
         {
             return true;
         }
-        // Only the search that drops dominated labels may assume that less uncertainty is never worse.
-        let implied = |(known, least): &KnownStart| {
-            if problem.prunes_dominated {
-                *least <= risk && is_within(known, belief)
-            } else {
-                *least == risk && known == belief
-            }
-        };
+        let implied =
+            |failed: &KnownStart| failure_follows(failed, (belief, risk), problem.prunes_dominated);
         if let Some(known) = self.none.borrow().get(&(place, look))
             && known.iter().any(implied)
         {
@@ -104,6 +98,22 @@ impl Rescues {
     }
 }
 
+/// Returns `true` if there is no plan from a belief and a risk, because there is none from another belief and risk at
+/// the same place: the one that failed is at least as good in every respect. A failure says nothing about beliefs with
+/// less uncertainty. Without pruning of dominated labels only an equal belief fails too, because only the search
+/// that prunes may assume that less uncertainty is never worse.
+fn failure_follows(
+    (failed, at_risk): &KnownStart,
+    (belief, risk): (&BeliefStateF64, f64),
+    prunes_dominated: bool,
+) -> bool {
+    if prunes_dominated {
+        *at_risk <= risk && is_within(failed, belief)
+    } else {
+        *at_risk == risk && failed == belief
+    }
+}
+
 impl SearchProblem<'_> {
     /// Returns `true` if the actions of a plan lead to the work from another beginning, without the banned look.
     fn succeeds(
@@ -142,8 +152,10 @@ impl SearchProblem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::belief::Random as Gaussian;
     use crate::plan::{Options, Plans};
     use crate::site::Site;
+    use nalgebra::Matrix3;
     use posegate_testkit::planning_sites::{Drive, Random, hall};
 
     thread_local! {
@@ -163,6 +175,67 @@ mod tests {
         let mut counts = COMPARED.get();
         counts[usize::from(answer)] += 1;
         COMPARED.set(counts);
+    }
+
+    /// Returns a belief with all lengths and angles of its error multiplied.
+    fn larger(belief: &BeliefStateF64, times: f64) -> BeliefStateF64 {
+        let mut larger = belief.clone();
+        larger.certain = larger.certain.map(|extent| extent * times);
+        if let Some(random) = &mut larger.random {
+            random.covariance *= times * times;
+        }
+        larger
+    }
+
+    #[test]
+    fn failure_of_a_belief_follows_only_for_beliefs_that_contain_it() {
+        let bounded = BeliefStateF64 {
+            pose: [1.0, 2.0, 0.5],
+            spread: [0.1, 0.02],
+            certain: [0.2, 0.03],
+            doubt: 0.01,
+            random: None,
+        };
+        let mut gaussian = bounded.clone();
+        gaussian.random = Some(Gaussian {
+            covariance: Matrix3::identity() * 0.01,
+            epsilon: 0.99,
+            radius_squared: 11.3449,
+        });
+        let vary = |of: &BeliefStateF64, change: &dyn Fn(&mut BeliefStateF64)| {
+            let mut varied = of.clone();
+            change(&mut varied);
+            (varied, 0.02)
+        };
+        for belief in [&bounded, &gaussian] {
+            let middle = (belief.clone(), 0.02);
+            let more = [
+                vary(belief, &|b| b.certain[0] += 0.1),
+                vary(belief, &|b| b.certain[1] += 0.1),
+                vary(belief, &|b| b.spread[0] += 0.1),
+                vary(belief, &|b| b.spread[1] += 0.1),
+                vary(belief, &|b| b.doubt += 0.1),
+                (belief.clone(), 0.03),
+            ];
+            let wider = belief
+                .random
+                .is_some()
+                .then(|| (larger(belief, 2.0), middle.1));
+            for more in more.iter().chain(&wider) {
+                assert!(failure_follows(&middle, (&more.0, more.1), true));
+                assert!(!failure_follows(more, (&middle.0, middle.1), true));
+                assert!(!failure_follows(&middle, (&more.0, more.1), false));
+                assert!(!failure_follows(more, (&middle.0, middle.1), false));
+            }
+            for prunes_dominated in [false, true] {
+                let equal = failure_follows(&middle, (belief, middle.1), prunes_dominated);
+                assert!(equal, "an equal belief fails");
+            }
+        }
+        // A normally distributed error is added to the bounded one.
+        let (bounded, gaussian) = ((bounded, 0.02), (gaussian, 0.02));
+        assert!(failure_follows(&bounded, (&gaussian.0, gaussian.1), true));
+        assert!(!failure_follows(&gaussian, (&bounded.0, bounded.1), true));
     }
 
     #[test]
