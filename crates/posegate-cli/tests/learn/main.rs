@@ -7,6 +7,7 @@ mod command;
 mod dependence;
 mod drift;
 mod fleets;
+mod flips;
 mod inflation;
 mod law;
 mod provenance;
