@@ -169,8 +169,10 @@ fn one_output(output: &Output, json: bool) -> Result<(), Failure> {
 
 fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
     one_output(&arguments.output, arguments.json)?;
-    let (bytes, name) = files.read(&arguments.detections)?;
-    let detections = Detections::read(&bytes, &name).map_err(refused)?;
+    let opened = files.open(&arguments.detections)?;
+    let detections =
+        Detections::draw(opened.reader, &opened.name, arguments.seed).map_err(refused)?;
+    let name = opened.name;
     let settings = BoundsSettings {
         quantile: arguments.quantile,
         confidence: arguments.confidence,
@@ -220,7 +222,7 @@ fn told(model: &ErrorModel) -> Value {
     let (rows, independent) = model.independent();
     json!({
         "taken_with": model.taken_with(),
-        "rows": rows, "independent_rows": independent, "runs": model.runs(),
+        "rows": rows, "independent_rows": independent, "runs": model.runs(), "drawn_of": model.drawn_of(),
         "quantile": model.quantile(), "views": views, "detections": detections, "flip_share": flip_share,
         "reach": {"d_m": d, "phi_deg": phi, "psi_deg": psi},
         "regions": regions.collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>(),
@@ -234,6 +236,11 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
         "{detections} detections of {views} views; {:.2} % of those with psi of 10 deg or more are flips",
         100.0 * flip_share
     ))?;
+    if let Some(rows) = model.drawn_of() {
+        print(&format_args!(
+            "the {views} views were drawn at random from {rows} rows; the guarantees are those for the drawn ones"
+        ))?;
+    }
     if let Some(runs) = model.runs() {
         let (rows, independent) = model.independent();
         print(&format_args!(

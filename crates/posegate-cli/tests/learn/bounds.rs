@@ -395,4 +395,36 @@ fn files_are_read_strictly() {
     let edge = text.find("d_m = [").unwrap() + 7;
     let stretched = format!("{}-1.0, {}", &text[..edge], &text[edge..]);
     refused(&stretched, "edges");
+    // Nested shapes come together and ascend.
+    let wider = text.find("[wider]").unwrap();
+    let end = wider + text[wider + 1..].find("\n[").unwrap() + 2;
+    refused(&format!("{}{}", &text[..wider], &text[end..]), "only one");
+    let swapped = text
+        .replace("[narrower]", "[other]")
+        .replace("[wider]", "[narrower]")
+        .replace("[other]", "[wider]");
+    refused(&swapped, "do not ascend");
+    let parts = text.replace("seed = 1\n", "seed = 1\nparts = [2, 0, 2]\n");
+    refused(&parts, "edges");
+}
+
+/// With few rows a model has one shape and factors, which is also how files of earlier versions are written.
+#[test]
+fn few_rows_have_one_shape() {
+    let model = learnt(&SQUARES.views(400, 82, |_| true), 0.9);
+    let text = model.write().unwrap();
+    assert!(
+        !text.contains("[wider]") && !text.contains("[narrower]"),
+        "{text}"
+    );
+    assert_eq!(ErrorModel::parse(&text, "m.toml").unwrap(), model);
+    // A factor that is twice as large doubles the bounds.
+    let key = text.find("\ntranslation = ").unwrap() + 15;
+    let end = key + text[key..].find('\n').unwrap();
+    let factor: f64 = text[key..end].parse().unwrap();
+    let doubled = format!("{}{}{}", &text[..key], 2.0 * factor, &text[end..]);
+    let doubled = ErrorModel::parse(&doubled, "m.toml").unwrap();
+    let at = [1.0, 10.0, 20.0];
+    let ratio = doubled.bounds_deg(at).unwrap().0 / model.bounds_deg(at).unwrap().0;
+    assert!((ratio - 2.0).abs() < 1e-9, "{ratio}");
 }

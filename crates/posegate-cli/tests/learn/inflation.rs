@@ -9,7 +9,7 @@ use posegate_host::learn::{
 
 /// Returns estimates of a filter with correlated errors, whose covariance is too small by a factor that depends on
 /// the time since the last fix: 2 below half a second, 6 from there on.
-fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
+pub fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
     let mut random = Random(seed);
     let mut rows = Vec::new();
     for run in 0..runs {

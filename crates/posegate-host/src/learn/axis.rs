@@ -2,8 +2,13 @@
 
 /// The most coarse cells of d, phi and psi.
 const MOST: [usize; 3] = [8, 2, 9];
-/// The number of parts of a coarse cell along each axis; the shape is linear within a part.
+/// The number of parts of a coarse cell along d, phi and psi in files that do not state it; the shape is linear within a part.
 pub(super) const PARTS: [usize; 3] = [2, 1, 2];
+/// Coarse cells of d and psi have more parts if there are at most this many: where errors jump, as where tags flip, wide
+/// parts would carry large errors far.
+const FEW: usize = 5;
+/// The fewest rows per part with which there are more parts.
+const FILLED: usize = 30;
 /// Inverse of the unit to which edges are rounded: millimetres, hundredths of a degree.
 const ROUND: [f64; 3] = [1000.0, 100.0, 100.0];
 /// A stretch without numbers is a gap if it is wider than this share of the mean cell width and than this many mean
@@ -99,15 +104,26 @@ pub(super) fn coarse_counts(rows: usize, each: f64) -> [usize; 3] {
     ]
 }
 
+/// Returns the numbers of parts of a coarse cell, given the numbers of rows and of coarse cells.
+pub(super) fn parts(rows: usize, coarse: [usize; 3]) -> [usize; 3] {
+    let more = [0, 1, 2].map(|axis| match axis {
+        1 => 1,
+        _ if coarse[axis] <= FEW => 2 * PARTS[axis],
+        _ => PARTS[axis],
+    });
+    let fine: usize = (0..3).map(|axis| coarse[axis] * more[axis]).product();
+    if rows < FILLED * fine { PARTS } else { more }
+}
+
 /// Returns `true` if a coarse cell holds about one number rather than a range of numbers.
 pub(super) fn narrow(which: usize, [low, high]: [f64; 2]) -> bool {
     (high - low) * ROUND[which] < 2.5
 }
 
 /// Returns the axis `which` of d, phi and psi for some numbers: coarse cells with equally many numbers, each divided
-/// into [`PARTS`] with equally many. A gap between numbers is a coarse cell of its own, and so is a single number
+/// into `parts` with equally many. A gap between numbers is a coarse cell of its own, and so is a single number
 /// between two gaps. `None` without numbers.
-pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis> {
+pub(super) fn over(numbers: &[f64], which: usize, coarse: usize, parts: usize) -> Option<Axis> {
     let mut sorted = numbers.to_vec();
     sorted.sort_by(f64::total_cmp);
     let kept = inner(&sorted, coarse)?;
@@ -115,7 +131,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
     let runs = runs(kept, which, coarse);
     for (number, run) in runs.iter().enumerate() {
         let cells = libm::round((coarse * run.len()) as f64 / kept.len() as f64) as usize;
-        let mut own = cut(run, which, cells.max(1))?;
+        let mut own = cut(run, which, cells.max(1), parts)?;
         // Numbers on the border of a gap would count as in the gap.
         let unit = ROUND[which];
         if number > 0 && own[0] >= run[0] {
@@ -126,14 +142,14 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize) -> Option<Axis>
             own[end] += 1.0 / unit;
         }
         if let (Some(from), Some(to)) = (edges.last().copied(), own.first()) {
-            let step = (to - from) / PARTS[which] as f64;
-            edges.extend((1..PARTS[which]).map(|part| from + part as f64 * step));
+            let step = (to - from) / parts as f64;
+            edges.extend((1..parts).map(|part| from + part as f64 * step));
         }
         edges.extend(own);
     }
     // Angles have no sign: views on either side of 0 are equal, so a small gap to 0 lies between neighbours.
     let low = edges[0];
-    if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[PARTS[which]] {
+    if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[parts] {
         edges[0] = 0.0;
     }
     Axis::new(edges, which == 0)
@@ -164,8 +180,8 @@ fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
 }
 
 /// Returns the edges of coarse cells, and of their parts, for sorted numbers without a gap.
-fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
-    let wanted = coarse * PARTS[which];
+fn cut(kept: &[f64], which: usize, coarse: usize, parts: usize) -> Option<Vec<f64>> {
+    let wanted = coarse * parts;
     let (first, last) = (*kept.first()?, *kept.last()?);
     let unit = ROUND[which];
     let mut low = libm::floor(first * unit) / unit;
@@ -189,12 +205,13 @@ fn cut(kept: &[f64], which: usize, coarse: usize) -> Option<Vec<f64>> {
         end + 1.0 / unit
     });
     // Only whole coarse cells: repeated numbers can leave fewer edges.
-    while !(edges.len() - 1).is_multiple_of(PARTS[which]) {
-        if edges.len() > 2 {
-            edges.remove(edges.len() - 2);
-        } else {
-            edges.insert(1, 0.5 * (edges[0] + edges[1]));
-        }
+    while edges.len() > parts + 1 && !(edges.len() - 1).is_multiple_of(parts) {
+        edges.remove(edges.len() - 2);
+    }
+    while edges.len() < parts + 1 {
+        let width = |at: usize| edges[at] - edges[at - 1];
+        let widest = (1..edges.len()).fold(1, |a, b| if width(b) > width(a) { b } else { a });
+        edges.insert(widest, 0.5 * (edges[widest - 1] + edges[widest]));
     }
     Some(edges)
 }
@@ -230,7 +247,7 @@ mod tests {
     #[test]
     fn cells_hold_equally_many() {
         let numbers: Vec<f64> = (0..10_000).map(|k| 0.5 + f64::from(k) * 6e-4).collect();
-        let axis = over(&numbers, 0, 5).unwrap();
+        let axis = over(&numbers, 0, 5, PARTS[0]).unwrap();
         assert_eq!(axis.cells(), 10);
         assert_eq!((axis.edges[0], axis.edges[10]), (0.5, 6.5));
         for cell in 0..10 {
@@ -250,28 +267,38 @@ mod tests {
     fn stragglers_stretch_no_cell() {
         let mut numbers: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k) * 0.004).collect();
         numbers.extend([20.0, 30.0]);
-        let axis = over(&numbers, 0, 4).unwrap();
+        let axis = over(&numbers, 0, 4, PARTS[0]).unwrap();
         assert!(*axis.edges.last().unwrap() <= 5.0);
         // The gap from the smallest angle to 0 closes if it is small.
         let angles: Vec<f64> = (0..1000).map(|k| 0.1 + f64::from(k) * 0.07).collect();
-        assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 0.0);
+        assert_eq!(over(&angles, 2, 4, PARTS[2]).unwrap().edges[0], 0.0);
         let angles: Vec<f64> = (0..1000).map(|k| 30.0 + f64::from(k) * 0.03).collect();
-        assert_eq!(over(&angles, 2, 4).unwrap().edges[0], 30.0);
+        assert_eq!(over(&angles, 2, 4, PARTS[2]).unwrap().edges[0], 30.0);
         // For psi only a gap of up to one degree closes.
         let angles: Vec<f64> = (0..1000).map(|k| 2.0 + f64::from(k) * 0.07).collect();
-        assert_eq!(over(&angles, 1, 2).unwrap().edges[0], 0.0);
-        assert_eq!(over(&angles, 2, 2).unwrap().edges[0], 2.0);
+        assert_eq!(over(&angles, 1, 2, PARTS[1]).unwrap().edges[0], 0.0);
+        assert_eq!(over(&angles, 2, 2, PARTS[2]).unwrap().edges[0], 2.0);
         // Equal numbers, and no numbers.
-        assert!(over(&[2.0; 50], 0, 3).is_some());
-        assert!(over(&[0.0; 50], 1, 3).is_some());
-        assert!(over(&[], 0, 3).is_none());
+        assert!(over(&[2.0; 50], 0, 3, PARTS[0]).is_some());
+        assert!(over(&[0.0; 50], 1, 3, PARTS[1]).is_some());
+        assert!(over(&[], 0, 3, PARTS[0]).is_none());
+    }
+
+    /// A coarse cell of four parts is whole even if all of its numbers are equal or nearly so.
+    #[test]
+    fn repeated_numbers_fill_four_parts() {
+        for numbers in [std::vec![2.0; 50], std::vec![2.0, 2.001, 2.001, 2.001]] {
+            let axis = over(&numbers, 0, 3, 4).unwrap();
+            assert_eq!(axis.cells() % 4, 0);
+            assert!(axis.cell(2.0).is_some());
+        }
     }
 
     #[test]
     fn gaps_are_cells_of_their_own() {
         let mut numbers: Vec<f64> = (0..1000).map(|k| 0.5 + f64::from(k) * 0.0018).collect();
         numbers.extend((0..1000).map(|k| 4.7 + f64::from(k) * 0.0013));
-        let axis = over(&numbers, 0, 6).unwrap();
+        let axis = over(&numbers, 0, 6, PARTS[0]).unwrap();
         let gap = axis.cell(3.5).unwrap();
         let [low, high] = [gap / 2, gap / 2 + 1].map(|coarse| axis.edges[2 * coarse]);
         assert!(
@@ -280,7 +307,7 @@ mod tests {
         );
         // A few distinct numbers.
         let few: Vec<f64> = (0..400).map(|k| f64::from(1 + k % 4)).collect();
-        let axis = over(&few, 0, 3).unwrap();
+        let axis = over(&few, 0, 3, PARTS[0]).unwrap();
         for k in 1..=4 {
             let coarse = axis.cell(f64::from(k)).unwrap() / 2;
             let ends = [axis.edges[2 * coarse], axis.edges[2 * coarse + 2]];

@@ -2,13 +2,15 @@
 //! on the other part.
 
 use super::LearnError;
+use super::axis::PARTS;
 use super::calibration::Calibration;
 use super::cells::{Cells, each, nested};
 use super::detections::{Detections, hexadecimal};
 use super::document::{self, Document};
 use super::error_model::ErrorModel;
+use super::family::{Family, LEAST_RATIO};
 use super::runs::{self, Tally};
-use super::smooth::{Lattice, Target, fit, floored, share_of};
+use super::smooth::{Lattice, Target, capped, errors_around, fit, floored, share_of};
 use super::split::{Drawn, FITTED, split};
 use super::taken_with::TakenWith;
 
@@ -38,7 +40,7 @@ impl Default for BoundsSettings {
 }
 
 /// The smallest error that is used, metres and radians; smaller ones are replaced by it.
-const LEAST_ERROR: f64 = 1e-7;
+pub(super) const LEAST_ERROR: f64 = 1e-7;
 /// A coarse cell gets this many times the fewest rows for a bound.
 const ROOMY: f64 = 3.0;
 /// The fewest rows of a coarse cell for which its parts are filled.
@@ -55,6 +57,10 @@ const FEWEST_VIEWS: f64 = 40.0;
 /// beyond it than beyond the requested one.
 const LEVELS: [f64; 3] = [0.7, 0.9, 0.97];
 const APART: f64 = 1.8;
+/// The ratio of the odds of an error beyond a shape to those beyond the next one.
+const STEP: f64 = 3.0;
+/// The fewest rows beyond the widest shape. With fewer, there is one shape, and the corners have no upper limits.
+const FEWEST_BEYOND: f64 = 10.0;
 /// Weight of the slope penalty relative to the bend penalty, in the fit of the differences between means and
 /// quantiles.
 const SLOPE: f64 = 0.02;
@@ -125,14 +131,18 @@ pub fn learn_bounds(
         None => 1.0,
         Some(_) => design_effect(&seen, &places, quantile),
     };
-    let cells = Cells::over(&places, each_cell * effect).ok_or_else(|| too_few(0))?;
+    let cells = Cells::fine_over(&places, each_cell * effect).ok_or_else(|| too_few(0))?;
     let [fitted, calibrated] = [true, false].map(|side| samples(&seen, &cells, side));
     if (fitted.len() as f64) < FEWEST * effect {
         return Err(too_few((seen.len() as f64 / effect) as u64));
     }
-    let shapes = [0, 1].map(|which| shape(&cells, &fitted, which, quantile, runs.is_some()));
+    let steps = steps(quantile, fitted.len() as f64 / effect);
+    let shapes = [0, 1].map(|which| shapes(&cells, &fitted, which, &steps, runs.is_some()));
+    let [Some(translation), Some(yaw)] = [0, 1].map(|which| Family::new(&shapes[which])) else {
+        return Err(too_few(0));
+    };
     let mut learnt = Calibration::new(&cells, settings, &places, runs.is_some());
-    learnt.run(&fitted, &calibrated, &shapes, effect);
+    learnt.run(&fitted, &calibrated, &[translation, yaw], effect);
     if !learnt.says_something() {
         let error = too_few((seen.len() as f64 / effect) as u64);
         return Err(match error {
@@ -156,16 +166,26 @@ pub fn learn_bounds(
             errors[1].to_degrees() > drawn.row.at[2]
         })
         .count();
+    let shape_of = |step: usize| document::Shape {
+        translation_m: nested(&cells, &shapes[0][step]),
+        yaw_rad: nested(&cells, &shapes[1][step]),
+    };
+    let (narrower, shape, wider) = match steps.len() {
+        1 => (None, shape_of(0), None),
+        _ => (Some(shape_of(0)), shape_of(1), Some(shape_of(2))),
+    };
     let document = Document {
         posegate_model: document::VERSION,
         kind: "bounds".into(),
         quantile,
         confidence,
         seed,
+        parts: (cells.parts != PARTS).then_some(cells.parts),
         taken_with: taken_with.clone(),
         data: document::Data {
             sha256: hexadecimal(&detections.sha256),
             views: rows.len() as u64,
+            drawn_of: detections.drawn_of,
             detections: seen.len() as u64,
             fitted: fitted.len() as u64,
             calibrated: calibrated.len() as u64,
@@ -175,10 +195,9 @@ pub fn learn_bounds(
             independent: runs.map(|_| independent),
         },
         edges: cells.edges(),
-        shape: document::Shape {
-            translation_m: nested(&cells, &shapes[0]),
-            yaw_rad: nested(&cells, &shapes[1]),
-        },
+        narrower,
+        shape,
+        wider,
         cell: learnt.cells(),
         region: learnt.regions,
         p_detect: share(&rows, runs.is_some()),
@@ -210,7 +229,7 @@ fn design_effect(seen: &[Drawn], places: &[[f64; 3]], quantile: f64) -> f64 {
     let lattice = Lattice::over(&cells.axes);
     let mut effect = 1.0f64;
     for which in [0, 1] {
-        let logs: Vec<f64> = shape(&cells, &fitted, which, 0.5, true)
+        let logs: Vec<f64> = shapes(&cells, &fitted, which, &[0.5], true)[0]
             .iter()
             .map(|value| libm::log(*value))
             .collect();
@@ -227,8 +246,27 @@ fn design_effect(seen: &[Drawn], places: &[[f64; 3]], quantile: f64) -> f64 {
     effect
 }
 
-/// Returns the quantile of one of the errors at the corners of the cells, with four digits, not falling with d.
-fn shape(cells: &Cells, fitted: &[Sample], which: usize, quantile: f64, in_runs: bool) -> Vec<f64> {
+/// Returns the shares of the errors for which shapes are fitted: the requested one, and, if there are enough independent rows,
+/// those with [`STEP`] times larger and smaller odds of an error beyond.
+fn steps(quantile: f64, independent: f64) -> Vec<f64> {
+    let odds = quantile / (1.0 - quantile);
+    let share = |odds: f64| odds / (1.0 + odds);
+    let wider = share(odds * STEP);
+    if independent * (1.0 - wider) < FEWEST_BEYOND {
+        return std::vec![quantile];
+    }
+    std::vec![share(odds / STEP), quantile, wider]
+}
+
+/// Returns quantiles of one of the errors at the corners of the cells, with four digits, not falling with d, each above the
+/// one before. The quantiles ascend.
+fn shapes(
+    cells: &Cells,
+    fitted: &[Sample],
+    which: usize,
+    quantiles: &[f64],
+    in_runs: bool,
+) -> Vec<Vec<f64>> {
     let lattice = Lattice::over(&cells.axes);
     let spots: Vec<_> = fitted
         .iter()
@@ -242,29 +280,53 @@ fn shape(cells: &Cells, fitted: &[Sample], which: usize, quantile: f64, in_runs:
     // First fit the mean, for which many rows give information. Then fit the differences from quantile to quantile,
     // for which fewer and fewer rows do.
     let mut values = fit(&lattice, Target::Mean, 0.0, &spots, &logs, &folds);
+    let mut shapes: Vec<Vec<f64>> = Vec::new();
+    let around = errors_around(lattice.len(), &spots, &logs);
     let below = LEVELS
         .iter()
-        .filter(|level| 1.0 - **level >= APART * (1.0 - quantile));
-    for level in below.chain(core::iter::once(&quantile)) {
+        .filter(|level| 1.0 - **level >= APART * (1.0 - quantiles[0]));
+    let [a, b, c] = cells.fine().map(|count| count + 1);
+    for (wanted, level) in below
+        .map(|level| (false, *level))
+        .chain(quantiles.iter().map(|level| (true, *level)))
+    {
         let beyond: Vec<f64> = spots
             .iter()
             .zip(&logs)
             .map(|(spot, log)| log - spot.value(&values))
             .collect();
-        let level = Target::Quantile(*level);
-        let above = fit(&lattice, level, SLOPE, &spots, &beyond, &folds);
+        let above = fit(
+            &lattice,
+            Target::Quantile(level),
+            SLOPE,
+            &spots,
+            &beyond,
+            &folds,
+        );
         for (value, above) in values.iter_mut().zip(&above) {
             *value += above;
         }
+        if !wanted {
+            continue;
+        }
+        let mut logs = floored(&values, &spots);
+        if quantiles.len() > 1 {
+            logs = capped(&logs, &around, level);
+        }
+        for [i, j, k] in each([a - 1, b, c]) {
+            let nearer = logs[lattice.corner([i, j, k])];
+            let farther = &mut logs[lattice.corner([i + 1, j, k])];
+            *farther = farther.max(nearer);
+        }
+        let mut shape: Vec<f64> = logs.iter().map(|log| digits(libm::exp(*log))).collect();
+        if let Some(before) = shapes.last() {
+            for (value, before) in shape.iter_mut().zip(before) {
+                *value = value.max(digits(before * (2.0 * LEAST_RATIO - 1.0)));
+            }
+        }
+        shapes.push(shape);
     }
-    let mut values = floored(&values, &spots);
-    let [a, b, c] = cells.fine().map(|count| count + 1);
-    for [i, j, k] in each([a - 1, b, c]) {
-        let nearer = values[lattice.corner([i, j, k])];
-        let farther = &mut values[lattice.corner([i + 1, j, k])];
-        *farther = farther.max(nearer);
-    }
-    values.iter().map(|log| digits(libm::exp(*log))).collect()
+    shapes
 }
 
 /// Returns the fold of each row for cross-validation: rows that depend on each other are in the same one.
@@ -295,7 +357,7 @@ fn share(rows: &[Drawn], in_runs: bool) -> document::Share {
             continue;
         };
         let hit = drawn.row.errors.is_some();
-        each[cells.number(Cells::coarse_of(cell))].push((drawn.run, hit));
+        each[cells.number(cells.coarse_of(cell))].push((drawn.run, hit));
         spots.push(spot);
         hits.push(f64::from(u8::from(hit)));
         runs.push(drawn.run);

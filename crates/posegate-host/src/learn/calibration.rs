@@ -1,11 +1,12 @@
 //! Regions of cells, calibrated on detections to which the shape was not fitted.
 
 use super::BoundsSettings;
-use super::axis::{GAP, PARTS, narrow};
+use super::axis::{GAP, narrow};
 use super::binomial::{at_most, conformal_rank, order_statistic, rank};
-use super::bounds::{FEWEST, FEWEST_RUNS, Sample};
+use super::bounds::{FEWEST, FEWEST_RUNS, LEAST_ERROR, Sample};
 use super::cells::{Cells, each, numbered};
 use super::document;
+use super::family::Family;
 use super::runs::{self, for_few_runs};
 use super::smooth::Lattice;
 use super::split::FITTED;
@@ -138,14 +139,14 @@ impl<'a> Calibration<'a> {
         &mut self,
         fitted: &[Sample],
         calibrated: &[Sample],
-        shapes: &[Vec<f64>; 2],
+        families: &[Family; 2],
         effect: f64,
     ) {
         let coarse = self.cells.coarse();
         let mut counts = std::vec![0u64; self.of_cell.len()];
         for sample in fitted {
             if let Some(cell) = self.cells.cell(sample.at) {
-                let number = self.cells.number(Cells::coarse_of(cell));
+                let number = self.cells.number(self.cells.coarse_of(cell));
                 counts[number] += u64::from(self.of_cell[number].refused.is_none());
             }
         }
@@ -161,12 +162,6 @@ impl<'a> Calibration<'a> {
 
         let mut scores = std::vec![Scores::default(); self.of_cell.len()];
         let lattice = Lattice::over(&self.cells.axes);
-        let logs = [0, 1].map(|which| -> Vec<f64> {
-            shapes[which]
-                .iter()
-                .map(|value| libm::log(*value))
-                .collect()
-        });
         for sample in calibrated {
             let (Some(cell), Some(spot)) = (
                 self.cells.cell(sample.at),
@@ -174,10 +169,10 @@ impl<'a> Calibration<'a> {
             ) else {
                 continue;
             };
-            let cell = &mut scores[self.cells.number(Cells::coarse_of(cell))];
+            let cell = &mut scores[self.cells.number(self.cells.coarse_of(cell))];
             for which in [0, 1] {
-                let score = sample.errors[which] / libm::exp(spot.value(&logs[which]));
-                cell.of[which].push(score);
+                let log = libm::log(sample.errors[which].max(LEAST_ERROR));
+                cell.of[which].push(families[which].score(&spot, log));
             }
             cell.runs.push(sample.run);
         }
@@ -375,7 +370,7 @@ fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<
     let mut held: Vec<Vec<[f64; 3]>> = std::vec![Vec::new(); cells.each_coarse().count()];
     for at in places {
         if let Some(cell) = cells.cell(*at) {
-            held[cells.number(Cells::coarse_of(cell))].push(*at);
+            held[cells.number(cells.coarse_of(cell))].push(*at);
         }
     }
     cells
@@ -410,7 +405,8 @@ fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'st
             continue;
         };
         let upper = |axis: usize| {
-            usize::from(wide.contains(&axis) && cell[axis] > coarse[axis] * PARTS[axis])
+            let part = cell[axis] - coarse[axis] * cells.parts[axis];
+            usize::from(wide.contains(&axis) && 2 * part >= cells.parts[axis])
         };
         quarters[2 * upper(0) + upper(2)] += 1;
         halves[part(1, at[1], 2)] += 1;

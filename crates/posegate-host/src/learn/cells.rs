@@ -9,32 +9,48 @@ use super::smooth::{InterpolationWeights, Lattice};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cells {
     pub(super) axes: [Axis; 3],
+    /// The number of fine cells of a coarse one along each axis.
+    pub(super) parts: [usize; 3],
 }
 
 impl Cells {
     /// Returns cells over some places, each coarse one with about `each` of them; `None` without places.
     pub(super) fn over(places: &[[f64; 3]], each: f64) -> Option<Self> {
+        Self::divided(places, axis::coarse_counts(places.len(), each), PARTS)
+    }
+
+    /// Returns such cells with more parts if the coarse cells are few.
+    pub(super) fn fine_over(places: &[[f64; 3]], each: f64) -> Option<Self> {
         let coarse = axis::coarse_counts(places.len(), each);
+        Self::divided(places, coarse, axis::parts(places.len(), coarse))
+    }
+
+    fn divided(places: &[[f64; 3]], coarse: [usize; 3], parts: [usize; 3]) -> Option<Self> {
         let of = |which: usize| {
             let numbers: Vec<f64> = places.iter().map(|at| at[which]).collect();
-            axis::over(&numbers, which, coarse[which])
+            axis::over(&numbers, which, coarse[which], parts[which])
         };
         Some(Self {
             axes: [of(0)?, of(1)?, of(2)?],
+            parts,
         })
     }
 
     /// Returns the cells of a file; `None` if the edges do not ascend or do not form whole coarse cells.
-    pub(super) fn of(edges: &Edges) -> Option<Self> {
+    pub(super) fn of(edges: &Edges, parts: [usize; 3]) -> Option<Self> {
+        if parts.contains(&0) {
+            return None;
+        }
         let whole = |edges: &Vec<f64>, parts: usize| {
             (edges.len() > parts && (edges.len() - 1).is_multiple_of(parts)).then(|| edges.clone())
         };
         Some(Self {
             axes: [
-                Axis::new(whole(&edges.d_m, PARTS[0])?, true)?,
-                Axis::new(whole(&edges.phi_deg, PARTS[1])?, false)?,
-                Axis::new(whole(&edges.psi_deg, PARTS[2])?, false)?,
+                Axis::new(whole(&edges.d_m, parts[0])?, true)?,
+                Axis::new(whole(&edges.phi_deg, parts[1])?, false)?,
+                Axis::new(whole(&edges.psi_deg, parts[2])?, false)?,
             ],
+            parts,
         })
     }
 
@@ -55,7 +71,7 @@ impl Cells {
     /// Returns the number of coarse cells along each axis.
     pub(super) fn coarse(&self) -> [usize; 3] {
         let fine = self.fine();
-        [0, 1, 2].map(|i| fine[i] / PARTS[i])
+        [0, 1, 2].map(|i| fine[i] / self.parts[i])
     }
 
     /// Returns the fine cell of a place.
@@ -80,8 +96,8 @@ impl Cells {
     }
 
     /// Returns the coarse cell that contains a fine one.
-    pub(super) fn coarse_of(fine: [usize; 3]) -> [usize; 3] {
-        [0, 1, 2].map(|i| fine[i] / PARTS[i])
+    pub(super) fn coarse_of(&self, fine: [usize; 3]) -> [usize; 3] {
+        [0, 1, 2].map(|i| fine[i] / self.parts[i])
     }
 
     /// Returns the ends of a coarse cell along each axis.
@@ -89,8 +105,8 @@ impl Cells {
         [0, 1, 2].map(|i| {
             let edges = &self.axes[i].edges;
             [
-                edges[coarse[i] * PARTS[i]],
-                edges[(coarse[i] + 1) * PARTS[i]],
+                edges[coarse[i] * self.parts[i]],
+                edges[(coarse[i] + 1) * self.parts[i]],
             ]
         })
     }

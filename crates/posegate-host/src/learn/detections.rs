@@ -1,9 +1,11 @@
 //! Views of tags and their outcomes: detected or not, with which error.
 
 use super::LearnError;
+use super::draw::{Digesting, Kept};
 use super::runs::Runs;
 use super::sheet::Sheet;
-use sha2::{Digest, Sha256};
+use crate::input::Limit;
+use std::io::Read;
 
 const NEEDED: [&str; 6] = [
     "d_m",
@@ -36,7 +38,12 @@ pub struct Detections {
     pub times: Vec<f64>,
     /// SHA-256 of the file.
     pub sha256: [u8; 32],
+    /// The number of rows in the file if only some of them were drawn.
+    pub drawn_of: Option<u64>,
 }
+
+/// The most rows that [`Detections::draw`] keeps.
+pub const DRAWN: usize = 200_000;
 
 impl Detections {
     /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty if
@@ -46,16 +53,39 @@ impl Detections {
     /// # Errors
     /// The first invalid field, with its line and column; a file without rows.
     pub fn read(bytes: &[u8], file: &str) -> Result<Self, LearnError> {
-        let mut sheet = Sheet::new(bytes, file)?;
+        Self::drawn(bytes, file, usize::MAX, 0)
+    }
+
+    /// Reads as [`Detections::read`], from a file of any length, which is read once. Of more than [`DRAWN`] rows without `run`
+    /// and `t_s`, as many are drawn at random, by their positions in the file and the seed: memory does not grow with the file.
+    /// The guarantees are those for the drawn rows. Every row of the file is checked. Rows with `run` or `t_s` are all kept, so
+    /// such a file may have 256 MiB.
+    ///
+    /// # Errors
+    /// As [`Detections::read`]; a line of more than a MiB; a file with `run` or `t_s` that is too long.
+    pub fn draw(reader: impl Read, file: &str, seed: u64) -> Result<Self, LearnError> {
+        Self::drawn(reader, file, DRAWN, seed)
+    }
+
+    fn drawn(reader: impl Read, file: &str, most: usize, seed: u64) -> Result<Self, LearnError> {
+        let mut digest = Digesting::new(reader);
+        let mut sheet = Sheet::new(&mut digest, file)?;
         let mut columns = Vec::new();
         for name in NEEDED {
             columns.push(sheet.needed(name, &NEEDED)?);
         }
         let run = sheet.optional("run")?;
         let time = sheet.optional("t_s")?;
+        let dependent = run.is_some() || time.is_some();
         let (mut names, mut times) = (Vec::new(), Vec::new());
-        let mut rows = Vec::new();
+        let mut kept = Kept::new(if dependent { usize::MAX } else { most }, seed);
         while let Some(line) = sheet.line()? {
+            if dependent && most != usize::MAX && line.byte() > Limit::FILE.bytes {
+                return Err(line.wrong_row(format!(
+                    "more than {} MiB of rows with a `run` or a `t_s`; give fewer runs",
+                    Limit::FILE.bytes >> 20
+                )));
+            }
             let at = place(&line, &columns)?;
             if let Some(run) = run {
                 names.push(line.name(run, "the name of a drive, a video or an approach")?);
@@ -78,8 +108,10 @@ impl Detections {
                 }
                 None
             };
-            rows.push(Detection { at, errors });
+            kept.push(Detection { at, errors });
         }
+        drop(sheet);
+        let (rows, drawn_of) = kept.rows();
         if rows.is_empty() {
             return Err(LearnError::Empty {
                 file: file.to_owned(),
@@ -93,7 +125,8 @@ impl Detections {
             rows,
             runs,
             times,
-            sha256: Sha256::digest(bytes).into(),
+            sha256: digest.sha256(),
+            drawn_of,
         })
     }
 }
@@ -150,6 +183,42 @@ mod tests {
         .unwrap();
         assert_eq!(found.rows[0].at, [2.5, 4.0, 30.0]);
         assert_eq!(found.rows[0].errors, Some([0.02, 0.01]));
+        assert_eq!(found.rows[1].errors, None);
+    }
+
+    /// A row in the file's middle that is not drawn is checked all the same, and the digest is that of the whole file.
+    #[test]
+    fn long_files_are_drawn_from_and_checked() {
+        let row = |k: u32| format!("{},2,3,1,0.1,0.2\n", 1 + k);
+        let text: String = HEADER.into();
+        let text = (0..1000).fold(text, |text, k| text + &row(k));
+        let drawn = |text: &str| Detections::drawn(text.as_bytes(), "d.csv", 100, 1);
+        let found = drawn(&text).unwrap();
+        assert_eq!((found.rows.len(), found.drawn_of), (100, Some(1000)));
+        let whole = read(&text).unwrap();
+        assert_eq!((found.sha256, whole.drawn_of), (whole.sha256, None));
+        let kept = |k: u32| found.rows.iter().any(|row| row.at[0] == f64::from(1 + k));
+        let dropped = (500..1000).find(|k| !kept(*k)).unwrap();
+        let error = drawn(&text.replace(&row(dropped), "nan,2,3,1,0.1,0.2\n")).unwrap_err();
+        let place = format!("d.csv:{}:1: `nan`", dropped + 2);
+        assert!(error.to_string().starts_with(&place), "{error}");
+        // Rows that depend on each other are all kept: a run is not thinned out.
+        let runs = text
+            .replace("rad\n", "rad,run\n")
+            .replace("0.2\n", "0.2,a\n");
+        let found = drawn(&runs).unwrap();
+        assert_eq!((found.rows.len(), found.drawn_of), (1000, None));
+    }
+
+    /// Spaces around fields and a byte-order mark are not part of them.
+    #[test]
+    fn fields_are_trimmed() {
+        let header = HEADER.replace(',', " , ");
+        let found = read(&format!(
+            "\u{feff} {header} 2.5 ,4, 30,1 , 0.02,-0.01 \n31,0,3, 0 , ,\n"
+        ));
+        let found = found.unwrap();
+        assert_eq!(found.rows[0].at, [2.5, 4.0, 30.0]);
         assert_eq!(found.rows[1].errors, None);
     }
 

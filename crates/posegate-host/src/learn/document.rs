@@ -22,13 +22,23 @@ pub(super) struct Document {
     pub confidence: f64,
     /// The seed for splitting the detections.
     pub seed: u64,
+    /// The numbers of fine cells of a coarse one along d, phi and psi; 2, 1 and 2 if missing. `p_detect` always has those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<[usize; 3]>,
     /// What the detections were taken with; `None` if it was not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken_with: Option<super::TakenWith>,
     pub data: Data,
-    /// The ends of the cells.
+    /// The ends of the fine cells.
     pub edges: Edges,
+    /// The shape for a smaller share of the errors: step 0 if there is a `wider` one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub narrower: Option<Shape>,
+    /// The shape for the share `quantile`: step 1 with the other two.
     pub shape: Shape,
+    /// The shape for a larger share of the errors: step 2.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wider: Option<Shape>,
     pub region: Vec<Region>,
     pub cell: Vec<Cell>,
     pub p_detect: Share,
@@ -39,6 +49,9 @@ pub(super) struct Document {
 pub(super) struct Data {
     pub sha256: String,
     pub views: u64,
+    /// The number of rows in the file if the views were drawn from more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drawn_of: Option<u64>,
     pub detections: u64,
     /// Detections to which the shape was fitted.
     pub fitted: u64,
@@ -64,7 +77,7 @@ pub(super) struct Edges {
     pub psi_deg: Vec<f64>,
 }
 
-/// The error quantiles at the corners, which a region's factor multiplies.
+/// An error quantile at the corners.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Shape {
@@ -86,9 +99,9 @@ pub(super) struct Region {
     pub independent: Option<u64>,
     /// The rank, from the smallest, of the score used as the factor; 0 if there are too few.
     pub rank: u64,
-    /// The factor for the shape of the translation.
+    /// The step of the translation's bounds between `narrower` and `wider`, or the factor of a shape alone.
     pub translation: f64,
-    /// The factor for the shape of the yaw.
+    /// The same for the yaw.
     pub yaw: f64,
 }
 
@@ -104,7 +117,7 @@ pub(super) struct Cell {
     /// The index of its region, from 0; `None` if the cell has no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<usize>,
-    /// Its own factors if they are larger than the region's.
+    /// Its own steps or factors if they are larger than the region's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<[f64; 2]>,
     /// The reason why it has no bound.

@@ -1,9 +1,11 @@
 //! A learnt error model: bounds on the error of an observation of a tag, by distance and angles.
 
 use super::LearnError;
+use super::axis::PARTS;
 use super::binomial::clopper_pearson;
 use super::cells::{Cells, flat, numbered};
 use super::document::{self, Document};
+use super::family::Family;
 use super::smooth::{Lattice, between};
 
 /// Bounds on the errors of an observation, and the share of detected views.
@@ -94,24 +96,16 @@ impl ErrorModel {
                 return Err(wrong("`quantile` and `confidence` are above 0 and below 1"));
             }
         }
-        let cells = Cells::of(&document.edges).ok_or_else(|| wrong("`edges` do not ascend"))?;
-        let logs = |corners| {
-            let values = flat(&cells, corners, |value| value > 0.0)?;
-            Some(values.into_iter().map(libm::log).collect::<Vec<f64>>())
-        };
-        let (Some(translation), Some(yaw)) = (
-            logs(&document.shape.translation_m),
-            logs(&document.shape.yaw_rad),
-        ) else {
-            return Err(wrong("`shape` has no number above 0 at each corner"));
-        };
-        let factors = factors(&document, &cells).map_err(|what| wrong(&what))?;
-        let bounds = bounds(&cells, [&translation, &yaw], &factors);
+        let cells = Cells::of(&document.edges, document.parts.unwrap_or(PARTS))
+            .ok_or_else(|| wrong("`edges` do not ascend"))?;
+        let families = families(&document, &cells).map_err(&wrong)?;
+        let steps = steps(&document, &cells, &families).map_err(|what| wrong(&what))?;
+        let bounds = bounds(&cells, &families, &steps);
         let share = &document.p_detect;
         let views = if share.share.is_empty() {
             None
         } else {
-            let views = Cells::of(&share.edges)
+            let views = Cells::of(&share.edges, PARTS)
                 .and_then(|cells| {
                     let values = flat(&cells, &share.share, |p| p > 0.0 && p < 1.0)?;
                     let count: usize = cells.coarse().iter().product();
@@ -189,7 +183,7 @@ impl ErrorModel {
     pub fn detectability_deg(&self, at: [f64; 3]) -> Option<Detectability> {
         let (cells, logits) = self.views.as_ref()?;
         let cell = cells.cell(at)?;
-        let number = cells.number(Cells::coarse_of(cell));
+        let number = cells.number(cells.coarse_of(cell));
         let share = &self.document.p_detect;
         let (views, detected) = (share.views[number], share.detected[number]);
         let lattice = Lattice::over(&cells.axes);
@@ -228,7 +222,7 @@ impl ErrorModel {
     /// if there is no limit above 0.
     pub(super) fn expected_share(&self, at: [f64; 3], limits: &[f64]) -> Option<(f64, f64)> {
         let (cells, _) = self.views.as_ref()?;
-        let least = *limits.get(cells.number(Cells::coarse_of(cells.cell(at)?)))?;
+        let least = *limits.get(cells.number(cells.coarse_of(cells.cell(at)?)))?;
         let share = self.detectability_deg(at)?.share;
         (least > 0.0).then_some((share, least))
     }
@@ -239,6 +233,12 @@ impl ErrorModel {
     pub fn counts(&self) -> (u64, u64, f64) {
         let data = &self.document.data;
         (data.views, data.detections, data.flip_share)
+    }
+
+    /// Returns the number of rows in the file if the views were drawn from more rows.
+    #[must_use]
+    pub fn drawn_of(&self) -> Option<u64> {
+        self.document.data.drawn_of
     }
 
     /// Returns the number of views in the data, and the number of independent views with the same information.
@@ -267,7 +267,7 @@ impl ErrorModel {
     /// Returns the index of the region at a distance (m) and angles (degrees).
     #[must_use]
     pub fn region_deg(&self, at: [f64; 3]) -> Option<usize> {
-        let coarse = Cells::coarse_of(self.cells.cell(at)?);
+        let coarse = self.cells.coarse_of(self.cells.cell(at)?);
         self.document.cell[self.cells.number(coarse)].region
     }
 
@@ -314,8 +314,33 @@ fn logit(share: f64) -> f64 {
     libm::log(share / (1.0 - share))
 }
 
-/// Returns the logarithms of the factors of each coarse cell.
-fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, String> {
+/// Returns the nested shapes of both bounds.
+fn families(document: &Document, cells: &Cells) -> Result<[Family; 2], &'static str> {
+    let shapes: Vec<&document::Shape> = match (&document.narrower, &document.wider) {
+        (Some(narrower), Some(wider)) => std::vec![narrower, &document.shape, wider],
+        (None, None) => std::vec![&document.shape],
+        _ => return Err("of `narrower` and `wider` there is only one"),
+    };
+    let family = |of: fn(&document::Shape) -> &document::Corners| {
+        let values: Option<Vec<Vec<f64>>> = shapes
+            .iter()
+            .map(|shape| flat(cells, of(shape), |value| value > 0.0))
+            .collect();
+        let values = values.ok_or("`shape` has no number above 0 at each corner")?;
+        Family::new(&values).ok_or("`narrower`, `shape` and `wider` do not ascend at each corner")
+    };
+    Ok([
+        family(|shape| &shape.translation_m)?,
+        family(|shape| &shape.yaw_rad)?,
+    ])
+}
+
+/// Returns the steps of each coarse cell. A file with one shape has factors instead: a step doubles.
+fn steps(
+    document: &Document,
+    cells: &Cells,
+    families: &[Family; 2],
+) -> Result<Vec<Option<[f64; 2]>>, String> {
     let count = cells.each_coarse().count();
     if document.cell.len() != count {
         return Err(format!(
@@ -323,9 +348,9 @@ fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, 
             document.cell.len()
         ));
     }
-    let mut factors = Vec::new();
+    let mut steps = Vec::new();
     for (coarse, cell) in cells.each_coarse().zip(&document.cell) {
-        let number = factors.len();
+        let number = steps.len();
         if cells.ends(coarse) != [cell.d_m, cell.phi_deg, cell.psi_deg] {
             return Err(format!("cell {number} does not lie between the edges"));
         }
@@ -340,13 +365,13 @@ fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, 
                 let regional = [region.translation, region.yaw];
                 let own = cell.own.unwrap_or(regional);
                 let larger = [0, 1].map(|i| own[i].max(regional[i]));
-                if larger
-                    .iter()
-                    .any(|factor| !(factor.is_finite() && *factor > 0.0))
-                {
-                    return Err(format!("a factor of cell {number} is not above 0"));
-                }
-                Some(larger.map(libm::log))
+                let [translation, yaw] = [0, 1].map(|i| families[i].step_of(larger[i]));
+                let (Some(translation), Some(yaw)) = (translation, yaw) else {
+                    return Err(format!(
+                        "a factor or step of cell {number} is not a number, or a factor is not above 0"
+                    ));
+                };
+                Some([translation, yaw])
             }
             _ => {
                 return Err(format!(
@@ -354,17 +379,17 @@ fn factors(document: &Document, cells: &Cells) -> Result<Vec<Option<[f64; 2]>>, 
                 ));
             }
         };
-        factors.push(of);
+        steps.push(of);
     }
-    Ok(factors)
+    Ok(steps)
 }
 
 /// Returns the logarithms of the bounds at each fine cell's corners: shape times factor, never falling with
 /// distance at the same angles.
 fn bounds(
     cells: &Cells,
-    shapes: [&[f64]; 2],
-    factors: &[Option<[f64; 2]>],
+    families: &[Family; 2],
+    steps: &[Option<[f64; 2]>],
 ) -> Vec<Option<[[f64; 8]; 2]>> {
     let lattice = Lattice::over(&cells.axes);
     let fine = cells.fine();
@@ -374,14 +399,14 @@ fn bounds(
             let mut nearer = [[f64::NEG_INFINITY; 4]; 2];
             for i in 0..fine[0] {
                 let cell = [i, j, k];
-                let Some(factor) = factors[cells.number(Cells::coarse_of(cell))] else {
+                let Some(step) = steps[cells.number(cells.coarse_of(cell))] else {
                     continue;
                 };
                 let corners = lattice.corners(cell);
                 let mut here = [[0.0; 8]; 2];
                 for which in [0, 1] {
                     for n in 0..4 {
-                        let at = |n: usize| shapes[which][corners[n]] + factor[which];
+                        let at = |n: usize| families[which].log(corners[n], step[which]);
                         let near = at(n).max(nearer[which][n]);
                         here[which][n] = near;
                         here[which][n + 4] = at(n + 4).max(near);

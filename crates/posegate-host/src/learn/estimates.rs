@@ -182,7 +182,7 @@ pub fn conditions(
     Ok(rows)
 }
 
-fn covariance_columns(sheet: &Sheet<'_>, all: &[&str]) -> Result<[Column; 6], LearnError> {
+fn covariance_columns(sheet: &Sheet<'_, &[u8]>, all: &[&str]) -> Result<[Column; 6], LearnError> {
     let mut columns = [sheet.needed(COVARIANCE[0], all)?; 6];
     for (column, name) in columns.iter_mut().zip(COVARIANCE) {
         *column = sheet.needed(name, all)?;
@@ -192,7 +192,7 @@ fn covariance_columns(sheet: &Sheet<'_>, all: &[&str]) -> Result<[Column; 6], Le
 
 /// Returns the index of the condition's column; `None` for the covariance's size.
 fn condition_place(
-    sheet: &Sheet<'_>,
+    sheet: &Sheet<'_, &[u8]>,
     condition: &str,
     file: &str,
 ) -> Result<Option<usize>, LearnError> {

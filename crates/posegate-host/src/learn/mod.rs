@@ -6,7 +6,7 @@ pub use self::by_age::{ByAge, by_age_json};
 pub use self::check::{
     BoundCheck, Change, CheckReport, CheckSettings, DetectionCheck, RegionCheck, check_bounds,
 };
-pub use self::detections::{Detection, Detections, places};
+pub use self::detections::{DRAWN, Detection, Detections, places};
 pub use self::error::LearnError;
 pub use self::error_model::{CellReport, Detectability, ErrorModel, RegionReport};
 pub use self::estimates::{Scored, ScoredEstimates, conditions};
@@ -29,9 +29,11 @@ mod cells;
 mod check;
 mod detections;
 mod document;
+mod draw;
 mod error;
 mod error_model;
 mod estimates;
+mod family;
 mod fisher;
 mod groups;
 mod inflation;

@@ -11,24 +11,25 @@ pub(super) struct Column {
 }
 
 /// A reader of a CSV.
-pub(super) struct Sheet<'a> {
+pub(super) struct Sheet<'a, R = &'a [u8]> {
     file: &'a str,
     names: Vec<String>,
-    reader: csv::Reader<&'a [u8]>,
+    reader: csv::Reader<R>,
+    record: csv::StringRecord,
 }
 
 /// A row of the CSV.
 pub(super) struct Line<'a> {
     file: &'a str,
-    record: csv::StringRecord,
+    record: &'a csv::StringRecord,
     /// The line number, from 1.
     pub(super) number: u64,
 }
 
-impl<'a> Sheet<'a> {
-    pub(super) fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, LearnError> {
+impl<'a, R: std::io::Read> Sheet<'a, R> {
+    pub(super) fn new(bytes: R, file: &'a str) -> Result<Self, LearnError> {
+        // Fields are trimmed when they are used: a trimmed copy of each row would take as long as its numbers.
         let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
             // Numbers need no quotes. An unclosed quote would hide the rest of the file.
             .quoting(false)
             .flexible(true)
@@ -36,12 +37,13 @@ impl<'a> Sheet<'a> {
         let header = reader.headers().map_err(|fault| unreadable(file, &fault))?;
         let names = header
             .iter()
-            .map(|name| name.trim_start_matches('\u{feff}').to_owned())
+            .map(|name| name.trim().trim_start_matches('\u{feff}').trim().to_owned())
             .collect();
         Ok(Self {
             file,
             names,
             reader,
+            record: csv::StringRecord::new(),
         })
     }
 
@@ -85,17 +87,15 @@ impl<'a> Sheet<'a> {
     }
 
     /// Returns the next row.
-    pub(super) fn line(&mut self) -> Result<Option<Line<'a>>, LearnError> {
-        let mut record = csv::StringRecord::new();
-        let more = self.reader.read_record(&mut record);
+    pub(super) fn line(&mut self) -> Result<Option<Line<'_>>, LearnError> {
+        let more = self.reader.read_record(&mut self.record);
         if !more.map_err(|fault| unreadable(self.file, &fault))? {
             return Ok(None);
         }
-        let number = record.position().map_or(0, csv::Position::line);
         let line = Line {
             file: self.file,
-            record,
-            number,
+            number: self.record.position().map_or(0, csv::Position::line),
+            record: &self.record,
         };
         let (found, expected) = (line.record.len(), self.names.len());
         if found != expected {
@@ -127,7 +127,7 @@ impl Line<'_> {
         allows: impl Fn(f64) -> bool,
         expected: &str,
     ) -> Result<f64, LearnError> {
-        let text = self.record.get(index).unwrap_or("");
+        let text = self.field(index);
         let number = text.parse::<f64>().ok();
         number
             .filter(|number| number.is_finite() && allows(*number))
@@ -141,7 +141,11 @@ impl Line<'_> {
 
     /// Returns the text of a field.
     pub(super) fn text(&self, index: usize) -> String {
-        self.record.get(index).unwrap_or("").to_owned()
+        self.field(index).to_owned()
+    }
+
+    fn field(&self, index: usize) -> &str {
+        self.record.get(index).unwrap_or("").trim()
     }
 
     /// Returns the text of a field that is not empty.
@@ -164,7 +168,7 @@ impl Line<'_> {
 
     /// Refuses a field that is not empty.
     pub(super) fn empty(&self, column: Column, why: &str) -> Result<(), LearnError> {
-        let text = self.record.get(column.index).unwrap_or("");
+        let text = self.field(column.index);
         if text.is_empty() {
             return Ok(());
         }
@@ -175,6 +179,16 @@ impl Line<'_> {
                 column.name
             ),
         ))
+    }
+
+    /// Returns the position of the row in the file, bytes.
+    pub(super) fn byte(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::byte)
+    }
+
+    /// Returns the error of a row.
+    pub(super) fn wrong_row(&self, what: String) -> LearnError {
+        self.wrong(1, what)
     }
 
     /// Returns the error of a field.

@@ -96,7 +96,7 @@ impl Lattice {
                 pull[index] = price[index] * values[index] + q - 0.5;
             }
             fit = self.solve_weighted(spots, &price, &pull, stiffness);
-            near = (near * 0.75).max(0.02);
+            near = (near * 0.75).max(0.01);
         }
         fit
     }
@@ -231,6 +231,55 @@ pub(super) fn floored(fit: &[f64], spots: &[InterpolationWeights]) -> Vec<f64> {
     fit.iter()
         .zip(floors)
         .map(|(value, floor)| value.max(floor))
+        .collect()
+}
+
+/// The fewest rows around a corner whose values limit it.
+const FEWEST_AROUND: usize = 20;
+/// The confidence of the limit that the rows around a corner set.
+const CAP_CONFIDENCE: f64 = 0.95;
+
+/// With too few rows for such a limit, the largest value is a limit with this tail: the largest of n errors grows with the power
+/// 1/4 of n.
+const TAIL: f64 = 0.25;
+
+/// Returns the values of the rows in the cells around each corner, ascending.
+pub(super) fn errors_around(
+    corners: usize,
+    spots: &[InterpolationWeights],
+    values: &[f64],
+) -> Vec<Vec<f64>> {
+    let mut around = std::vec![Vec::new(); corners];
+    for (spot, value) in spots.iter().zip(values) {
+        for corner in spot.corners {
+            around[corner].push(*value);
+        }
+    }
+    for values in &mut around {
+        values.sort_by(f64::total_cmp);
+    }
+    around
+}
+
+/// Returns a fit to the `q`-quantile whose corners are nowhere higher than an upper confidence limit of that quantile of the
+/// values around them: a slope is not continued to errors that were not observed.
+pub(super) fn capped(fit: &[f64], around: &[Vec<f64>], q: f64) -> Vec<f64> {
+    let needed = libm::log(1.0 - CAP_CONFIDENCE) / libm::log(q);
+    let limit = |values: &Vec<f64>| {
+        let n = values.len();
+        let largest = *values.last()?;
+        if n < FEWEST_AROUND {
+            return None;
+        }
+        let k = super::binomial::rank(n as u64, q, CAP_CONFIDENCE);
+        match k.and_then(|k| usize::try_from(k).ok()) {
+            Some(k) => Some(values[k - 1]),
+            None => Some(largest + TAIL * libm::log(needed / n as f64)),
+        }
+    };
+    fit.iter()
+        .zip(around)
+        .map(|(value, around)| limit(around).map_or(*value, |limit| value.min(limit)))
         .collect()
 }
 
