@@ -21,10 +21,10 @@
 
 use crate::report::PoseEstimate;
 use crate::set::{Growth, InputError, Uncertainty};
-use core::f64::consts::{LN_2, LOG2_E, TAU};
+use core::f64::consts::{LOG2_E, TAU};
 
-/// The bets: by how much the errors may be larger than claimed.
-const SCALES_SQUARED: [f64; 2] = [2.0, 4.0];
+/// The bets: the square of how much larger the errors are than claimed, and its binary logarithm.
+const BETS: [(f64, f64); 2] = [(2.0, 1.0), (4.0, 2.0)];
 
 /// A fix against its prediction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,15 +75,10 @@ impl Innovation {
         let x = metres(to.x_um, from.x_um);
         let y = metres(to.y_um, from.y_um);
         let yaw = f64::from(to.yaw.minus(from.yaw).signed()) * (TAU / 4_294_967_296.0);
-        let length = libm::hypot(x, y);
+        // On each axis, so at least as much as the disc of the slip explains.
+        let less = |value: f64, by: f64| value - value.max(-by).min(by);
         let slipped = f64::from(beside.translation_um()) * 1e-6;
-        let share = if length > slipped {
-            1.0 - slipped / length
-        } else {
-            0.0
-        };
         let turned = f64::from(beside.yaw_q24()) * (TAU / 16_777_216.0);
-        let yaw = libm::copysign((libm::fabs(yaw) - turned).max(0.0), yaw);
         let [a, b] = [covariance(fix)?, covariance(prediction)?];
         let mut sum = a;
         for (row, other) in sum.iter_mut().zip(b) {
@@ -92,7 +87,7 @@ impl Innovation {
             }
         }
         Ok(Self {
-            difference: [x * share, y * share, yaw],
+            difference: [less(x, slipped), less(y, slipped), less(yaw, turned)],
             covariance: sum,
         })
     }
@@ -170,7 +165,7 @@ pub enum ModelStanding {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Monitor {
-    /// The binary logarithm of twice the fixes between false alarms.
+    /// The binary logarithm of twice the fixes between false alarms, rounded up.
     most: f64,
     /// The binary logarithm of each product.
     doubts: [f64; 2],
@@ -183,7 +178,10 @@ impl Monitor {
     #[must_use]
     pub fn new(fixes_between_false_alarms: u32) -> Option<Self> {
         (fixes_between_false_alarms >= 100).then(|| Self {
-            most: 1.0 + libm::log2(f64::from(fixes_between_false_alarms)),
+            // Rounded up: alarms are rarer.
+            most: f64::from(
+                33_u32.saturating_sub(fixes_between_false_alarms.saturating_sub(1).leading_zeros()),
+            ),
             doubts: [0.0; 2],
             is_contradicted: false,
         })
@@ -196,8 +194,8 @@ impl Monitor {
     /// [`InputError`] of an innovation that is not valid: it counts for nothing.
     pub fn fix(&mut self, innovation: &Innovation) -> Result<ModelStanding, InputError> {
         let squared = innovation.normalised_squared()?;
-        for (doubt, scale_squared) in self.doubts.iter_mut().zip(SCALES_SQUARED) {
-            *doubt = doubt.max(0.0) + bet(squared, scale_squared);
+        for (doubt, scale) in self.doubts.iter_mut().zip(BETS) {
+            *doubt = doubt.max(0.0) + bet(squared, scale);
             // An innovation beyond the range of numbers contradicts as well.
             self.is_contradicted |= !(*doubt < self.most);
         }
@@ -225,9 +223,8 @@ impl Monitor {
 }
 
 /// Returns the binary logarithm of the factor of a bet.
-fn bet(normalised_squared: f64, scale_squared: f64) -> f64 {
-    let won = normalised_squared * (1.0 - 1.0 / scale_squared) * (0.5 * LOG2_E);
-    won - 1.5 * libm::log(scale_squared) / LN_2
+fn bet(normalised_squared: f64, (scale_squared, logarithm): (f64, f64)) -> f64 {
+    normalised_squared * (1.0 - 1.0 / scale_squared) * (0.5 * LOG2_E) - 1.5 * logarithm
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 use super::*;
 use crate::set::Estimate;
+use core::f64::consts::LN_2;
 
 /// A generator of normal numbers (SplitMix64, Box and Muller).
 struct Normal(u64);
@@ -51,7 +52,8 @@ fn fixes_until_alarm(
 /// innovation, so smaller errors than claimed lose.
 #[test]
 fn a_bet_is_fair() {
-    for scale_squared in SCALES_SQUARED {
+    for scale in BETS {
+        assert_eq!(scale.1, scale.0.log2());
         let step = 1e-3;
         let mean: f64 = (0..400_000)
             .map(|k| (f64::from(k) + 0.5) * step)
@@ -59,11 +61,11 @@ fn a_bet_is_fair() {
                 // Of the root of d^2, whose density has no pole: 2 root times that of d^2.
                 let squared = root * root;
                 let density = (2.0 / core::f64::consts::PI).sqrt() * squared;
-                density * (bet(squared, scale_squared) * LN_2 - squared / 2.0).exp() * step
+                density * (bet(squared, scale) * LN_2 - squared / 2.0).exp() * step
             })
             .sum();
-        assert!((mean - 1.0).abs() < 1e-6, "{scale_squared}: {mean}");
-        assert!(bet(1.0, scale_squared) < bet(1.1, scale_squared));
+        assert!((mean - 1.0).abs() < 1e-6, "{scale:?}: {mean}");
+        assert!(bet(1.0, scale) < bet(1.1, scale));
     }
 }
 
@@ -189,6 +191,10 @@ fn what_is_no_innovation_counts_for_nothing() {
     };
     assert_eq!(monitor.fix(&huge), Ok(ModelStanding::Contradicted));
     assert!(Monitor::new(99).is_none());
+    for between in [100, 127, 128, 129, 1_000_000, u32::MAX] {
+        let most = Monitor::new(between).unwrap().most;
+        assert_eq!(most, 1.0 + f64::from(between).log2().ceil(), "{between}");
+    }
 }
 
 /// Doubt comes before contradiction, good fixes take it away, and a contradiction stays until the reset.
