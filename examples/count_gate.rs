@@ -30,10 +30,10 @@ mod firmware {
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
     use posegate::contain::{self, Decision, second};
-    use posegate::gate::{Gate, ScrubProgress, Step, self_test};
+    use posegate::gate::{Gate, Innovation, Monitor, ScrubProgress, Step, self_test};
     use posegate::motion::MotionBounds;
     use posegate::report::{PoseEstimate, Report};
-    use posegate::set::{InputError, PoseSet, Trust};
+    use posegate::set::{Growth, InputError, PoseSet, Trust};
     use posegate::table::Table;
 
     // Measured functions. Not inlined, so that each call is a real call.
@@ -117,6 +117,13 @@ mod firmware {
         let name = "growth of a pose-set by a movement";
         let most = if M4F { 200 } else { 500 };
         counter.line("", name, growth.0, "instructions", Some(most));
+        let mut monitor = Monitor::new(1_000_000).ok_or("the monitor is invalid")?;
+        let fix = counter.count(|| {
+            let (fix, prediction) = (black_box(&report.belief), black_box(&report.belief));
+            monitor.fix(&Innovation::of_independent(fix, prediction, Growth::NONE)?)
+        })?;
+        let _ = fix.1.map_err(|_| "a fix was refused")?;
+        counter.line("", "fix of a monitor", fix.0, "instructions", None);
         let now_ms = SCHEDULE.get(3).map_or(0, |cycle| cycle.now_ms) + 1;
         let told = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
         if !told.permission.is_permit() {

@@ -1251,8 +1251,8 @@ typedef struct posegate_estimate {
 } posegate_estimate;
 
 /**
- * Storage of a monitor, which compares the fixes of a source with predictions, and tells when they contradict the errors that it claims: a
- * camera was knocked, or a tag has moved.
+ * Storage of a monitor. It compares the fixes of a source with predictions, and reports when they contradict the errors that the source
+ * claims: a camera was knocked, or a tag has moved.
  *
  * `posegate_monitor_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
  */
@@ -1750,8 +1750,8 @@ posegate_status posegate_judge_examine(const struct posegate_judge *judge,
                                        struct posegate_verdict *verdict);
 
 /**
- * Initialises a monitor that contradicts a model that holds once in `fixes_between_false_alarms` fixes on average, or less often: at least
- * 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+ * Initialises a monitor. Where the model holds, it contradicts it wrongly once in `fixes_between_false_alarms` fixes on average, or less
+ * often: at least 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
  *
  * Errors: `POSEGATE_STATUS_BAD_VALUE` for fewer.
  *
@@ -1762,8 +1762,8 @@ posegate_status posegate_monitor_init(struct posegate_monitor *monitor,
                                       uint32_t fixes_between_false_alarms);
 
 /**
- * Takes an accepted fix and its prediction for the same time: with a tracker, `posegate_tracker_tracked` before `posegate_tracker_fix`, and
- * the report after it. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+ * Takes an accepted fix and its prediction for the same time. With a tracker call `posegate_tracker_tracked` before and after
+ * `posegate_tracker_fix`, for the same time: the evidence from before is the prediction, the report from after is the fix. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
  *
  * Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if one of both has no valid covariance or the dependence is no such number. The
  * fix then counts for nothing, and `POSEGATE_MODEL_CONTRADICTED` is written.
@@ -1778,7 +1778,7 @@ posegate_status posegate_monitor_fix(struct posegate_monitor *monitor,
                                      uint32_t *model);
 
 /**
- * Starts a monitor anew, after a person has looked at the cause.
+ * Lets a monitor forget all fixes. Call it after a person has removed the cause.
  *
  * # Safety
  * The pointer is null, misaligned, or points to what its type says.

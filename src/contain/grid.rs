@@ -36,8 +36,8 @@ impl From<Offset> for Stop {
 
 /// Returns `Ok` if every pose of the set lies in a covered cell.
 ///
-/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn. `most_runs` bounds the runs and the
-/// rows without a run that are looked at.
+/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn. The walk looks at `most_runs` runs at
+/// most; a row without a run counts as one.
 pub(super) fn covers<S: Section>(
     grid: &Grid<'_>,
     cells: &Cells,

@@ -1,7 +1,7 @@
 //! Does the error model of a source still hold? A test of every accepted fix against its prediction.
 //!
-//! A camera that was knocked, or a tag that has moved, gives fixes whose claimed covariance is too small: everything agrees with itself
-//! and is wrong. What shows it is that fixes differ from the predictions by more than both claim. The monitor bets against the claim:
+//! A camera that was knocked, or a tag that has moved, gives fixes with larger errors than their covariance claims. Such fixes differ from
+//! their predictions by more than both claim. The monitor tests the claim:
 //!
 //! - The square of the normalised innovation, `d^2 = r' S^-1 r`, has at most the chi-square distribution with 3 degrees of freedom if the
 //!   claims hold. `r` is the difference of fix and prediction, `S` the sum of their covariances.
@@ -130,7 +130,7 @@ fn covariance(estimate: &PoseEstimate) -> Result<[[f64; 3]; 3], InputError> {
     }
 }
 
-/// What a monitor thinks of a model.
+/// How well a model agrees with the fixes so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
@@ -138,13 +138,13 @@ pub enum ModelStanding {
     /// Nothing speaks against it.
     #[default]
     Holds,
-    /// The evidence against it is the root of what contradicts it: time to look at camera and tags.
+    /// Half of the evidence that contradicts it, in logarithms, is there: check camera and tags soon.
     InDoubt,
     /// It is contradicted. Deny with [`super::Reason::ModelContradicted`] until a person has looked.
     Contradicted,
 }
 
-/// Watches whether the errors that a source claims hold, fix by fix. 32 bytes.
+/// Tests the errors that a source claims, fix by fix. 32 bytes; `./ci.sh budgets` prints the instructions of a fix.
 ///
 /// ```
 /// use posegate::gate::{Gate, Innovation, ModelStanding, Monitor, Reason, Step};
@@ -173,8 +173,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Returns a monitor that contradicts a model that holds once in so many fixes on average, or less often: at least 100. `None` for fewer,
-    /// with which it would stop robots all day. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+    /// Returns a monitor. Where the model holds, it contradicts it wrongly once in `fixes_between_false_alarms` fixes on average, or less
+    /// often. `None` for fewer than 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
     #[must_use]
     pub fn new(fixes_between_false_alarms: u32) -> Option<Self> {
         (fixes_between_false_alarms >= 100).then(|| Self {
@@ -187,8 +187,7 @@ impl Monitor {
         })
     }
 
-    /// Takes an accepted fix, and returns what it thinks of the model then. A contradiction stays until [`Monitor::reset`]. Some hundred
-    /// instructions of floating point.
+    /// Takes an accepted fix, and returns the standing of the model with it. A contradiction stays until [`Monitor::reset`].
     ///
     /// # Errors
     /// [`InputError`] of an innovation that is not valid: it counts for nothing.
@@ -202,7 +201,7 @@ impl Monitor {
         Ok(self.standing())
     }
 
-    /// Returns what it thinks of the model.
+    /// Returns the standing of the model with the fixes so far.
     pub fn standing(&self) -> ModelStanding {
         if self.is_contradicted {
             return ModelStanding::Contradicted;
@@ -215,7 +214,7 @@ impl Monitor {
         }
     }
 
-    /// Starts anew, after a person has looked at the cause.
+    /// Forgets all fixes. Call it after a person has removed the cause.
     pub fn reset(&mut self) {
         self.doubts = [0.0; 2];
         self.is_contradicted = false;

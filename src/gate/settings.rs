@@ -231,7 +231,7 @@ impl Settings<'static> {
     /// - `maximum_age_ms` adds two, since the age counts up to the end of the permission.
     /// - `inhibit_hold_ms` is this time: after a denial at least one further report is evaluated before the gate opens.
     /// - `permits_in_a_row` is 3.
-    /// - `most_runs` is 1,000: a set of 0.5 m and 10 deg on cells of 2 cm and 1 deg.
+    /// - `most_runs` is 1,000, such as 50 rows in each of 20 slabs of headings: 1 m and 20 deg on cells of 2 cm and 1 deg.
     ///
     /// One lost report closes the gate. To bear one, give twice the period. Longer times cost margin, since a robot that moves is
     /// granted what it can move in them ([`Source::motion`]); odometry makes the times short ([`crate::track`]): then the period is

@@ -8,8 +8,8 @@ use posegate::gate::{Innovation, ModelStanding, Monitor};
 /// Words of a `posegate_monitor`.
 pub const POSEGATE_MONITOR_WORDS: usize = 5;
 
-/// Storage of a monitor, which compares the fixes of a source with predictions, and tells when they contradict the errors that it claims: a
-/// camera was knocked, or a tag has moved.
+/// Storage of a monitor. It compares the fixes of a source with predictions, and reports when they contradict the errors that the source
+/// claims: a camera was knocked, or a tag has moved.
 ///
 /// `posegate_monitor_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
 #[repr(C)]
@@ -34,13 +34,13 @@ pub enum posegate_dependence {
     Unknown = 2,
 }
 
-/// What a monitor thinks of a model.
+/// How well a model agrees with the fixes so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_model {
     /// Nothing speaks against it.
     Holds = 0,
-    /// Evidence is coming together: time to look at camera and tags.
+    /// Half of the evidence that contradicts it, in logarithms, is there: check camera and tags soon.
     InDoubt = 1,
     /// It is contradicted: keep the gate closed (`posegate_gate_inhibit` with `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until a
     /// person has looked and `posegate_monitor_reset` was called.
@@ -58,8 +58,8 @@ fn model(standing: ModelStanding) -> u32 {
     model as u32
 }
 
-/// Initialises a monitor that contradicts a model that holds once in `fixes_between_false_alarms` fixes on average, or less often: at least
-/// 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+/// Initialises a monitor. Where the model holds, it contradicts it wrongly once in `fixes_between_false_alarms` fixes on average, or less
+/// often: at least 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
 ///
 /// Errors: `POSEGATE_STATUS_BAD_VALUE` for fewer.
 ///
@@ -80,8 +80,8 @@ pub unsafe extern "C" fn posegate_monitor_init(
     })
 }
 
-/// Takes an accepted fix and its prediction for the same time: with a tracker, `posegate_tracker_tracked` before `posegate_tracker_fix`, and
-/// the report after it. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+/// Takes an accepted fix and its prediction for the same time. With a tracker call `posegate_tracker_tracked` before and after
+/// `posegate_tracker_fix`, for the same time: the evidence from before is the prediction, the report from after is the fix. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
 ///
 /// Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if one of both has no valid covariance or the dependence is no such number. The
 /// fix then counts for nothing, and `POSEGATE_MODEL_CONTRADICTED` is written.
@@ -124,7 +124,7 @@ pub unsafe extern "C" fn posegate_monitor_fix(
     })
 }
 
-/// Starts a monitor anew, after a person has looked at the cause.
+/// Lets a monitor forget all fixes. Call it after a person has removed the cause.
 ///
 /// # Safety
 /// The pointer is null, misaligned, or points to what its type says.

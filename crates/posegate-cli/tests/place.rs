@@ -63,15 +63,6 @@ fn pose(told: &Value, key: &str) -> f64 {
     number(&told["tag_pose"], key)
 }
 
-/// Returns all cases in a deep job, and in the fast suite one of them, another one each day.
-fn today<T: Copy>(all: &[T]) -> Vec<T> {
-    if counts::is_deep() {
-        return all.to_vec();
-    }
-    let day = counts::first_seed() / 100_000;
-    vec![all[day as usize % all.len()]]
-}
-
 #[test]
 fn a_pose_that_is_known_has_its_tag_as_near_as_it_is_seen() {
     // d = (s / 2) fy / (height / 2), straight ahead.
@@ -114,7 +105,7 @@ fn more_looks_are_no_worse() {
         number(&json(SITE, &line, 0), "mean")
     };
     let few = mean(24);
-    for looks in today(&[25, 26, 31, 40]) {
+    for looks in counts::one_a_day(&[25, 26, 31, 40]) {
         assert!(mean(looks) <= few, "{looks}");
     }
 }
@@ -390,7 +381,7 @@ fn a_wall_that_carries_a_tag_hides_another_one() {
 fn answers_are_the_same_at_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let budget = if counts::is_deep() { 600 } else { 60 };
-    for method in today(&["cmaes", "ga"]) {
+    for method in ["cmaes", "ga"] {
         let line = place(
             "0.1",
             &format!("{FREE} --budget {budget} --method {method} --seed 5 --json"),
@@ -437,7 +428,7 @@ fn the_margin_holds_within_the_reserve() {
             let (metres, degrees) = (metres + 0.01 * beyond, degrees + beyond);
             // The neighbours of the middle of a cube. The first is towards the robot.
             let mut others: Vec<i32> = (0..27).filter(|way| *way != 13 && *way != 12).collect();
-            others = today(&others);
+            others = counts::one_a_day(&others);
             others.insert(0, 12);
             for way in others {
                 let axis = [way % 3 - 1, way / 3 % 3 - 1, way / 9 - 1].map(f64::from);

@@ -17,6 +17,17 @@ pub fn cases(all: u64) -> u64 {
     if is_deep() { all } else { (all / 20).max(1) }
 }
 
+/// Returns all cases in a deep job, and in the fast suite one of them, another one on each day of the year.
+#[allow(dead_code)] // Some tests have numbers of cases.
+pub fn one_a_day<T: Copy>(all: &[T]) -> Vec<T> {
+    if is_deep() {
+        return all.to_vec();
+    }
+    let day = first_seed() / A_DAY;
+    let today = all.iter().cycle().nth(day as usize % all.len().max(1));
+    today.copied().into_iter().collect()
+}
+
 /// Returns the first seed of a test: another one on each day of the year, so that the tried cases add up, and 0 in a
 /// deep job. `POSEGATE_SEED` repeats a run; the seed is printed.
 #[allow(dead_code)] // Some tests have no seeds.

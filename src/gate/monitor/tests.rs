@@ -190,6 +190,7 @@ fn what_is_no_innovation_counts_for_nothing() {
         ..odd
     };
     assert_eq!(monitor.fix(&huge), Ok(ModelStanding::Contradicted));
+    assert_eq!(size_of::<Monitor>(), 32);
     assert!(Monitor::new(99).is_none());
     for between in [100, 127, 128, 129, 1_000_000, u32::MAX] {
         let most = Monitor::new(between).unwrap().most;

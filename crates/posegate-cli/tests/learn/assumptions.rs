@@ -1,9 +1,9 @@
 //! The assumptions of what is learnt: where one holds, the result holds; where it does not, the result visibly fails. The tests of
 //! dependence, fleets, drift and surveys have the same for theirs.
 
-use crate::Share;
 use crate::inflation::estimates;
 use crate::law::{Law, Random, SQUARES};
+use crate::{Share, in_regions};
 use posegate::confidence::radius_squared;
 use posegate_host::learn::{
     BoundsSettings, Detection, Detections, ErrorModel, InflationModel, InflationSettings, Scored,
@@ -22,19 +22,16 @@ fn learnt(detections: &Detections) -> ErrorModel {
 
 /// Returns the share of translation errors within the bound in each region, and overall at the end.
 fn shares(model: &ErrorModel, later: &Detections) -> Vec<Share> {
-    let regions = model.regions().count();
-    let mut shares = vec![Share::default(); regions + 1];
-    for row in &later.rows {
-        let (Some(errors), Some(bounds), Some(region)) = (
-            row.errors,
-            model.bounds_deg(row.at),
-            model.region_deg(row.at),
-        ) else {
-            continue;
-        };
-        shares[region].count(errors[0] <= bounds.0);
-        shares[regions].count(errors[0] <= bounds.0);
-    }
+    let mut shares: Vec<Share> = in_regions(model, later)
+        .into_iter()
+        .map(|[own, _]| own)
+        .collect();
+    let sum = |field: fn(&Share) -> u64| shares.iter().map(field).sum();
+    let overall = Share {
+        trials: sum(|share| share.trials),
+        hits: sum(|share| share.hits),
+    };
+    shares.push(overall);
     shares
 }
 

@@ -1,6 +1,6 @@
 //! Bounds where tags flip: the quantile of the errors jumps from the size of noise to that of a mirrored solution.
 
-use crate::Share;
+use crate::in_regions;
 use crate::law::{Law, Random};
 use posegate_host::learn::{BoundsSettings, ErrorModel, learn_bounds};
 
@@ -64,18 +64,7 @@ fn bounds_are_tight_where_tags_flip() {
             nth(&flipped, 0.5),
             nth(&flipped, 0.95)
         );
-        let mut each = vec![[Share::default(); 2]; model.regions().count()];
-        for row in FLIPPING.views(24_000, seed + 100, |_| true).rows {
-            let (Some(errors), Some(bounds), Some(region)) = (
-                row.errors,
-                model.bounds_deg(row.at),
-                model.region_deg(row.at),
-            ) else {
-                continue;
-            };
-            each[region][0].count(errors[0] <= bounds.0);
-            each[region][1].count(errors[1] <= bounds.1);
-        }
+        let each = in_regions(&model, &FLIPPING.views(24_000, seed + 100, |_| true));
         assert!(each.len() >= 3, "{}", each.len());
         for share in each.iter().flatten() {
             assert!(share.holds(quantile), "{seed}: {share:?}");

@@ -16,7 +16,7 @@ mod recorded;
 mod site;
 mod survey;
 
-use posegate_host::learn::acceptance;
+use posegate_host::learn::{Detections, ErrorModel, acceptance};
 
 /// A count of hits in a number of trials.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,4 +39,21 @@ impl Share {
     fn holds(self, q: f64) -> bool {
         self.hits >= acceptance(self.trials, q, 0.99)[0]
     }
+}
+
+/// Returns for each region of a model the shares of later errors within its bounds: translation and yaw.
+fn in_regions(model: &ErrorModel, later: &Detections) -> Vec<[Share; 2]> {
+    let mut shares = vec![[Share::default(); 2]; model.regions().count()];
+    for row in &later.rows {
+        let (Some(errors), Some(bounds), Some(region)) = (
+            row.errors,
+            model.bounds_deg(row.at),
+            model.region_deg(row.at),
+        ) else {
+            continue;
+        };
+        shares[region][0].count(errors[0] <= bounds.0);
+        shares[region][1].count(errors[1] <= bounds.1);
+    }
+    shares
 }
