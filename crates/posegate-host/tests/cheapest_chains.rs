@@ -238,3 +238,52 @@ fn plans_near_the_way_cost_as_much_as_with_all_looks() {
     }
     assert!(plans >= 12, "{plans}");
 }
+
+/// A tag whose region is near the way faces away, so that the way to where it is seen is long; one whose region is farther off faces the
+/// robot and gives the cheaper plan. Dozens of tags beyond reach make the site too large to be prepared as a whole.
+#[test]
+fn a_plan_with_looks_near_the_way_is_not_taken_if_one_farther_off_may_cost_less() {
+    let mut text = String::from(
+        r#"
+[camera.front]
+width_px = 640
+height_px = 480
+fx = 615.0
+fy = 615.0
+cx = 320.0
+cy = 240.0
+mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }
+[confidence]
+epsilon = 0.99
+[planner]
+look = { camera = "front", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }
+r = [[0.02, 0.4]]
+views = 4
+range = 40.0
+[navigation]
+model = { kind = "bounded", k_turn = 0.0005, k_drift = 0.0005, k_slip = 0.001 }
+controller = { translation = 0.005, yaw_deg = 0.2 }
+[task.dock]
+kind = "work"
+goal = { x = 3.0, y = 0.0, yaw_deg = 0.0 }
+success = { shape = "box", x = [-0.25, 0.25], y = [-0.25, 0.25], yaw_deg = [-8.0, 8.0] }
+[chain.to]
+start = { x = 0.0, y = 0.0, yaw_deg = 0.0, bounded = { translation = 0.3, yaw_deg = 1.5 } }
+"#,
+    );
+    let near = [(1.5, 8.3), (1.5, -10.0)];
+    let far = (0..70).map(|tag| (1000.0 + 6.0 * f64::from(tag), 0.0));
+    for (id, (x, y)) in near.into_iter().chain(far).enumerate() {
+        text += &format!(
+            "[tag.t{id}]\nid = {id}\nfamily = \"tag36h11\"\nsize = 0.3\n\
+             pose = {{ x = {x:?}, y = {y:?}, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }}\n"
+        );
+    }
+    let site = Site::parse(&text, "hall.toml").expect("a site");
+    let start = &site.chains["to"].start;
+    let found = plan_near(&site, None, start, "dock", &Options::default()).expect("an answer");
+    let plan = found.plan.expect("a plan");
+    let tags: Vec<&String> = plan.steps.iter().flat_map(|step| &step.tags).collect();
+    assert_eq!(tags, ["t1"], "{}", plan.cost);
+    assert!(plan.cost < 18.0, "{}", plan.cost);
+}
