@@ -10,7 +10,8 @@ use super::planar::Planar;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
 use super::{
-    BoxSet, Footprint, PoseDeg, Resolved, SeparatingHalfPlane, Shape, SuccessSet, Visibility,
+    BoxSet, Exclusion, Footprint, PoseDeg, Resolved, SeparatingHalfPlane, Shape, SuccessSet,
+    Visibility,
 };
 use std::sync::Arc;
 
@@ -179,8 +180,18 @@ impl Node {
             Shape::Footprint(set) => leaf(Convex::Footprint(set.clone())),
             Shape::Visibility(set) => leaf(Convex::Visibility(*set)),
             Shape::Bounded { view, limit } => {
-                let views = limit.views(view).into_iter();
-                any(views.map(|view| leaf(Convex::Visibility(view))).collect())
+                let views = limit.views(view).into_iter().map(|within| {
+                    let seen = leaf(Convex::Visibility(within.view));
+                    if !(within.psi_min_deg > 0.0) {
+                        return seen;
+                    }
+                    let oblique = Shape::Apart(Exclusion::Square {
+                        view: within.view,
+                        psi_min_deg: within.psi_min_deg,
+                    });
+                    Self::All(vec![seen, Self::of(&oblique, goal)])
+                });
+                any(views.collect())
             }
             Shape::Apart(set) => {
                 let sides = set.sides(goal).into_iter();

@@ -298,7 +298,22 @@ fn learnt<'a>(
         return Ok(None);
     };
     let learnt = site.error_models.get(name).map(ViewBound::Learnt);
-    let formula = site.error_formulas.get(name).map(ViewBound::Formula);
+    let formula = site.error_formulas.get(name);
+    let psi_max_deg = task
+        .set
+        .shape
+        .visibility()
+        .map_or(90.0, |view| view.psi_max_deg);
+    if formula.is_some_and(|model| !model.is_bound_up_to(psi_max_deg)) {
+        return Err(Failure::usage(
+            format!(
+                "{}: the error model `{name}` has a bound below 0 at a psi of {psi_max_deg} deg, up to which the task sees its tag",
+                arguments.site.display()
+            ),
+            "choose a c3 with c0 + c3 psi^2 >= 0 up to the task's psi_max_deg",
+        ));
+    }
+    let formula = formula.map(ViewBound::Formula);
     let model = learnt.or(formula).ok_or_else(|| {
         Failure::usage(
             format!(

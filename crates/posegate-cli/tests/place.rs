@@ -554,7 +554,9 @@ fn a_formula_is_a_cost() {
     let site = SITE.to_owned()
         + &formula("paper", "[0.0, 1.0, 0.5, 0.5]", "[0.0, 0.0, 0.0, 0.0]")
         + &formula("yaw", "[0.0, 0.0, 0.0, 0.0]", "[0.0, 100.0, 50.0, 50.0]")
-        + &formula("near", "[0.0, 2.0, 0.5, 0.5]", "[0.0, 0.0, 0.0, 0.0]");
+        + &formula("near", "[0.0, 2.0, 0.5, 0.5]", "[0.0, 0.0, 0.0, 0.0]")
+        + &formula("square", "[1.0, 1.0, 0.5, -1.0]", "[0.0, 0.0, 0.0, 0.0]")
+        + &formula("below", "[0.1, 1.0, 0.5, -1.0]", "[0.0, 0.0, 0.0, 0.0]");
     let mean = |model: &str| {
         let line = place("0.05", "--free x=0.8:4,yaw_deg=110:250 --budget 200 --json");
         let told = run_in(folder.path(), &site, &format!("{line}{model}"), None);
@@ -572,6 +574,20 @@ fn a_formula_is_a_cost() {
     }
     let near = mean(" --error-model near");
     assert!(near > 1.1 * paper, "{near} {paper}");
+    // Oblique views are better here: the cost is below that of a tag seen head-on.
+    let square = mean(" --error-model square");
+    assert!(square > 100.0 && square < 100.0 + paper, "{square} {paper}");
+    let told = run_in(
+        folder.path(),
+        &site,
+        &place("0.05", "--error-model below"),
+        None,
+    );
+    assert!(
+        told.code == 2 && told.err.contains("has a bound below 0 at a psi of 50 deg"),
+        "{}",
+        told.err
+    );
 }
 
 #[test]

@@ -22,11 +22,7 @@ impl ViewBound<'_> {
             Self::Learnt(model) => model
                 .bounds(d, phi, psi)
                 .map(|(translation, yaw)| [translation, yaw.to_degrees()]),
-            Self::Formula(model) => {
-                let sum =
-                    |[c0, c1, c2, c3]: [f64; 4]| c0 + c1 * d * d + c2 * phi * phi + c3 * psi * psi;
-                Some([model.translation, model.yaw_deg].map(sum))
-            }
+            Self::Formula(model) => Some(model.at(d, phi, psi)),
         }
     }
 }

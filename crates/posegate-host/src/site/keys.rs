@@ -395,15 +395,15 @@ pub(super) const MODEL_FILE: Key = Key::new(
 );
 pub(super) const MODEL_TRANSLATION: Key = Key::number(
     "translation",
-    "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in metres (m, rad, rad), none below 0",
+    "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in metres (m, rad, rad); only c3 may be below 0",
     "[0.005, 0.002, 0.0, 0.01]",
-    |number| number >= 0.0,
+    |_| true,
 );
 pub(super) const MODEL_YAW: Key = Key::number(
     "yaw_deg",
-    "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in degrees (m, rad, rad), none below 0",
+    "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in degrees (m, rad, rad); only c3 may be below 0",
     "[0.1, 0.05, 0.0, 0.5]",
-    |number| number >= 0.0,
+    |_| true,
 );
 
 // Walls.

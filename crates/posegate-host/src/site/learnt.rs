@@ -166,7 +166,7 @@ pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>,
     let model = success::named(&model, "error_model", names.error_models)?;
     let coverage = match model {
         SiteModel::Learnt(model) => model.coverage(),
-        SiteModel::Grows(_) => 1.0,
+        SiteModel::Formula(_) => 1.0,
     };
     let [translation, yaw_deg] = success::largest(&r)?;
     Ok(Some(Limit {

@@ -171,7 +171,7 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         error_formulas: error_models
             .iter()
             .filter_map(|(name, model)| match model {
-                places::SiteModel::Grows(model) => Some((name.clone(), *model)),
+                places::SiteModel::Formula(model) => Some((name.clone(), *model)),
                 places::SiteModel::Learnt(_) => None,
             })
             .collect(),
@@ -179,7 +179,7 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
             .into_iter()
             .filter_map(|(name, model)| match model {
                 places::SiteModel::Learnt(model) => Some((name, model)),
-                places::SiteModel::Grows(_) => None,
+                places::SiteModel::Formula(_) => None,
             })
             .collect(),
     })

@@ -106,7 +106,7 @@ pub(super) fn intrinsics(node: &Node<'_>) -> Result<Intrinsics, SiteError> {
 #[allow(clippy::large_enum_variant)]
 pub(super) enum SiteModel {
     /// A bound that is a polynomial of distance and angles.
-    Grows(ErrorModel),
+    Formula(ErrorModel),
     /// Learnt bounds.
     Learnt(learn::ErrorModel),
 }
@@ -135,11 +135,15 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFil
     }
     let four = |key| {
         let node = table.required(key)?;
-        let numbers: Vec<f64> = node
-            .array()?
-            .iter()
-            .map(Node::number)
-            .collect::<Result<_, _>>()?;
+        let mut numbers: Vec<f64> = Vec::new();
+        for entry in &node.array()? {
+            let number = entry.number()?;
+            // A bound may fall with psi, the last one: errors are largest head-on.
+            if number < 0.0 && numbers.len() < 3 {
+                return Err(entry.out_of_range());
+            }
+            numbers.push(number);
+        }
         <[f64; 4]>::try_from(numbers)
             .map_err(|_| node.error(format!("`{}` is not four numbers", node.path())))
     };
@@ -147,7 +151,7 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFil
         translation: four(&keys::MODEL_TRANSLATION)?,
         yaw_deg: four(&keys::MODEL_YAW)?,
     };
-    Ok((SiteModel::Grows(model), None))
+    Ok((SiteModel::Formula(model), None))
 }
 
 /// Reads a learnt model from a file; its path is relative to the site file's folder.

@@ -257,14 +257,26 @@ fn view(
             let limit = table.required(&keys::ERROR_LIMIT)?;
             let [translation, yaw_deg] = largest(&limit)?;
             match model {
-                SiteModel::Grows(model) => Shape::Bounded {
-                    view,
-                    limit: ErrorLimit {
-                        model: *model,
-                        translation,
-                        yaw_deg,
-                    },
-                },
+                SiteModel::Formula(model) => {
+                    let psi_max_deg = view.psi_max_deg;
+                    if !model.is_bound_up_to(psi_max_deg) {
+                        return Err(node
+                            .error(format!(
+                                "the error model of `{}` has a bound below 0 at a psi of {psi_max_deg} deg",
+                                node.path()
+                            ))
+                            .expected("a bound that is at least 0 at every angle of the set: c0 + c3 psi^2 >= 0 up to `psi_max_deg`")
+                            .help("choose a smaller negative c3, or a smaller `psi_max_deg`"));
+                    }
+                    Shape::Bounded {
+                        view,
+                        limit: ErrorLimit {
+                            model: *model,
+                            translation,
+                            yaw_deg,
+                        },
+                    }
+                }
                 SiteModel::Learnt(model) => {
                     learnt::same(&node, model, camera, tag)?;
                     learnt::set(&limit, &view, model, [translation, yaw_deg])?

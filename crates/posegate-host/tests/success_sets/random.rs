@@ -227,13 +227,25 @@ impl Random {
             d_min: self.chance(0.3).then(|| self.within(0.5, 2.0)),
             psi_min_deg: self.chance(0.3).then(|| self.within(3.0, 20.0)),
             walls,
-            limit: self.chance(0.2).then(|| ErrorLimit {
-                model: ErrorModel {
-                    translation: [0.005, 0.004, 0.01, 0.02],
-                    yaw_deg: [0.1, 0.05, 0.2, 0.6],
-                },
-                translation: self.within(0.03, 0.1),
-                yaw_deg: self.within(0.5, 2.0),
+            limit: self.chance(0.2).then(|| {
+                let translation = self.within(0.03, 0.1);
+                ErrorLimit {
+                    model: if translation < 0.065 {
+                        ErrorModel {
+                            translation: [0.005, 0.004, 0.01, 0.02],
+                            yaw_deg: [0.1, 0.05, 0.2, 0.6],
+                        }
+                    } else {
+                        // Of a tag seen head-on the yaw has the largest error, and sometimes the position too.
+                        let falls = if translation < 0.08 { 0.02 } else { -0.03 };
+                        ErrorModel {
+                            translation: [0.07, 0.002, 0.01, falls],
+                            yaw_deg: [2.0, 0.02, 0.1, -1.0],
+                        }
+                    },
+                    translation,
+                    yaw_deg: self.within(0.5, 2.0),
+                }
             }),
         }
     }

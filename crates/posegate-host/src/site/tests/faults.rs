@@ -99,7 +99,26 @@ success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0
 [tag.t7] => [wall.w]\nfrom = [0, 0]\nto = [0, 0]\nz = [0, 1]\n[tag.t7] => [0, 0]\nz => ends where it starts
 [tag.t7] => [wall.w]\nfrom = [0, 0]\nz = [0, 1]\n[tag.t7] => [wall.w] => `to` is missing => add `to
 [tag.t7] => [error_model.m]\ntranslation = [0, 1, 2]\nyaw_deg = [0, 0, 0, 0]\n[tag.t7] => [0, 1, 2] => is not four numbers
+[tag.t7] => [error_model.m]\ntranslation = [0, -1, 0, 0]\nyaw_deg = [0, 0, 0, 0]\n[tag.t7] => -1, 0 => is -1 => write it like
 "#;
+
+#[test]
+fn a_bound_is_not_below_zero() {
+    let model = "[error_model.m]\ntranslation = [0.01, 0.0, 0.0, -0.02]\nyaw_deg = [1.0, 0.0, 0.0, 0.0]\n[tag.t7]";
+    let site = |psi_max_deg: &str| {
+        let set = format!(
+            "psi_max_deg = {psi_max_deg}, error_model = \"m\", r = {{ translation = 0.05, yaw_deg = 2.0 }}"
+        );
+        sample_with("[tag.t7]", model).replace("psi_max_deg = 50.0", &set)
+    };
+    // 0.01 - 0.02 psi^2 is 0 at 40.5 deg.
+    let told = fault(&site("41.0")).to_string();
+    assert!(
+        told.contains("has a bound below 0 at a psi of 41 deg"),
+        "{told}"
+    );
+    assert!(crate::site::Site::parse(&site("40.0"), "site.toml").is_ok());
+}
 
 const CAMERAS: &str = r#"
 fx = 615.0 => distortion = {}\nfx = 615.0 => {}\n => `model` is missing from `camera.front.distortion`
@@ -186,5 +205,5 @@ fn bad_cameras_point_at_what_makes_them_so() {
 
 #[test]
 fn sets_and_what_they_refer_to() {
-    check(SETS, 17);
+    check(SETS, 18);
 }
