@@ -584,11 +584,8 @@ fn tasks_that_cannot_be_served_are_named_with_the_reason() {
     let text = warehouse(5, 1, 12.0, 1, 10);
     // Far away.
     let far = text.replace("goal = { x = ", "goal = { x = 10");
-    assert!(
-        reason(&far).contains("none is near enough"),
-        "{}",
-        reason(&far)
-    );
+    let told = reason(&far);
+    assert!(told.contains("none is near enough"), "{told}");
     // Turned to the wall.
     let turned = text.replace(
         "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
@@ -599,20 +596,14 @@ fn tasks_that_cannot_be_served_are_named_with_the_reason() {
         "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
     );
     let turned = turned.replace("yaw_deg = +90.5 }", "yaw_deg = 90.0 }");
-    assert!(
-        reason(&turned).contains("walls hide them"),
-        "{}",
-        reason(&turned)
-    );
+    let told = reason(&turned);
+    assert!(told.contains("walls hide them"), "{told}");
     // A dock that is narrower than what an observation leaves.
     let from = text.find("x = [-0.").expect("a box");
     let to = from + text[from..].find(", yaw_deg").expect("a box");
     let narrow = text.replacen(&text[from..to], "x = [-0.01, 0.01], y = [-0.01, 0.01]", 1);
-    assert!(
-        reason(&narrow).contains("the nearest miss"),
-        "{}",
-        reason(&narrow)
-    );
+    let told = reason(&narrow);
+    assert!(told.contains("the nearest miss"), "{told}");
 }
 
 #[test]
@@ -656,7 +647,8 @@ fn the_command_writes_what_plan_takes() {
 #[test]
 fn stopped_searches_keep_the_best_choice() {
     let mut unfinished = 0;
-    for (text, _) in sites() {
+    let skipped = if counts::is_deep() { 0 } else { 2 };
+    for (text, _) in sites().into_iter().skip(skipped) {
         let site = parsed(&text);
         for survive in [false, true] {
             let greedy = covered(&site, &order(survive, Method::Greedy));

@@ -381,7 +381,7 @@ fn a_wall_that_carries_a_tag_hides_another_one() {
 fn answers_are_the_same_at_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let budget = if counts::is_deep() { 600 } else { 60 };
-    for method in ["cmaes", "ga"] {
+    for method in counts::one_a_day(&["cmaes", "ga"]) {
         let line = place(
             "0.1",
             &format!("{FREE} --budget {budget} --method {method} --seed 5 --json"),
@@ -558,7 +558,7 @@ fn a_formula_is_a_cost() {
         + &formula("square", "[1.0, 1.0, 0.5, -1.0]", "[0.0, 0.0, 0.0, 0.0]")
         + &formula("below", "[0.1, 1.0, 0.5, -1.0]", "[0.0, 0.0, 0.0, 0.0]");
     let mean = |model: &str| {
-        let line = place("0.05", "--free x=0.8:4,yaw_deg=110:250 --budget 200 --json");
+        let line = place("0.05", "--free x=0.8:4,yaw_deg=110:250 --budget 100 --json");
         let told = run_in(folder.path(), &site, &format!("{line}{model}"), None);
         assert_eq!(told.code, 0, "{}{}", told.out, told.err);
         let best: Value = serde_json::from_str(&told.out).unwrap();

@@ -157,7 +157,7 @@ fn with_random_chains(random: &mut Random, count: usize) -> String {
 fn no_proven_chain_costs_less_than_the_bound() {
     let mut proven = [0; 4];
     let mut tight = 0;
-    let (sites, chains) = if counts::is_deep() { (60, 8) } else { (6, 4) };
+    let (sites, chains) = if counts::is_deep() { (60, 8) } else { (3, 4) };
     for seed in 0..sites {
         let text = with_random_chains(&mut Random(seed), chains);
         // The model of the site is that of all drives.
@@ -200,8 +200,8 @@ fn no_proven_chain_costs_less_than_the_bound() {
         }
     }
     println!("proven chains by looks {proven:?}, plans within a tenth of the bound: {tight}");
-    assert!(proven.iter().sum::<i32>() >= 4, "{proven:?}");
-    assert!(tight >= 2, "{tight}");
+    assert!(proven.iter().sum::<i32>() >= 2, "{proven:?}");
+    assert!(tight >= 1, "{tight}");
     if counts::is_deep() {
         assert!(proven.iter().all(|count| *count >= 5), "{proven:?}");
     }
@@ -211,8 +211,9 @@ fn no_proven_chain_costs_less_than_the_bound() {
 #[test]
 fn plans_near_the_way_cost_as_much_as_with_all_looks() {
     let mut plans = 0;
-    for seed in 0..3 {
-        let text = hall(&mut Random(seed), 100, 8, Drive::Bounded);
+    let seeds = counts::one_a_day(&[0, 1, 2]);
+    for seed in &seeds {
+        let text = hall(&mut Random(*seed), 100, 8, Drive::Bounded);
         let site = Site::parse(&text, "hall.toml").expect("a site");
         let mut whole = Prepared::of(&site, None).expect("a library");
         for dock in 0..8 {
@@ -236,7 +237,7 @@ fn plans_near_the_way_cost_as_much_as_with_all_looks() {
             }
         }
     }
-    assert!(plans >= 12, "{plans}");
+    assert!(plans >= 4 * seeds.len(), "{plans}");
 }
 
 /// A tag whose region is near the way faces away, so that the way to where it is seen is long; one whose region is farther off faces the

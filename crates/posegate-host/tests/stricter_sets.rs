@@ -5,6 +5,7 @@ use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::shape::{Shape, SuccessSet};
 use posegate::verify::{ExpectedTable, VerifyError, build, verify};
 use posegate_host::site::Site;
+use posegate_testkit::counts;
 
 const SITE: &str = r#"
 [camera.front]
@@ -189,7 +190,8 @@ fn what_is_stricter_is_held() {
     fn refer<'a>(replace: &'a [(&'a str, String)]) -> Vec<(&'a str, &'a str)> {
         replace.iter().map(|(a, b)| (*a, b.as_str())).collect()
     }
-    for (number, (text, lax, strict)) in rows.iter().enumerate() {
+    let (skipped, step) = counts::part(4);
+    for (number, (text, lax, strict)) in rows.iter().enumerate().skip(skipped).step_by(step) {
         let (lax, strict) = (set(text, &refer(lax)), set(text, &refer(strict)));
         for layout in [Layout::Facets, Layout::Grid] {
             let made = |success: &SuccessSet| {

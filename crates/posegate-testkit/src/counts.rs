@@ -28,6 +28,16 @@ pub fn one_a_day<T: Copy>(all: &[T]) -> Vec<T> {
     today.copied().into_iter().collect()
 }
 
+/// Returns how many cases to skip and the step from case to case: all cases in a deep job, and in the fast suite a part of them, one
+/// of `parts`, another one on each day of the year.
+#[allow(dead_code)] // Some tests have numbers of cases.
+pub fn part(parts: usize) -> (usize, usize) {
+    if is_deep() {
+        return (0, 1);
+    }
+    ((first_seed() / A_DAY) as usize % parts.max(1), parts.max(1))
+}
+
 /// Returns the first seed of a test: another one on each day of the year, so that the tried cases add up, and 0 in a
 /// deep job. `POSEGATE_SEED` repeats a run; the seed is printed.
 #[allow(dead_code)] // Some tests have no seeds.

@@ -34,7 +34,9 @@ pub fn peers(_: &Arguments) -> Result {
 
 /// Runs the tests with random cases with all of their cases; the fast suite runs a part of them.
 pub fn deep(_: &Arguments) -> Result {
-    cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib --test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot")
+    cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib")
+        .words("--test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot")
+        .words("--test cheapest_chains --test pose_set_proofs --test stricter_sets --test worst_pose")
         .env("POSEGATE_DEEP", "1")
         .run()?;
     cmd("cargo test --release -p posegate-cli --test learn -- --ignored many").run()?;
@@ -45,6 +47,7 @@ pub fn deep(_: &Arguments) -> Result {
         "place",
         "standard_output",
         "tag_tolerance",
+        "valid_sites",
     ];
     cmd("cargo test --release -p posegate-cli")
         .words(&tests.map(|name| format!("--test {name}")).join(" "))

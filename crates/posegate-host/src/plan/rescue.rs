@@ -156,6 +156,7 @@ mod tests {
     use crate::plan::{Options, Plans};
     use crate::site::Site;
     use nalgebra::Matrix3;
+    use posegate_testkit::counts;
     use posegate_testkit::planning_sites::{Drive, Random, hall};
 
     thread_local! {
@@ -245,7 +246,8 @@ mod tests {
             ..Options::default()
         };
         COMPARED.set([0, 0]);
-        for seed in 0..6 {
+        let sites = if counts::is_deep() { 6 } else { 3 };
+        for seed in 0..sites {
             let drive = [Drive::Bounded, Drive::Gaussian][usize::from(seed % 3 == 2)];
             // Tags near each other, so that there are other ways.
             let text = hall(&mut Random(seed), 3 + (seed % 4) as usize, 2, drive);
@@ -259,6 +261,10 @@ mod tests {
             }
         }
         let [none, some] = COMPARED.get();
-        assert!(none >= 10 && some >= 5, "compared {none} and {some}");
+        let least = if counts::is_deep() { [10, 5] } else { [1, 1] };
+        assert!(
+            none >= least[0] && some >= least[1],
+            "compared {none} and {some}"
+        );
     }
 }
