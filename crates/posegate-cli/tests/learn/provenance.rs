@@ -77,6 +77,29 @@ fn a_site_with_another_camera_or_tag_is_refused() {
         assert_eq!(joined(&err).contains("was learnt with"), refused, "{err}");
         assert!(!refused || err.contains("there.toml"), "{err}");
     }
+    // Larger tags are seen from farther away; the model is scaled if the site asks for it.
+    let to = format!("size = {:?}", size * 1.5);
+    let larger = changed("size", &key("size", size), &to);
+    let scaled = format!("file = \"m.toml\"\ntag_size = {:?}", size * 1.5);
+    write(
+        &folder,
+        "there.toml",
+        &larger.replace("file = \"m.toml\"", &scaled),
+    );
+    let (code, _, err) = run(&folder, "check there.toml");
+    assert_eq!(code, 0, "{err}");
+    let formula = "translation = [0, 0, 0, 0]\nyaw_deg = [0, 0, 0, 0]\ntag_size = 0.3";
+    write(
+        &folder,
+        "there.toml",
+        &larger.replace("file = \"m.toml\"", formula),
+    );
+    let (code, _, err) = run(&folder, "check there.toml");
+    assert_eq!(code, 2, "{err}");
+    assert!(
+        joined(&err).contains("is a formula and has a `tag_size`"),
+        "{err}"
+    );
     let other = changed("family", "tag36h11", "tag25h9");
     write(&folder, "there.toml", &other);
     let (code, _, err) = run(&folder, "check there.toml");
@@ -109,6 +132,15 @@ fn what_data_were_taken_with_is_stated_without_a_site() {
     );
     assert_eq!(code, 0, "{err}");
     assert!(lines(&out)[0]["taken_with"].is_null());
+    // A model of tags of an unknown size is not scaled.
+    let scaled = LOOK.replace("m.toml\"", "m.toml\"\ntag_size = 0.3");
+    write(&folder, "there.toml", &format!("{SAMPLE}{scaled}"));
+    let (code, _, err) = run(&folder, "check there.toml");
+    assert_eq!(code, 2, "{err}");
+    assert!(
+        joined(&err).contains("does not record the size of its tags"),
+        "{err}"
+    );
     assert_eq!(run(&folder, "check here.toml").0, 0);
     for (options, words) in [
         ("--camera front", "--site"),

@@ -8,6 +8,8 @@ use super::document::{self, Document};
 use super::family::Family;
 use super::smooth::{Lattice, between};
 
+mod scaled;
+
 /// Bounds on the errors of an observation, and the share of detected views.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorModel {
@@ -16,6 +18,8 @@ pub struct ErrorModel {
     /// The logarithms of the two bounds at the corners of each fine cell; `None` for a cell without bounds.
     bounds: Vec<Option<[[f64; 8]; 2]>>,
     views: Option<(Cells, Vec<f64>)>,
+    /// For tags of another size than those of the data.
+    is_scaled: bool,
 }
 
 /// The share of detected views at a place.
@@ -71,8 +75,14 @@ impl ErrorModel {
     /// Returns the text of its file.
     ///
     /// # Errors
-    /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
+    /// [`LearnError::Unwritten`] for a model that was scaled to other tags. It does not happen for a model that was learnt
+    /// or read.
     pub fn write(&self) -> Result<String, LearnError> {
+        if self.is_scaled {
+            return Err(LearnError::Unwritten(
+                "it is scaled to other tags than those of its data".to_owned(),
+            ));
+        }
         super::kind::write(&self.document)
     }
 
@@ -123,6 +133,7 @@ impl ErrorModel {
             cells,
             bounds,
             views,
+            is_scaled: false,
         })
     }
 

@@ -393,6 +393,12 @@ pub(super) const MODEL_FILE: Key = Key::new(
     "the path, relative to the site file's folder, of a model that `posegate learn bounds` wrote",
     "\"tags.toml\"",
 );
+pub(super) const MODEL_TAG_SIZE: Key = Key::number(
+    "tag_size",
+    "the size in metres of the tags for which the model is scaled, above 0",
+    "0.30",
+    above_0,
+);
 pub(super) const MODEL_TRANSLATION: Key = Key::number(
     "translation",
     "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in metres (m, rad, rad); only c3 may be below 0",

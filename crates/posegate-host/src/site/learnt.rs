@@ -29,7 +29,7 @@ pub(super) fn same(
             node.path()
         ))
         .expected("the camera and the tags with which its detections were taken")
-        .help("take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`"))
+        .help("take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`. If only the size of the tags differs, `tag_size` in the [error_model] table scales the model"))
 }
 
 impl SiteCamera {

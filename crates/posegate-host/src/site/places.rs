@@ -112,11 +112,17 @@ pub(super) enum SiteModel {
 }
 
 /// Reads an error model. Also returns its file if it names one.
-pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFile>), SiteError> {
+///
+/// `lever` is the largest distance of a camera from the robot's reference point along the floor, metres.
+pub(super) fn error_model(
+    node: &Node<'_>,
+    lever: f64,
+) -> Result<(SiteModel, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::MODEL_TRANSLATION,
         &keys::MODEL_YAW,
         &keys::MODEL_FILE,
+        &keys::MODEL_TAG_SIZE,
     ])?;
     if let Some(file) = table.optional(&keys::MODEL_FILE) {
         for key in [&keys::MODEL_TRANSLATION, &keys::MODEL_YAW] {
@@ -130,8 +136,26 @@ pub(super) fn error_model(node: &Node<'_>) -> Result<(SiteModel, Option<NamedFil
                     .help("remove one or the other"));
             }
         }
-        let (model, named) = learnt(&file)?;
+        let (mut model, named) = learnt(&file)?;
+        if let Some(node) = table.optional(&keys::MODEL_TAG_SIZE) {
+            model = model.for_tags_of(node.number()?, lever).ok_or_else(|| {
+                node.error(format!(
+                    "the error model of {} does not record the size of its tags, so it cannot be scaled",
+                    table.title()
+                ))
+                .help("learn it again with `posegate learn bounds --tag-size` or `--camera --site`, or remove `tag_size`")
+            })?;
+        }
         return Ok((SiteModel::Learnt(model), Some(named)));
+    }
+    if table.has(keys::MODEL_TAG_SIZE.name) {
+        return Err(table
+            .error_at_key(
+                keys::MODEL_TAG_SIZE.name,
+                format!("{} is a formula and has a `tag_size`", table.title()),
+            )
+            .expected("a `tag_size` only beside a `file`")
+            .help("remove `tag_size`, and write a formula for the tags of this site"));
     }
     let four = |key| {
         let node = table.required(key)?;

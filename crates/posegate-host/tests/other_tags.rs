@@ -1,0 +1,164 @@
+//! A model that was learnt with tags of one size, scaled to tags of another size that the same camera sees.
+
+use posegate::shape::{Camera, Pose3Deg, Tag, Tolerance};
+use posegate_host::learn::{
+    BoundsSettings, Detection, Detections, ErrorModel, Runs, TakenWith, learn_bounds,
+};
+use posegate_host::log::corners::{MountedCamera, TagObservation, locate};
+use posegate_testkit::oracle::Rng;
+use rayon::prelude::*;
+
+const QUANTILE: f64 = 0.9;
+const FOCAL: f64 = 615.0;
+/// The camera is behind the robot's reference point, so the robot is between camera and tag.
+const MOUNT: Pose3Deg = Pose3Deg {
+    x: -1.0,
+    y: 0.0,
+    z: 0.5,
+    roll_deg: 0.0,
+    pitch_deg: 0.0,
+    yaw_deg: 0.0,
+};
+
+/// Returns the detections of tags of a size (m): corners with an error of 0.3 px, at distances of 8 to 24 times the size.
+fn detections(size: f64, seed: u64, rows: u64) -> Detections {
+    let camera = MountedCamera {
+        camera: Camera::pinhole([1280.0, 960.0], [FOCAL; 2], [640.0, 480.0]),
+        mount: MOUNT,
+        mount_tolerance: Tolerance::NONE,
+    };
+    let tag = Tag {
+        id: 1,
+        size,
+        pose: Pose3Deg { x: 0.0, ..MOUNT },
+    };
+    let row = |row: u64| {
+        let mut rng = Rng::new(seed * 1_000_000 + row);
+        let (d, psi, phi) = (
+            size * rng.within(8.0, 24.0),
+            rng.within(-60.0, 60.0),
+            rng.within(-20.0, 20.0),
+        );
+        // The tag's normal is along x; the camera is at an angle psi from it.
+        let way = psi.to_radians();
+        let camera_at = [d * way.cos(), d * way.sin()];
+        let yaw = way + core::f64::consts::PI + f64::to_radians(phi);
+        let (sin, cos) = yaw.sin_cos();
+        let mut noise = || 0.3 * (0..12).map(|_| rng.unit() - 0.5).sum::<f64>();
+        let half = 0.5 * size;
+        // AprilTag's order: from the bottom left, counterclockwise in the view of the tag.
+        let corners_px = [[1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|[y, z]| {
+            let off = [-camera_at[0], -half * y - camera_at[1]];
+            let ahead = cos * off[0] + sin * off[1];
+            let left = -sin * off[0] + cos * off[1];
+            [
+                640.0 - FOCAL * left / ahead + noise(),
+                480.0 - FOCAL * half * z / ahead + noise(),
+            ]
+        });
+        let seen = TagObservation {
+            tag: &tag,
+            tolerance: Tolerance::NONE,
+            corners_px,
+        };
+        let robot = [
+            camera_at[0] - cos * MOUNT.x,
+            camera_at[1] - sin * MOUNT.x,
+            yaw,
+        ];
+        let errors = locate(&camera, &[seen], 0.3, 11.3449).ok().map(|fix| {
+            let [x, y, turned] = [0, 1, 2].map(|i| fix.pose[i] - robot[i]);
+            let turned = turned.sin().atan2(turned.cos());
+            [x.hypot(y), turned.abs()]
+        });
+        Detection {
+            at: [d, phi.abs(), psi.abs()],
+            errors,
+        }
+    };
+    Detections {
+        rows: (0..rows).into_par_iter().map(row).collect(),
+        runs: Runs::default(),
+        ..Detections::default()
+    }
+}
+
+fn learnt(size: f64) -> ErrorModel {
+    let settings = BoundsSettings {
+        quantile: QUANTILE,
+        taken_with: Some(TakenWith {
+            tag_size: Some(size),
+            ..TakenWith::default()
+        }),
+        ..BoundsSettings::default()
+    };
+    learn_bounds(&detections(size, 1, 8_000), &settings).unwrap()
+}
+
+/// Returns the share of the detections within both bounds, the shares within each of them, and their number.
+fn held(model: &ErrorModel, later: &Detections) -> ([f64; 3], f64) {
+    let (mut held, mut count) = ([0.0; 3], 0.0);
+    for Detection { at, errors } in &later.rows {
+        let (Some([translation, yaw]), Some(bounds)) = (errors, model.bounds_deg(*at)) else {
+            continue;
+        };
+        let within = [*translation <= bounds.0, *yaw <= bounds.1];
+        held[0] += f64::from(u8::from(within[0] && within[1]));
+        held[1] += f64::from(u8::from(within[0]));
+        held[2] += f64::from(u8::from(within[1]));
+        count += 1.0;
+    }
+    (held.map(|held| held / f64::max(count, 1.0)), count)
+}
+
+/// Bounds hold for tags twice and half as large; without the scale, and without the lever, they do not.
+#[test]
+fn bounds_are_scaled_to_tags_of_another_size() {
+    let lever = MOUNT.x.abs();
+    let small = learnt(0.1);
+    let large = detections(0.2, 2, 6_000);
+    let scaled = small.for_tags_of(0.2, lever).unwrap();
+    let (share, count) = held(&scaled, &large);
+    println!("twice as large: {share:?} of {count}");
+    assert!(
+        count > 1_000.0 && share[0] >= 2.0 * QUANTILE - 1.0,
+        "{share:?}"
+    );
+    assert!(
+        share[1] >= QUANTILE - 0.01 && share[2] >= QUANTILE - 0.01,
+        "{share:?}"
+    );
+    // Nearby, the robot is between camera and tag, and its position errs by less than the camera's.
+    let (share, _) = held(&small.for_tags_of(0.2, 0.0).unwrap(), &large);
+    println!("without the lever: {share:?}");
+    assert!(share[1] < QUANTILE - 0.02, "{share:?}");
+
+    let large = learnt(0.2);
+    let small = detections(0.1, 3, 6_000);
+    let (share, count) = held(&large.for_tags_of(0.1, lever).unwrap(), &small);
+    println!("half as large: {share:?} of {count}");
+    assert!(
+        count > 1_000.0 && share[0] >= 2.0 * QUANTILE - 1.0,
+        "{share:?}"
+    );
+    let (share, _) = held(&large, &small);
+    println!("not scaled: {share:?}");
+    assert!(share[0] < 0.6, "{share:?}");
+
+    // The size is that of the data again: nothing changes. A model that was scaled is not written.
+    let same = large.for_tags_of(0.2, lever).unwrap();
+    assert_eq!(
+        same.bounds_deg([3.0, 10.0, 30.0]),
+        large.bounds_deg([3.0, 10.0, 30.0])
+    );
+    assert_eq!(scaled.reach()[0][0], 2.0 * learnt(0.1).reach()[0][0]);
+    assert!(same.write().is_err() && large.write().is_ok());
+    for (size, lever) in [
+        (0.0, 0.0),
+        (f64::NAN, 0.0),
+        (0.2, -1.0),
+        (0.2, f64::INFINITY),
+    ] {
+        assert!(large.for_tags_of(size, lever).is_none());
+    }
+}
