@@ -9,6 +9,7 @@ use posegate_host::learn::{
     BoundsSettings, Detection, Detections, ErrorModel, InflationModel, InflationSettings, Scored,
     ScoredEstimates, learn_bounds, learn_inflation,
 };
+use std::collections::BTreeMap;
 
 const QUANTILE: f64 = 0.9;
 
@@ -214,4 +215,35 @@ fn inflation_is_too_small_if_an_error_lasts_for_the_whole_log() {
     assert!(short.trials == 40 && short.value() >= 0.7, "{short:?}");
     let lasting = covering(4000, 352);
     assert!(lasting.trials == 40 && lasting.value() < 0.4, "{lasting:?}");
+}
+
+/// Limits of the share of detected views are for later views like those of the data: not for views of which each sixth is dark.
+#[test]
+fn shares_of_detected_views_are_for_the_light_of_the_data() {
+    let mut random = Random(501);
+    let places: Vec<[f64; 3]> = (0..20_000).map(|_| Law::place(&mut random)).collect();
+    // Cells whose limits contain the share: in the light of the data, and in the dark.
+    let (mut cells, mut alike, mut dark) = (0, 0, 0);
+    for seed in 0..6 {
+        let model = learnt(&SQUARES.views(6_000, 511 + seed, |_| true));
+        // Places of one cell have the same limits.
+        let mut shares: BTreeMap<[u64; 2], [f64; 2]> = BTreeMap::new();
+        for at in &places {
+            if let Some(found) = model.detectability_deg(*at) {
+                let [sum, count] = shares.entry(found.limits.map(f64::to_bits)).or_default();
+                *sum += Law::detected(*at);
+                *count += 1.0;
+            }
+        }
+        for (limits, [sum, count]) in shares {
+            let [low, high] = limits.map(f64::from_bits);
+            let within = |share: f64| usize::from((low..=high).contains(&share));
+            cells += 1;
+            alike += within(sum / count);
+            dark += within(sum / count * 5.0 / 6.0);
+        }
+    }
+    assert!(cells > 60, "{cells}");
+    assert!(alike * 100 >= cells * 93, "{alike} of {cells}");
+    assert!(dark * 4 < cells, "{dark} of {cells}");
 }
