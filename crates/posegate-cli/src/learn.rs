@@ -33,7 +33,7 @@ pub enum Command {
 /// independent rows. Without `run`, rows that follow each other at video rate by `t_s` are cut into runs at gaps.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0); run for rows that depend on each other, such as the frames of one approach. In a site file: [error_model.NAME] file = \"tags.toml\"."
+    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0); run for rows that depend on each other, such as the frames of one approach; second_err_translation_m, second_err_yaw_rad for the other pose that fits the image, if the gate takes both. In a site file: [error_model.NAME] file = \"tags.toml\"."
 )]
 pub struct Bounds {
     /// Views with the errors of their detections (CSV); `-` for standard input
@@ -222,7 +222,7 @@ fn told(model: &ErrorModel) -> Value {
     let (rows, independent) = model.independent();
     json!({
         "taken_with": model.taken_with(),
-        "rows": rows, "independent_rows": independent, "runs": model.runs(), "drawn_of": model.drawn_of(),
+        "rows": rows, "independent_rows": independent, "runs": model.runs(), "drawn_of": model.drawn_of(), "of_better_pose": model.is_of_better_pose(),
         "quantile": model.quantile(), "views": views, "detections": detections, "flip_share": flip_share,
         "reach": {"d_m": d, "phi_deg": phi, "psi_deg": psi},
         "regions": regions.collect::<Vec<_>>(), "refused": refused.collect::<Vec<_>>(),
@@ -236,6 +236,11 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
         "{detections} detections of {views} views; {:.2} % of those with psi of 10 deg or more are flips",
         100.0 * flip_share
     ))?;
+    if model.is_of_better_pose() {
+        print(
+            &"the bounds hold for the better one of both poses of a tag: a gate must take both, and a permit needs both",
+        )?;
+    }
     if let Some(rows) = model.drawn_of() {
         print(&format_args!(
             "the {views} views were drawn at random from {rows} rows; the guarantees are those for the drawn ones"

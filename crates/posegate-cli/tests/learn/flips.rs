@@ -1,8 +1,11 @@
 //! Bounds where tags flip: the quantile of the errors jumps from the size of noise to that of a mirrored solution.
 
+use crate::command::{lines, run, write};
 use crate::in_regions;
 use crate::law::{Law, Random};
 use posegate_host::learn::{BoundsSettings, ErrorModel, learn_bounds};
+use posegate_host::site::SAMPLE;
+use std::fmt::Write;
 
 /// Errors are a few centimetres, and a metre more with a probability that falls with psi and rises with the distance.
 const FLIPPING: Law = Law {
@@ -69,5 +72,87 @@ fn bounds_are_tight_where_tags_flip() {
         for share in each.iter().flatten() {
             assert!(share.holds(quantile), "{seed}: {share:?}");
         }
+    }
+}
+
+/// Rows with the errors of both poses that fit a tag's image: the detector's own, which may be the flipped one, and the other one.
+fn of_both_poses(seed: u64, rows: u32) -> Vec<([f64; 3], [[f64; 2]; 2])> {
+    let noise = Law {
+        flips: |_| 0.0,
+        ..FLIPPING
+    };
+    let mut random = Random(seed);
+    let row = |_| {
+        let at = Law::place(&mut random);
+        let good = noise.errors(at, &mut random);
+        let flipped = [good[0] + 1.0, good[1] + 1.0];
+        let is_flipped = random.even() < (FLIPPING.flips)(at);
+        let both = if is_flipped {
+            [flipped, good]
+        } else {
+            [good, flipped]
+        };
+        (at, both)
+    };
+    (0..rows).map(row).collect()
+}
+
+/// With both poses as hypotheses a bound is as tight as if no tag flipped, and one of the two is within it.
+#[test]
+fn bounds_for_both_poses_know_no_flips() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut both =
+        "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad,second_err_translation_m,second_err_yaw_rad\n"
+            .to_owned();
+    let mut one = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n".to_owned();
+    for ([d, phi, psi], [first, second]) in of_both_poses(31, 12_000) {
+        let start = format!("{d},{phi},{psi},1,{},{}", first[0], first[1]);
+        writeln!(both, "{start},{},{}", second[0], second[1]).unwrap();
+        writeln!(one, "{start}").unwrap();
+    }
+    let site = SAMPLE.to_owned()
+        + "[error_model.m]\nfile = \"both.toml\"\n\n[task.look]\nkind = \"localization\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\nsuccess = { shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 60.0, error_model = \"m\", r = { translation = 0.1, yaw_deg = 5.0 } }\n";
+    write(&folder, "both.csv", &both);
+    write(&folder, "one.csv", &one);
+    write(&folder, "site.toml", &site);
+    let model = |name: &str| {
+        let line = format!("learn bounds {name}.csv --quantile 0.99 -o {name}.toml --json");
+        let (code, out, err) = run(&folder, &line);
+        assert_eq!(code, 0, "{err}");
+        assert_eq!(lines(&out)[0]["of_better_pose"], name == "both", "{out}");
+        let text = std::fs::read_to_string(folder.path().join(format!("{name}.toml"))).unwrap();
+        ErrorModel::parse(&text, name).unwrap()
+    };
+    let (of_both, of_one) = (model("both"), model("one"));
+    // Where a tenth of the tags flip.
+    let flipping = [6.0, 5.0, 20.0];
+    let ratio = of_one.bounds_deg(flipping).unwrap().0 / of_both.bounds_deg(flipping).unwrap().0;
+    assert!(ratio > 5.0, "{ratio}");
+    let (mut held, mut tried) = (0, 0);
+    for (at, poses) in of_both_poses(33, 20_000) {
+        let Some((translation, yaw)) = of_both.bounds_deg(at) else {
+            continue;
+        };
+        tried += 1;
+        let within = poses
+            .iter()
+            .any(|pose| pose[0] <= translation && pose[1] <= yaw);
+        held += u32::from(within);
+    }
+    assert!(
+        tried > 15_000 && f64::from(held) >= 0.98 * f64::from(tried),
+        "{held} of {tried}"
+    );
+    // A look promises the one pose that it gives; rows of one pose are no test of such a model.
+    let (code, _, err) = run(&folder, "check site.toml");
+    assert!(code == 2 && err.contains("better one"), "{code}: {err}");
+    for (name, data) in [("both", "one"), ("one", "both")] {
+        let (code, _, err) = run(&folder, &format!("learn check {name}.toml {data}.csv"));
+        assert!(
+            code == 2 && err.contains("second_err_yaw_rad"),
+            "{code}: {err}"
+        );
+        let (code, _, err) = run(&folder, &format!("learn check {name}.toml {name}.csv"));
+        assert_eq!(code, 0, "{err}");
     }
 }

@@ -191,6 +191,7 @@ pub fn learn_bounds(
             calibrated: calibrated.len() as u64,
             flips: flips as u64,
             flip_share: flips as f64 / oblique.count().max(1) as f64,
+            of_better_pose: detections.of_better_pose,
             runs: runs.map(|runs| runs as u64),
             independent: runs.map(|_| independent),
         },

@@ -275,7 +275,8 @@ struct View {
 /// without names of runs, rows are used that are as far apart as runs would be.
 ///
 /// # Errors
-/// [`LearnError::Share`] if the confidence is not in (0, 1).
+/// [`LearnError::Share`] if the confidence is not in (0, 1); [`LearnError::Poses`] if the rows have the errors of one pose and the
+/// model those of the better one of two, or the other way round.
 pub fn check_bounds(
     model: &ErrorModel,
     new: &Detections,
@@ -286,6 +287,20 @@ pub fn check_bounds(
         return Err(LearnError::Share {
             name: "confidence",
             value: settings.confidence,
+        });
+    }
+    let poses = [model.is_of_better_pose(), new.of_better_pose];
+    let [of_model, of_rows] = poses.map(|better| {
+        if better {
+            "the better one of two poses"
+        } else {
+            "one pose"
+        }
+    });
+    if of_model != of_rows {
+        return Err(LearnError::Poses {
+            model: of_model,
+            rows: of_rows,
         });
     }
     let regions: Vec<_> = model.regions().collect();

@@ -3,7 +3,7 @@
 use super::LearnError;
 use super::draw::{Digesting, Kept};
 use super::runs::Runs;
-use super::sheet::Sheet;
+use super::sheet::{Column, Line, Sheet};
 use crate::input::Limit;
 use std::io::Read;
 
@@ -15,6 +15,8 @@ const NEEDED: [&str; 6] = [
     "err_translation_m",
     "err_yaw_rad",
 ];
+/// The errors of the detector's second pose of the tag.
+const SECOND: [&str; 2] = ["second_err_translation_m", "second_err_yaw_rad"];
 const PLACE: [&str; 3] = ["d_m", "phi_deg", "psi_deg"];
 
 /// One view of a tag.
@@ -23,7 +25,7 @@ pub struct Detection {
     /// d in metres, above 0; phi and psi in degrees, 0 to 180: computed from the truth.
     pub at: [f64; 3],
     /// The magnitudes of the errors of the position, metres, and of the yaw, radians; `None` if the tag was
-    /// not detected.
+    /// not detected. Of two poses, those of the pose whose yaw errs less.
     pub errors: Option<[f64; 2]>,
 }
 
@@ -40,6 +42,8 @@ pub struct Detections {
     pub sha256: [u8; 32],
     /// The number of rows in the file if only some of them were drawn.
     pub drawn_of: Option<u64>,
+    /// `true` if the errors are those of the better one of both poses that a detector gives of a tag.
+    pub of_better_pose: bool,
 }
 
 /// The most rows that [`Detections::draw`] keeps.
@@ -49,6 +53,10 @@ impl Detections {
     /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty if
     /// `detected` is 0. Rows with the same text in the column `run` depend on each other. Without that column, rows that
     /// follow each other at video rate by `t_s` (seconds) are cut into runs at gaps ([`Runs::of_times`]).
+    ///
+    /// The columns `second_err_translation_m, second_err_yaw_rad` are the errors of the second pose that fits a tag's image, empty
+    /// if the detector gave one pose. Then a row has the errors of the pose whose yaw errs less: bounds hold for that one, for a gate
+    /// that takes both poses as hypotheses.
     ///
     /// # Errors
     /// The first invalid field, with its line and column; a file without rows.
@@ -74,6 +82,20 @@ impl Detections {
         for name in NEEDED {
             columns.push(sheet.needed(name, &NEEDED)?);
         }
+        let second = match [sheet.optional(SECOND[0])?, sheet.optional(SECOND[1])?] {
+            [Some(translation), Some(yaw)] => Some([translation, yaw]),
+            [None, None] => None,
+            [first, _] => {
+                // The other one is missing.
+                let missing = SECOND[usize::from(first.is_some())];
+                return Err(sheet.needed(missing, &SECOND).map_or_else(
+                    |error| error,
+                    |_| LearnError::Empty {
+                        file: file.to_owned(),
+                    },
+                ));
+            }
+        };
         let run = sheet.optional("run")?;
         let time = sheet.optional("t_s")?;
         let dependent = run.is_some() || time.is_some();
@@ -94,16 +116,18 @@ impl Detections {
                 times.push(line.number(time, |_| true, "a time in seconds")?);
             }
             let errors = if line.flag(columns[3])? {
-                let size = "the size of an error in metres, 0 or more";
-                let translation = line.number(columns[4], |error| error >= 0.0, size)?;
-                let yaw = line.number(
-                    columns[5],
-                    |error| libm::fabs(error) <= 7.0,
-                    "an error in radians, at most a turn",
-                )?;
-                Some([translation, libm::fabs(yaw)])
+                let first = errors(&line, [columns[4], columns[5]])?;
+                let one =
+                    |[a, b]: [Column; 2]| line.empty(a, "").is_ok() && line.empty(b, "").is_ok();
+                match second.filter(|columns| !one(*columns)) {
+                    Some(columns) => {
+                        let second = errors(&line, columns)?;
+                        Some(if second[1] < first[1] { second } else { first })
+                    }
+                    None => Some(first),
+                }
             } else {
-                for column in &columns[4..] {
+                for column in columns[4..].iter().chain(second.iter().flatten()) {
                     line.empty(*column, "the row's `detected` is 0")?;
                 }
                 None
@@ -127,8 +151,24 @@ impl Detections {
             times,
             sha256: digest.sha256(),
             drawn_of,
+            of_better_pose: second.is_some(),
         })
     }
+}
+
+/// Returns the magnitudes of a pose's errors, metres and radians.
+fn errors(line: &Line<'_>, [translation, yaw]: [Column; 2]) -> Result<[f64; 2], LearnError> {
+    let translation = line.number(
+        translation,
+        |error| error >= 0.0,
+        "the size of an error in metres, 0 or more",
+    )?;
+    let yaw = line.number(
+        yaw,
+        |error| libm::fabs(error) <= 7.0,
+        "an error in radians, at most a turn",
+    )?;
+    Ok([translation, libm::fabs(yaw)])
 }
 
 /// Reads the places `d_m, phi_deg, psi_deg` for which a model is evaluated.
@@ -148,10 +188,7 @@ pub fn places(bytes: &[u8], file: &str) -> Result<Vec<[f64; 3]>, LearnError> {
     Ok(rows)
 }
 
-fn place(
-    line: &super::sheet::Line<'_>,
-    columns: &[super::sheet::Column],
-) -> Result<[f64; 3], LearnError> {
+fn place(line: &Line<'_>, columns: &[Column]) -> Result<[f64; 3], LearnError> {
     let angle = |angle: f64| (0.0..=180.0).contains(&angle);
     Ok([
         line.number(columns[0], |d| d > 0.0, "a distance in metres, above 0")?,
@@ -220,6 +257,46 @@ mod tests {
         let found = found.unwrap();
         assert_eq!(found.rows[0].at, [2.5, 4.0, 30.0]);
         assert_eq!(found.rows[1].errors, None);
+    }
+
+    /// The errors of the better pose count, both of one pose.
+    #[test]
+    fn of_two_poses_the_better_one_counts() {
+        let header = HEADER.replace("rad\n", "rad,second_err_translation_m,second_err_yaw_rad\n");
+        let found = read(&format!(
+            "{header}1,2,3,1,0.1,0.2,0.3,-0.1\n1,2,3,1,0.1,0.2,0.05,0.4\n1,2,3,1,0.1,0.2,,\n1,2,3,0,,,,\n"
+        ))
+        .unwrap();
+        let errors: Vec<_> = found.rows.iter().map(|row| row.errors).collect();
+        let first = Some([0.1, 0.2]);
+        assert_eq!(errors, [Some([0.3, 0.1]), first, first, None]);
+        assert!(found.of_better_pose);
+        assert!(
+            !read(&format!("{HEADER}1,2,3,1,0.1,0.2\n"))
+                .unwrap()
+                .of_better_pose
+        );
+        for (row, place) in [
+            ("1,2,3,1,0.1,0.2,0.3,\n", "d.csv:2:8: ``"),
+            ("1,2,3,1,0.1,0.2,,0.1\n", "d.csv:2:7: ``"),
+            ("1,2,3,1,0.1,0.2,nan,0.1\n", "d.csv:2:7: `nan`"),
+            ("1,2,3,0,,,0.1,\n", "d.csv:2:7: `0.1`"),
+        ] {
+            let error = read(&format!("{header}{row}")).unwrap_err();
+            assert!(error.starts_with(place), "{row}: {error}");
+        }
+        let half = header.replace(",second_err_yaw_rad", "");
+        let error = read(&half).unwrap_err();
+        assert!(
+            error.starts_with("d.csv:1:1: there is no column `second_err_yaw_rad`"),
+            "{error}"
+        );
+        let half = header.replace(",second_err_translation_m", "");
+        let error = read(&half).unwrap_err();
+        assert!(
+            error.starts_with("d.csv:1:1: there is no column `second_err_translation_m`"),
+            "{error}"
+        );
     }
 
     #[test]

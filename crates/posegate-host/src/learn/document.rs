@@ -61,6 +61,9 @@ pub(super) struct Data {
     pub flips: u64,
     /// Their share of the detections with psi of 10 degrees or more.
     pub flip_share: f64,
+    /// `true` if the errors are those of the better one of a detector's two poses.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub of_better_pose: bool,
     /// The number of runs; `None` if rows were taken as independent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runs: Option<u64>,

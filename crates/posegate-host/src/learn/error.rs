@@ -88,6 +88,16 @@ pub enum LearnError {
         /// The mismatch.
         what: String,
     },
+    /// Bounds for the better one of two poses, and rows of one pose, or the other way round.
+    #[error(
+        "the model's bounds hold for {model}, and the rows have the errors of {rows}: give rows with `second_err_translation_m` and `second_err_yaw_rad` exactly if the model was learnt with them"
+    )]
+    Poses {
+        /// What the model was learnt with.
+        model: &'static str,
+        /// What the rows have.
+        rows: &'static str,
+    },
     /// A model that could not be written.
     #[error("the model cannot be written: {0}")]
     Unwritten(String),

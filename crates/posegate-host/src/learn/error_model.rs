@@ -246,6 +246,13 @@ impl ErrorModel {
         (data.views, data.detections, data.flip_share)
     }
 
+    /// Returns `true` if the bounds hold for the better one of the two poses that fit a tag's image, not for one that a detector
+    /// chose: for a gate that takes both as hypotheses.
+    #[must_use]
+    pub fn is_of_better_pose(&self) -> bool {
+        self.document.data.of_better_pose
+    }
+
     /// Returns the number of rows in the file if the views were drawn from more rows.
     #[must_use]
     pub fn drawn_of(&self) -> Option<u64> {

@@ -137,6 +137,15 @@ pub(super) fn error_model(
             }
         }
         let (mut model, named) = learnt(&file)?;
+        if model.is_of_better_pose() {
+            return Err(file
+                .error(format!(
+                    "the bounds of the error model of {} hold for the better one of a detector's two poses",
+                    table.title()
+                ))
+                .expected("bounds for the one pose that a look gives")
+                .help("learn the model without the columns `second_err_translation_m` and `second_err_yaw_rad`"));
+        }
         if let Some(node) = table.optional(&keys::MODEL_TAG_SIZE) {
             model = model.for_tags_of(node.number()?, lever).ok_or_else(|| {
                 node.error(format!(
