@@ -38,6 +38,7 @@ mod predict;
 mod replay;
 mod report;
 mod seal;
+mod sheet;
 mod site;
 mod table;
 mod terminal;

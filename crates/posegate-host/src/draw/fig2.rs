@@ -17,5 +17,5 @@ pub fn fig2_chain(study: &CaseStudy) -> Result<String, StudyError> {
     let report =
         evaluate(site, CHAIN, chain, StartAssumption::AtGoal).map_err(|error| fault(&error))?;
     let success = |name: &str| site.tasks.get(name).map(|task| &task.success);
-    Ok(chain_picture(CHAIN, &report, &success))
+    Ok(chain_picture(CHAIN, &report, &success, None))
 }

@@ -1,6 +1,7 @@
 //! Things on a floor plan: walls, tags, cameras, robots.
 
 use super::ingredients::{Eye, axes, frame};
+use super::measure::{fitted, text_width};
 use super::palette;
 use super::panel::{Inside, Window};
 use super::section::border;
@@ -69,6 +70,80 @@ impl Inside<'_> {
             picture.rectangle([x - 2.0, y - 10.5, width + 2.0, 14.0], &ground);
             let font = Font::new(11.0, palette::INK).bold();
             picture.text([x, y], text, &font.anchored(Anchor::Start));
+        });
+    }
+}
+
+/// Names on a floor plan that do not overlap.
+#[derive(Debug, Default)]
+pub struct Labels {
+    /// Left, top, right, bottom in the picture, pixels.
+    boxes: Vec<[f64; 4]>,
+}
+
+impl Labels {
+    const SIZE: f64 = 11.0;
+
+    /// Keeps names off the pixels about a point of the floor.
+    pub fn avoid(&mut self, inside: &mut Inside<'_>, at: [f64; 2], reach: f64) {
+        inside.in_pixels(|_, panel| {
+            let [x, y] = panel.at(at);
+            self.boxes
+                .push([x - reach, y - reach, x + reach, y + reach]);
+        });
+    }
+
+    /// Draws a name near a point of the floor, at the first of several places where it overlaps no other name; at the first one
+    /// if there is no such place.
+    pub fn place(&mut self, inside: &mut Inside<'_>, at: [f64; 2], text: &str) {
+        inside.in_pixels(|picture, panel| {
+            let text = fitted(text, Self::SIZE, true, panel.width() - 8.0);
+            let wide = text_width(&text, Self::SIZE, true);
+            let [x, y] = panel.at(at);
+            let place = |dx: f64, dy: f64| {
+                let within = |v: f64, lo: f64, hi: f64| v.min(hi).max(lo);
+                let left = panel.left + 4.0;
+                let x = within(
+                    x + dx,
+                    left,
+                    (panel.left + panel.width() - wide - 4.0).max(left),
+                );
+                let y = within(y + dy, panel.top + 13.0, panel.bottom() - 4.0);
+                [x, y - 11.0, x + wide, y + 4.0]
+            };
+            let sides = [8.0, -8.0 - wide, -0.5 * wide, 30.0, -30.0 - wide];
+            let mut offsets: Vec<[f64; 2]> = Vec::new();
+            for row in 0..7 {
+                let dy = 14.0 * f64::from(row);
+                offsets.extend(
+                    sides
+                        .iter()
+                        .flat_map(|dx| [[*dx, -8.0 - dy], [*dx, 18.0 + dy]]),
+                );
+            }
+            let far = |[dx, dy]: &[f64; 2]| libm::hypot(dx + 0.5 * wide, dy - 4.0);
+            offsets.sort_by(|a, b| far(a).total_cmp(&far(b)));
+            let overlaps = |a: &[f64; 4]| {
+                let meets =
+                    |b: &&[f64; 4]| !(a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1]);
+                self.boxes.iter().filter(meets).count()
+            };
+            let all = offsets.into_iter().map(|[dx, dy]| place(dx, dy));
+            // The first of those with the fewest overlaps.
+            let chosen = all.min_by_key(overlaps);
+            let Some([left, top, right, bottom]) = chosen else {
+                return;
+            };
+            self.boxes.push([left, top, right, bottom]);
+            let near = [x.clamp(left, right), y.clamp(top, bottom)];
+            if libm::hypot(near[0] - x, near[1] - y) > 16.0 {
+                picture.line(&[[x, y], near], &Style::outlined(palette::FAINT, 0.8));
+            }
+            let ground = Style::filled("none").with_fill_opacity("#ffffff", 0.8);
+            let size = [right - left, bottom - top];
+            picture.rectangle([left - 1.0, top, size[0] + 1.0, size[1]], &ground);
+            let font = Font::new(Self::SIZE, palette::INK).bold();
+            picture.text([left, top + 11.0], &text, &font);
         });
     }
 }
