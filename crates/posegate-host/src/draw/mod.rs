@@ -54,6 +54,7 @@ mod multiple;
 mod palette;
 pub(crate) mod panel;
 mod parking;
+mod parking_errors;
 mod pieces;
 mod placement;
 mod plan;
