@@ -34,7 +34,7 @@ const FREE: [Option<[f64; 2]>; 4] = [
 const EVALUATIONS_EXACT: u64 = 2_000;
 
 /// Number of places evaluated by a search for an uncertain pose.
-const EVALUATIONS: u64 = 400;
+const EVALUATIONS: u64 = 300;
 
 /// Returns the tag at the start, at its best place for an exactly known pose, and at its best places for an uncertain pose: the least
 /// E[c], and the least E[c] where the whole pose-set sees the tag. `progress` is called after each search.
