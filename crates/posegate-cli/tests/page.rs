@@ -378,6 +378,18 @@ fn tasks_that_are_alike_are_folded() {
     );
 }
 
+/// A stated error that the tag's tolerance alone exceeds makes a plan that is proven, and wrong: the summary says so.
+#[test]
+fn warnings_stand_beside_the_claim() {
+    let doubtful =
+        hall(&[5.25, 8.25, 14.25, 17.25]) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let page = made(&doubtful, |_| ()).expect("a page");
+    assert!(page.contains("<p id=\"summary\" class=\"warned\">6 of 6 docks"));
+    assert!(page.contains("<li>WARNING: "), "no warning");
+    let page = made(&hall(&[5.25, 8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    assert!(page.contains("<p id=\"summary\" class=\"good\">") && !page.contains("WARNING"));
+}
+
 /// Where nothing is known the page says so: 0.000 m would promise that a tag is exactly where the file says.
 #[test]
 fn an_unknown_tolerance_is_not_zero() {

@@ -2,6 +2,7 @@
 
 use super::contents::{Contents, ShownChain};
 use super::figures::escaped;
+use crate::doctor::examine;
 use crate::draw::success_of;
 use crate::log::factor;
 use crate::plan::{ChainReport, StepKind};
@@ -70,7 +71,17 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
             Err(why) => format!("chain {name} is not evaluated: {why}"),
         });
     }
-    let class = if good { "good" } else { "bad" };
+    // A proof is about the site file: what is doubtful in it stands beside the claim.
+    let warnings = examine(site).warnings;
+    let class = match (good, warnings.is_empty()) {
+        (true, true) => "good",
+        (true, false) => "warned",
+        (false, _) => "bad",
+    };
+    let warnings = warnings
+        .iter()
+        .map(|warning| format!("WARNING: {}: {}", warning.about, warning.message));
+    notes.splice(0..0, warnings);
     let notes: Vec<String> = notes
         .iter()
         .map(|note| format!("<li>{}</li>", escaped(note)))
