@@ -294,6 +294,66 @@ def timed(page, task):
     line("a drag step, 99 % are below", round(steps[1], 3), "ms", 16, steps[1] < 16)
 
 
+# Returns the texts that a reader sees with a font below 11 px.
+SMALL = """() => [...document.querySelectorAll("body *")].filter((element) => {
+  if (element.closest("script, style, details:not([open])")) return false;
+  if (![...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim())) return false;
+  const svg = element.closest("svg");
+  const drawn = svg && svg.viewBox.baseVal.width > 0;
+  const shown = drawn ? svg.getBoundingClientRect().width / svg.viewBox.baseVal.width : 1;
+  return parseFloat(getComputedStyle(element).fontSize) * shown < 10.99;
+}).map((element) => element.textContent.slice(0, 30))"""
+
+# Returns the pairs of texts of the pictures in a file whose boxes overlap by more than a pixel.
+OVERLAPS = """() => [...document.querySelectorAll("svg")].flatMap((svg) => {
+  const all = [...svg.querySelectorAll("text")].map((text) => [text.textContent, text.getBoundingClientRect()]);
+  return all.flatMap(([text, a], index) => all.slice(index + 1)
+    .filter(([, b]) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
+      && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1)
+    .map(([other]) => [text, other]));
+})"""
+
+
+def pages_of(page):
+    """Returns the number of A4 pages that a file prints on."""
+    return page.pdf(prefer_css_page_size=True).count(b"/Type /Page\n")
+
+
+def hall(browser):
+    """The page and the mounting sheet of a hall of six docks: on a telephone, and in print."""
+    folder = pathlib.Path(FOLDER).resolve()
+    context = browser.new_context(viewport={"width": 390, "height": 844}, is_mobile=True, offline=True)
+    page = context.new_page()
+    page.goto((folder / "hall.html").as_uri())
+    page.wait_for_selector("body[data-ready=yes]")
+    summary = page.inner_text("#summary")
+    line("the summary comes first", summary, "", "6 of 6 docks served by ... proven",
+         summary.startswith("6 of 6 docks served by ") and summary.endswith(", proven"))
+    small = page.evaluate(SMALL)
+    line("texts below 11 px on a telephone", small[:5], "", [], small == [])
+    shrunk = page.evaluate("""async () => {
+      const all = [...document.images].filter((image) => !image.closest("details"));
+      all.forEach((image) => (image.loading = "eager"));
+      await Promise.all(all.map((image) => image.decode().catch(() => null)));
+      return all.filter((image) => image.naturalWidth > 0 && image.clientWidth < 0.99 * image.naturalWidth).length;
+    }""")
+    line("pictures that are shrunk on a telephone", shrunk, "", 0, shrunk == 0)
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    line("width of the page on a telephone", wide, "px", 390, wide <= 390)
+    ticks = page.evaluate("document.querySelectorAll('#axes text').length")
+    line("labels of the panel's axes", ticks, "", "at least 6", ticks >= 6)
+    margin = page.evaluate("state.verdict.marginQ16 / 65536")
+    line("margin of the first pose-set", round(margin, 3), "", "1.3 to 2", 1.3 <= margin <= 2)
+    count = pages_of(page)
+    line("pages of A4 for six docks", count, "pages", 4, 1 <= count <= 4)
+    sheet = context.new_page()
+    sheet.goto((folder / "sheet.html").as_uri())
+    overlaps = sheet.evaluate(OVERLAPS)
+    line("texts of the mounting sheet that overlap", overlaps[:3], "", [], overlaps == [])
+    drawn, printed = sheet.locator("body > svg").count(), pages_of(sheet)
+    line("pages of the mounting sheet", [drawn, printed], "drawn, printed", "equal", drawn == printed >= 2)
+
+
 def main():
     site = json.loads(pathlib.Path(FOLDER, "tasks.json").read_text())
     task = site["task"]
@@ -326,6 +386,7 @@ def main():
         headings_go_round(page)
         gone_back(page, task)
         timed(page, task)
+        hall(browser)
         # The picture of the README.
         page.set_viewport_size({"width": 1200, "height": 860})
         choose(page, "see-t7")

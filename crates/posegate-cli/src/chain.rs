@@ -23,7 +23,7 @@ pub struct Arguments {
     /// may leave it
     #[arg(long, value_enum, default_value = "general")]
     assume: Assumption,
-    /// Draw the chain, step by step (SVG)
+    /// Draw the hall with the route and the looks, then the chain step by step (SVG)
     #[arg(short, long)]
     output: Option<Output>,
     /// Print JSON
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         .map_err(|error| failure(&arguments.site, error))?;
     if let Some(path) = &arguments.output {
         let success = |name: &str| site.tasks.get(name).map(|task| &task.success);
-        let picture = chain_picture(&arguments.name, &report, &success);
+        let picture = chain_picture(&arguments.name, &report, &success, Some(&site));
         files.write(path, picture.as_bytes())?;
     }
     if arguments.json {

@@ -3,12 +3,13 @@
 use crate::door::{
     Failure, Outcome, answer, check_stated_errors, print, print_json, progress, warn,
 };
+use crate::sheet;
 use indicatif::ProgressBar;
 use posegate_host::cover::{
-    Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch, cover_watched,
-    polished, written,
+    ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch,
+    cover_watched, polished, written,
 };
-use posegate_host::draw::{Mounted, mounting_sheet};
+use posegate_host::draw::Mounted;
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::PlanError;
 use posegate_host::site::Site;
@@ -58,7 +59,7 @@ pub struct Arguments {
     /// errors are largest
     #[arg(long, value_name = "METRES")]
     polish: Option<f64>,
-    /// Draw a mounting sheet of the chosen tags (SVG)
+    /// Write a mounting sheet of the chosen tags: A4 pages as HTML if the file's name ends with .html, else as SVG
     #[arg(long)]
     sheet: Option<Output>,
     /// Write the site file with the chosen tags as tags, and without candidates
@@ -132,7 +133,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         files.write(path, text.as_bytes())?;
     }
     if let (Some(path), true) = (&arguments.sheet, found.serves_all()) {
-        files.write(path, sheet(&found).as_bytes())?;
+        sheet::write(files, path, "Mounting sheet", &mounted(&found), &site)?;
     }
     if arguments.json {
         print_json(&found.to_json())?;
@@ -142,17 +143,16 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(found.serves_all()))
 }
 
-/// Returns a mounting sheet (SVG) of the chosen tags.
-fn sheet(found: &Cover) -> String {
-    let mounted = found.tags.iter().map(|chosen| Mounted {
+/// Returns the chosen tags for a mounting sheet.
+fn mounted(found: &Cover) -> Vec<Mounted> {
+    let mounted = |chosen: &ChosenTag| Mounted {
         name: chosen.name.clone(),
         family: chosen.tag.family.clone(),
         tag: chosen.tag.tag,
         reserve: (!chosen.tag.tolerance.is_none()).then_some(chosen.tag.tolerance),
         left: None,
-        on: "where its candidate is".to_owned(),
-    });
-    mounting_sheet("Mounting sheet", &mounted.collect::<Vec<_>>())
+    };
+    found.tags.iter().map(mounted).collect()
 }
 
 fn unread(name: &str, beside: &str) -> Failure {

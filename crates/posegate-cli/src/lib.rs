@@ -29,6 +29,7 @@ mod family;
 mod gate;
 mod import;
 mod init;
+mod inscribe;
 mod learn;
 mod manual;
 mod metrics;
@@ -38,6 +39,7 @@ mod predict;
 mod replay;
 mod report;
 mod seal;
+mod sheet;
 mod site;
 mod table;
 mod terminal;
@@ -77,6 +79,7 @@ enum Command {
     Replay(Box<replay::Arguments>),
     Seal(seal::Arguments),
     Family(family::Arguments),
+    Inscribe(inscribe::Arguments),
     Cost(cost::Arguments),
     Place(place::Arguments),
     #[command(subcommand)]
@@ -119,6 +122,7 @@ fn run(words: &[OsString]) -> failure::Outcome {
         Command::Replay(arguments) => replay::run(arguments, files),
         Command::Seal(arguments) => seal::run(arguments, files),
         Command::Family(arguments) => family::run(arguments, files),
+        Command::Inscribe(arguments) => inscribe::run(arguments, files),
         Command::Cost(arguments) => cost::run(arguments, files),
         Command::Place(arguments) => place::run(arguments, files),
         Command::Site(command) => site::run(command, files),

@@ -2,8 +2,9 @@
 
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
+use crate::sheet;
 use posegate::shape::{Family, Tag, Tolerance};
-use posegate_host::draw::{Column, Mounted, mounting_sheet, placement_picture};
+use posegate_host::draw::{Column, Mounted, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::place::{
     Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
@@ -71,7 +72,7 @@ pub struct Arguments {
     /// Draw the tag's present place and the best ones, side by side (SVG)
     #[arg(short, long)]
     output: Option<Output>,
-    /// Draw a mounting sheet of the best place (SVG)
+    /// Write a mounting sheet of the best place: an A4 page as HTML if the file's name ends with .html, else as SVG
     #[arg(long)]
     sheet: Option<Output>,
     /// Print JSON
@@ -276,13 +277,9 @@ fn pictures(
             },
             reserve: best.contained.then_some(best.reserve),
             left: best.mean.filter(|_| best.contained).map(|_| best.left),
-            on: arguments
-                .wall
-                .as_ref()
-                .map_or_else(|| "its own stand".to_owned(), |wall| format!("wall {wall}")),
         };
         let title = format!("Mounting sheet for task {}", arguments.task);
-        files.write(path, mounting_sheet(&title, &[mounted]).as_bytes())?;
+        sheet::write(files, path, &title, &[mounted], site)?;
     }
     Ok(())
 }

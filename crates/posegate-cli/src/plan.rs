@@ -2,7 +2,7 @@
 
 use crate::chain::{failure, sentences};
 use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
-use posegate_host::draw::chain_picture;
+use posegate_host::draw::{chain_picture, success_of};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::{Options, PlanError, Status, plan_near};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Write the plan as rules for a controller's sequencer
     #[arg(long)]
     rules: Option<Output>,
-    /// Draw the chain, step by step (SVG)
+    /// Draw the hall with the route and the looks, then the chain step by step (SVG)
     #[arg(short, long)]
     output: Option<Output>,
     /// Print JSON
@@ -87,12 +87,8 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         files.write(path, &bytes)?;
     }
     if let (Some(path), Some(plan)) = (&arguments.output, &planned.plan) {
-        let made = |name: &str| site.planner.looks.get(name).map(|look| &look.success);
-        let success = |name: &str| {
-            let own = site.tasks.get(name).map(|task| &task.success);
-            own.or_else(|| made(name))
-        };
-        let picture = chain_picture(&arguments.to, &plan.report(), &success);
+        let success = |name: &str| success_of(&site, name);
+        let picture = chain_picture(&arguments.to, &plan.report(), &success, Some(&site));
         files.write(path, picture.as_bytes())?;
     }
     if arguments.json {

@@ -69,6 +69,7 @@ fn the_case_study_comes_out_as_in_the_paper() {
         posegate(&["table", "verify", &table, "site.toml"], &out);
     }
 
+    check_figures(&out, &numbers);
     for picture in PICTURES {
         check_picture(&String::from_utf8(read(&out, picture)).unwrap(), picture);
     }
@@ -91,7 +92,10 @@ fn check_numbers(numbers: &Value, out: &Path) {
     for table in tables {
         let file = format!("{}.posegate", table["task"].as_str().unwrap());
         assert_eq!(table["bytes"], read(out, &file).len());
-        assert!(table["proven_cells"].as_u64().unwrap() > 0);
+        // A controller takes facets: a few hundred bytes.
+        assert_eq!(table["layout"], "facets");
+        assert!(table["bytes"].as_u64().unwrap() < 600);
+        assert!(table["proven_corners"].as_u64().unwrap() > 0);
         assert!(table["prove_s"].as_f64().unwrap() >= 0.0);
         assert!(table["bake_s"].as_f64().unwrap() >= 0.0);
     }
@@ -124,6 +128,62 @@ fn check_numbers(numbers: &Value, out: &Path) {
     }
     assert_eq!(numbers["chain"]["holds"], true);
     assert_eq!(numbers["chain"]["steps"].as_array().unwrap().len(), 3);
+}
+
+/// Checks what the figures show: the three errors of Fig. 1, before and after each task in Fig. 2, the panels and boxes of Fig. 3, and in
+/// Fig. 4 places that are never worse than the start.
+fn check_figures(out: &Path, numbers: &Value) {
+    let text = |name: &str| String::from_utf8(read(out, name)).unwrap();
+    // A car of 4.5 m by 1.5 m in a space of 5 m by 3 m has 25 cm before and behind it, and 75 cm at each side.
+    let parking = text("fig1-parking.svg");
+    for shown in [
+        "(a) error along x",
+        "fits up to 0.25 m;",
+        "(b) error across, y",
+        "fits up to 0.75 m;",
+        "(c) error in yaw",
+        "yaw (rad)",
+    ] {
+        assert!(parking.contains(shown), "{shown}");
+    }
+    let chain = text("fig2-chain.svg");
+    for shown in [
+        "1. before see-t7",
+        "after see-t7",
+        "2. before dock",
+        "after dock",
+    ] {
+        assert!(chain.contains(shown), "{shown}");
+    }
+    let sections = text("fig3-sections.svg");
+    for panel in [
+        "(a) yaw",
+        "(b) yaw",
+        "(c) yaw",
+        "(d) yaw",
+        "(e) yaw",
+        "in S<tspan",
+    ] {
+        assert!(sections.contains(panel), "{panel}");
+    }
+    let places = numbers["placements"].as_array().unwrap();
+    assert_eq!(places.len(), 4);
+    let mean = |index: usize| places[index]["mean"].as_f64().unwrap();
+    let margin = |index: usize| places[index]["margin"].as_f64().unwrap();
+    // The start is on the border of sight; the search makes it better, and better still if some poses may miss the tag.
+    assert!(margin(0) < 0.3 && margin(0) > 0.0);
+    assert!(mean(2) <= mean(3) && mean(3) < 0.01 * mean(0));
+    assert!(margin(3) >= 1.0 && places[3]["contained"] == true);
+    let placement = text("fig4-placement.svg");
+    assert_eq!(
+        placement.matches("m from the goal</tspan></text>").count(),
+        4
+    );
+    // The sets of the paper are told apart without colours: S is hatched, pose-sets are dashed.
+    for figure in [&chain, &sections, &placement] {
+        assert!(figure.contains("stroke=\"#b3001b\" stroke-width=\"0.6\""));
+        assert!(figure.contains("stroke-dasharray=\"6 3\""));
+    }
 }
 
 /// Checks that elements are balanced, coordinates are numbers, and nothing is fetched.

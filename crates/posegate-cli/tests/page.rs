@@ -291,3 +291,112 @@ fn the_command_writes_a_page_or_nothing() {
     let page = std::fs::read_to_string(path("report.html")).expect("a page");
     assert!(page.contains("<h1>site</h1>"));
 }
+
+const HALL: &str = include_str!("../../../examples/sites/hall.toml");
+
+/// Returns the hall with tags of 30 cm on its north wall, at these places along it in metres, and without candidates.
+fn hall(along: &[f64]) -> String {
+    let (site, _) = HALL.split_once("[candidates.").expect("candidates");
+    let tags = along.iter().enumerate().map(|(id, x)| {
+        format!("[tag.north-{id}]\nid = {id}\nfamily = \"tag36h11\"\nsize = 0.3\npose = {{ x = {x:?}, y = 9.0, z = 0.6, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }}\n")
+    });
+    site.to_owned() + &tags.collect::<String>()
+}
+
+/// Returns the content of the element with an id.
+fn element<'p>(page: &'p str, id: &str) -> &'p str {
+    let (_, rest) = page
+        .split_once(&format!(" id=\"{id}\""))
+        .expect("an element");
+    let (_, rest) = rest.split_once('>').expect("content");
+    rest.split_once('<').expect("an end").0
+}
+
+/// The first thing that a manager reads is whether the docks are served, by how many tags, and how near to the limit.
+#[test]
+fn the_page_begins_with_a_summary() {
+    let all = made(&hall(&[5.25, 8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    let summary = element(&all, "summary");
+    assert!(
+        summary.starts_with("6 of 6 docks served by 4 tags, worst margin 1.0")
+            && summary.ends_with(", proven"),
+        "{summary}"
+    );
+    // The worst margin is the least one of the tables of steps, rounded down.
+    let (_, steps) = all
+        .split_once("the steps of plan of dock-1")
+        .expect("steps");
+    let cells = steps
+        .split("<td>")
+        .filter_map(|cell| cell.split_once("</td>"));
+    let margins = cells.map(|(cell, _)| cell).filter(|cell| {
+        cell.len() == 5 && cell.as_bytes()[1] == b'.' && cell.parse::<f64>().is_ok()
+    });
+    let least = margins.map(|cell| cell.parse::<f64>().expect("a number"));
+    let least = least.filter(|margin| *margin >= 1.0).fold(9.0, f64::min);
+    let shown: f64 = summary
+        .split(' ')
+        .find_map(|word| word.strip_suffix(',')?.parse().ok())
+        .expect("a margin");
+    assert!(shown <= least && least < shown + 0.01, "{shown} {least}");
+    let (header, _) = all.split_once("<main>").expect("a header");
+    assert!(header.contains("id=\"summary\""));
+    // Without the first tag, the first dock is not served: this is said, not hidden.
+    let fewer = made(&hall(&[8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    let summary = element(&fewer, "summary");
+    assert!(
+        summary.starts_with("5 of 6 docks served by 3 tags"),
+        "{summary}"
+    );
+    assert!(fewer.contains("<p id=\"summary\" class=\"bad\">"));
+    assert!(fewer.contains("<li>NOT served: dock-1: "));
+    // Nothing is claimed of tasks without a start.
+    let sample = made(SAMPLE, |_| ()).expect("a page");
+    assert_eq!(element(&sample, "summary"), "3 of 3 success sets proven");
+    assert!(sample.contains("unknown whether a robot can reach dock, park: no start"));
+}
+
+#[test]
+fn tasks_that_are_alike_are_folded() {
+    let site = hall(&[5.25, 8.25, 14.25, 17.25]);
+    let page = made(&site, |_| ()).expect("a page");
+    assert!(page.contains("<p>6 tasks are alike in the frames of their goals."));
+    assert_eq!(
+        page.matches("<details><summary>the pictures of dock-")
+            .count(),
+        5
+    );
+    // One that is narrower is shown by itself.
+    let (before, last) = site.split_once("[task.dock-6]").expect("a task");
+    let narrow = last.replacen("x = [-0.1, 0.1]", "x = [-0.1, 0.09]", 1);
+    let page = made(&format!("{before}[task.dock-6]{narrow}"), |_| ()).expect("a page");
+    assert!(page.contains("<p>5 tasks are alike in the frames of their goals."));
+    assert_eq!(
+        page.matches("<details><summary>the pictures of dock-")
+            .count(),
+        4
+    );
+}
+
+/// A stated error that the tag's tolerance alone exceeds makes a plan that is proven, and wrong: the summary says so.
+#[test]
+fn warnings_stand_beside_the_claim() {
+    let doubtful =
+        hall(&[5.25, 8.25, 14.25, 17.25]) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let page = made(&doubtful, |_| ()).expect("a page");
+    assert!(page.contains("<p id=\"summary\" class=\"warned\">6 of 6 docks"));
+    assert!(page.contains("<li>WARNING: "), "no warning");
+    let page = made(&hall(&[5.25, 8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    assert!(page.contains("<p id=\"summary\" class=\"good\">") && !page.contains("WARNING"));
+}
+
+/// Where nothing is known the page says so: 0.000 m would promise that a tag is exactly where the file says.
+#[test]
+fn an_unknown_tolerance_is_not_zero() {
+    let page = made(&hall(&[5.25]), |_| ()).expect("a page");
+    let (_, tags) = page.split_once("<section id=\"tags\">").expect("tags");
+    assert!(tags.contains("<td>unknown</td>") && !tags.contains("<td>0.000 m"));
+    let known = hall(&[5.25]) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let page = made(&known, |_| ()).expect("a page");
+    assert!(page.contains("<td>0.010 m, 0.50 deg</td>"));
+}

@@ -23,6 +23,8 @@ pub mod log;
 
 pub mod site;
 
+pub mod inscribe;
+
 pub mod plan;
 
 pub mod cover;

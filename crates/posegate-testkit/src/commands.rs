@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 34] = [
+pub const LINES: [(&str, &str); 35] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
@@ -62,6 +62,7 @@ pub const LINES: [(&str, &str); 34] = [
     ),
     ("seal", "seal {firmware} -o {output}"),
     ("family", "family {site} --tag t7 --r 0.02"),
+    ("inscribe", "inscribe {site} --task dock"),
     (
         "cost",
         "cost {site} --task see-t7 --covariance-file {covariance_file}",

@@ -56,6 +56,20 @@ pub fn browser(given: &Arguments) -> Result {
         .arg("-o")
         .arg(&page)
         .run()?;
+    // A hall of six docks: from candidates to tags, a sheet and a page.
+    let (hall, sheet) = (folder.join("hall.toml"), folder.join("sheet.html"));
+    posegate()
+        .words("cover examples/sites/hall.toml -o")
+        .arg(&hall)
+        .arg("--sheet")
+        .arg(&sheet)
+        .run()?;
+    posegate()
+        .arg("report")
+        .arg(&hall)
+        .arg("-o")
+        .arg(folder.join("hall.html"))
+        .run()?;
     program_at(&python)
         .arg("tests/support/browser.py")
         .arg(&page)

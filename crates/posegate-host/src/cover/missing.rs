@@ -49,7 +49,17 @@ fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
             near => format!(
                 "no candidate is in reach: {near} are near enough to the start or the goal, \
                  but none is seen from near the straight line between these: \
-                 they look elsewhere, or walls hide them"
+                 they look elsewhere, or walls hide them{}",
+                if site
+                    .candidates
+                    .values()
+                    .any(|one| !one.tag.tolerance.is_none())
+                {
+                    " (a wall also hides a tag on it that has a tolerance: \
+                     leave the wall out of `walls` in [planner] look)"
+                } else {
+                    ""
+                }
             ),
         };
     }

@@ -11,8 +11,10 @@ const LEFT: f64 = 66.0;
 const TOP: f64 = 84.0;
 /// The largest panel, pixels.
 const LARGEST: [f64; 2] = [190.0, 190.0];
-/// Space between panels, pixels.
-const GAP: f64 = 40.0;
+/// Space between panels, pixels: beside each other and below each other.
+const GAP: [f64; 2] = [40.0, 62.0];
+/// Panels in a row: with three, a page of A4 shows them at their own size.
+const COLUMNS: usize = 3;
 
 /// Draws the borders at up to five headings, about evenly spaced and the goal's among them. `sections` has headings
 /// relative to the goal's in degrees, with closed polygons in metres of the goal frame.
@@ -38,19 +40,21 @@ pub fn borders_picture(
     let shown: Vec<_> = at.into_iter().filter_map(|k| sections.get(k)).collect();
     let wide = [window.x, window.y].map(|[lo, hi]| hi - lo);
     let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
-    let pitch = wide[0] * scale + GAP;
-    let width = LEFT + pitch * shown.len().max(1) as f64;
-    let mut picture = Picture::new(width.max(620.0), TOP + wide[1] * scale + 44.0, title);
+    let pitch = [0, 1].map(|axis| wide[axis] * scale + GAP[axis]);
+    let width = LEFT + pitch[0] * shown.len().clamp(1, COLUMNS) as f64;
+    let rows = shown.len().div_ceil(COLUMNS).max(1);
+    let height = TOP + pitch[1] * rows as f64 - 18.0;
+    let mut picture = Picture::new(width.max(620.0), height, title);
     picture.text([24.0, 32.0], title, &Font::new(16.0, palette::INK).bold());
     let note = "In the frame of the goal; yaw counts from the goal's.";
     picture.text([24.0, 52.0], note, &Font::new(12.0, palette::FAINT));
     for (number, (yaw_deg, border)) in shown.into_iter().enumerate() {
         let panel = Panel {
             window: *window,
-            left: LEFT + pitch * number as f64,
-            top: TOP,
+            left: LEFT + pitch[0] * (number % COLUMNS) as f64,
+            top: TOP + pitch[1] * (number / COLUMNS) as f64,
             scale,
-            y_title: number == 0,
+            y_title: number.is_multiple_of(COLUMNS),
         };
         let empty = if border.is_empty() { ": empty" } else { "" };
         let title = format!("yaw {}°{empty}", signed(*yaw_deg));

@@ -2,6 +2,7 @@
 //! S.
 
 use super::depth::SlackEvaluator;
+use super::hall::{hall, hall_legend};
 use super::legend::{Sample, legend};
 use super::palette;
 use super::panel::{Panel, Window, tick_at_scale};
@@ -9,6 +10,7 @@ use super::section::border;
 use super::svg::{Font, Picture, Style, literal};
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind, StepReport};
+use crate::site::Site;
 use posegate::shape::SuccessSet;
 
 /// Edge of a panel, pixels.
@@ -22,18 +24,38 @@ const DOWN: f64 = EDGE + 96.0;
 /// Every pose with which a step must be able to begin: the estimate's spread plus its error.
 const NEEDED: Style = Style::outlined("#444444", 1.2).dashed("2 3");
 
-/// Draws a chain; `success` returns the success set of a task by its name.
+/// The largest panel of the hall, pixels.
+const HALL: [f64; 2] = [600.0, 420.0];
+
+/// Draws a chain; `success` returns the success set of a task by its name. With a site, its hall comes first, with the route and
+/// where the robot looks.
 #[must_use]
 pub fn chain_picture<'s>(
     name: &str,
     report: &ChainReport,
     success: &dyn Fn(&str) -> Option<&'s SuccessSet>,
+    site: Option<&Site>,
 ) -> String {
     let columns = report.steps.len().clamp(1, COLUMNS);
     let rows = report.steps.len().div_ceil(COLUMNS).max(1);
     let width = LEFT + columns as f64 * ACROSS + 10.0;
-    let bottom = TOP + rows as f64 * DOWN;
     let title = format!("Chain {}", literal(name));
+    // The hall decides how far down the steps begin: draw it once for its size.
+    let with_hall = |picture: &mut Picture| {
+        let site = site?;
+        let panel = hall(
+            picture,
+            site,
+            &[report],
+            "The hall and the route",
+            [LEFT, TOP + 14.0],
+            HALL,
+        );
+        let legend = [24.0, panel.bottom() + 44.0];
+        Some(legend[1] + hall_legend(picture, legend, true) + 34.0)
+    };
+    let first = with_hall(&mut Picture::new(760.0, 760.0, &title)).unwrap_or(TOP);
+    let bottom = first + rows as f64 * DOWN;
     let mut picture = Picture::new(width.max(760.0), bottom + 96.0, &title);
     picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
     let whole = match report.first_failure() {
@@ -42,9 +64,10 @@ pub fn chain_picture<'s>(
     };
     let colour = palette::of_words(report.succeeds());
     picture.text([24.0, 54.0], &whole, &Font::new(14.0, colour));
+    with_hall(&mut picture);
     for (index, step) in report.steps.iter().enumerate() {
         let left = LEFT + (index % COLUMNS) as f64 * ACROSS;
-        let top = TOP + 14.0 + (index / COLUMNS) as f64 * DOWN;
+        let top = first + 14.0 + (index / COLUMNS) as f64 * DOWN;
         let set = step.task.as_deref().and_then(success);
         panel(&mut picture, [left, top], index, step, set);
     }

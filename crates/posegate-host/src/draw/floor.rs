@@ -1,6 +1,7 @@
 //! Things on a floor plan: walls, tags, cameras, robots.
 
 use super::ingredients::{Eye, axes, frame};
+use super::measure::{fitted, text_width};
 use super::palette;
 use super::panel::{Inside, Window};
 use super::section::border;
@@ -73,6 +74,84 @@ impl Inside<'_> {
     }
 }
 
+/// Names on a floor plan that do not overlap.
+#[derive(Debug, Default)]
+pub struct Labels {
+    /// Left, top, right, bottom in the picture, pixels, and how bad it is to cover them.
+    boxes: Vec<([f64; 4], u32)>,
+}
+
+impl Labels {
+    const SIZE: f64 = 11.0;
+    /// How bad it is to cover a name, and a part of the drawing.
+    const NAME: u32 = 1000;
+    const DRAWN: u32 = 1;
+
+    /// Keeps names off the pixels about a point of the floor.
+    pub fn avoid(&mut self, inside: &mut Inside<'_>, at: [f64; 2], reach: f64) {
+        inside.in_pixels(|_, panel| {
+            let [x, y] = panel.at(at);
+            let about = [x - reach, y - reach, x + reach, y + reach];
+            self.boxes.push((about, Self::DRAWN));
+        });
+    }
+
+    /// Draws a name near a point of the floor, at the first of several places where it overlaps no other name; at the first one
+    /// if there is no such place.
+    pub fn place(&mut self, inside: &mut Inside<'_>, at: [f64; 2], text: &str) {
+        inside.in_pixels(|picture, panel| {
+            let text = fitted(text, Self::SIZE, true, panel.width() - 8.0);
+            let wide = text_width(&text, Self::SIZE, true);
+            let [x, y] = panel.at(at);
+            let place = |dx: f64, dy: f64| {
+                let within = |v: f64, lo: f64, hi: f64| v.min(hi).max(lo);
+                let left = panel.left + 4.0;
+                let x = within(
+                    x + dx,
+                    left,
+                    (panel.left + panel.width() - wide - 4.0).max(left),
+                );
+                let y = within(y + dy, panel.top + 13.0, panel.bottom() - 4.0);
+                [x, y - 11.0, x + wide, y + 4.0]
+            };
+            let sides = [8.0, -8.0 - wide, -0.5 * wide, 30.0, -30.0 - wide];
+            let mut offsets: Vec<[f64; 2]> = Vec::new();
+            for row in 0..7 {
+                let dy = 14.0 * f64::from(row);
+                offsets.extend(
+                    sides
+                        .iter()
+                        .flat_map(|dx| [[*dx, -8.0 - dy], [*dx, 18.0 + dy]]),
+                );
+            }
+            let far = |[dx, dy]: &[f64; 2]| libm::hypot(dx + 0.5 * wide, dy - 4.0);
+            offsets.sort_by(|a, b| far(a).total_cmp(&far(b)));
+            let overlaps = |a: &[f64; 4]| -> u32 {
+                let meets =
+                    |b: &[f64; 4]| !(a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1]);
+                let met = self.boxes.iter().filter(|(b, _)| meets(b));
+                met.map(|(_, bad)| bad).sum()
+            };
+            let all = offsets.into_iter().map(|[dx, dy]| place(dx, dy));
+            // The first of those that cover the least; no name covers another one where there is another place.
+            let chosen = all.min_by_key(overlaps);
+            let Some([left, top, right, bottom]) = chosen else {
+                return;
+            };
+            self.boxes.push(([left, top, right, bottom], Self::NAME));
+            let near = [x.clamp(left, right), y.clamp(top, bottom)];
+            if libm::hypot(near[0] - x, near[1] - y) > 16.0 {
+                picture.line(&[[x, y], near], &Style::outlined(palette::FAINT, 0.8));
+            }
+            let ground = Style::filled("none").with_fill_opacity("#ffffff", 0.8);
+            let size = [right - left, bottom - top];
+            picture.rectangle([left - 1.0, top, size[0] + 1.0, size[1]], &ground);
+            let font = Font::new(Self::SIZE, palette::INK).bold();
+            picture.text([left, top + 11.0], &text, &font);
+        });
+    }
+}
+
 /// Returns polygons of the floor that a camera sees at the height of its tag, up to the largest distance of
 /// the tag. The view of a lens ends at its window.
 #[must_use]
@@ -93,4 +172,56 @@ pub fn seen(
             && planes.contains([-left / depth, -up / depth])
     };
     border(&inside, window, spacing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::panel::Panel;
+    use crate::draw::svg::Picture;
+
+    /// A row of docks below a wall of tags, with drawn parts everywhere about them: names cover those rather than each other.
+    #[test]
+    fn names_do_not_cover_each_other() {
+        let panel = Panel {
+            window: Window {
+                x: [0.0, 24.0],
+                y: [0.0, 12.0],
+            },
+            left: 66.0,
+            top: 50.0,
+            scale: 25.0,
+            y_title: true,
+        };
+        let mut picture = Picture::new(700.0, 400.0, "names");
+        let mut labels = Labels::default();
+        panel.draw(&mut picture, "", 5.0, |inside| {
+            for column in 0..240 {
+                for row in 0..30 {
+                    let at = [0.1 * f64::from(column), 6.0 + 0.2 * f64::from(row)];
+                    labels.avoid(inside, at, 3.0);
+                }
+            }
+            for number in 0..6 {
+                let x = 3.0 + 3.0 * f64::from(number);
+                labels.place(inside, [x, 9.0], &format!("dock-{number}"));
+                labels.place(
+                    inside,
+                    [x + 0.7, 10.0],
+                    &format!("north-{number}, id {number}"),
+                );
+            }
+        });
+        let names = labels.boxes.iter().filter(|(_, bad)| *bad == Labels::NAME);
+        let names: Vec<&[f64; 4]> = names.map(|(name, _)| name).collect();
+        assert_eq!(names.len(), 12);
+        for (number, a) in names.iter().enumerate() {
+            for b in &names[number + 1..] {
+                assert!(
+                    a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1],
+                    "{a:?} {b:?}"
+                );
+            }
+        }
+    }
 }

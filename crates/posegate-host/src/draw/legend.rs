@@ -16,6 +16,8 @@ pub enum Sample {
     Line(Style),
     /// A hatched patch.
     Hatched(Style),
+    /// A success set of the paper's figures.
+    SuccessSet,
     /// Nothing: the text continues the line above.
     Words,
 }
@@ -40,6 +42,14 @@ pub fn legend(picture: &mut Picture, [left, top]: [f64; 2], entries: &[(Sample, 
                 let corners = corners.map(|[x, y]| [left + x, middle + y]);
                 picture.path(&hatching(&corners), style);
                 picture.rectangle([left, middle - 6.0, 24.0, 12.0], style);
+            }
+            Sample::SuccessSet => {
+                let corners = [[0.0, -6.0], [24.0, -6.0], [24.0, 6.0], [0.0, 6.0]];
+                let corners = corners.map(|[x, y]| [left + x, middle + y]);
+                let edges = [left, middle - 6.0, 24.0, 12.0];
+                picture.rectangle(edges, &palette::PAPER_AREA);
+                picture.path(&hatching(&corners), &palette::PAPER_HATCH);
+                picture.rectangle(edges, &palette::PAPER_BORDER);
             }
             Sample::Words => {}
         }

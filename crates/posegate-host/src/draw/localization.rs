@@ -3,10 +3,11 @@
 use super::legend::{Sample, legend, row_heading, verdict, words};
 use super::multiple::Row;
 use super::palette;
-use super::panel::{Inside, Panel, Window};
+use super::panel::{Inside, Panel, Window, signed};
 use super::report::chain;
 use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
-use super::svg::{Font, Picture};
+use super::svg::{Font, Picture, Style};
+use crate::inscribe::{InscribedBox, inscribed_box};
 use posegate::shape::{Shape, Visibility};
 
 const WIDTH: f64 = 1200.0;
@@ -16,7 +17,9 @@ const LEFT: f64 = 66.0;
 const PITCH: f64 = 287.0;
 
 /// The headings of S_l's sections, degrees; they include the ends of the pose-sets.
-const SEE_DEG: [f64; 7] = [-10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0];
+const SEE_DEG: [f64; 5] = [-8.0, -2.0, 0.0, 2.0, 8.0];
+/// The names of these panels.
+const NAMES: [&str; 5] = ["(a) ", "(b) ", "(c) ", "(d) ", "(e) "];
 /// The headings of S_w's sections, degrees.
 const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
 
@@ -35,7 +38,7 @@ pub fn fig3_sections(study: &CaseStudy) -> Result<String, StudyError> {
         verdict(&mut picture, at, step.answer.holds(), &bold, step.meaning);
     }
     see(study, &mut picture)?;
-    explain(&mut picture, [LEFT + PITCH * 3.0 - 24.0, 392.0]);
+    explain(study, &mut picture, [LEFT + PITCH * 1.0 + 4.0, 388.0])?;
     dock(study, &mut picture)?;
     Ok(picture.finish())
 }
@@ -58,7 +61,7 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
         answers: &answers,
         tick: 1.0,
     };
-    let end = end_of_table(study)?;
+    let boxes = boxes(study)?;
     for (index, yaw_deg) in SEE_DEG.into_iter().enumerate() {
         let panel = Panel {
             window: Window {
@@ -70,8 +73,15 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
             scale: 39.0,
             y_title: index % 4 == 0,
         };
-        row.draw(picture, &panel, yaw_deg, "", |inside| {
-            inside.polygons(&end, &palette::EXTENT);
+        row.draw(picture, &panel, NAMES[index], yaw_deg, "", |inside| {
+            for (inscribed, style) in boxes.iter().zip(BOXES) {
+                let [low, high] = inscribed.yaw_deg;
+                if (low..=high).contains(&yaw_deg) {
+                    let ([x0, x1], [y0, y1]) = (inscribed.x, inscribed.y);
+                    let corners = std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+                    inside.polygons(&[corners], &style);
+                }
+            }
             tag(inside, sight);
             if yaw_deg == 0.0 {
                 for answer in &answers {
@@ -83,39 +93,51 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
     Ok(())
 }
 
+/// The styles of the boxes inside S_l.
+const BOXES: [Style; 2] = [
+    palette::PAPER_BOX,
+    Style::outlined("#222222", 1.6).dashed("9 3"),
+];
+
+/// Returns boxes that are proven inside S_l (the paper's TSR_l): a large one, and one for the headings of the pose-sets.
+fn boxes(study: &CaseStudy) -> Result<[InscribedBox; 2], StudyError> {
+    let success = &study.task(SEE)?.success;
+    let found =
+        |yaw_deg| inscribed_box(success, yaw_deg).ok_or_else(|| StudyError::Shape(SEE.into()));
+    Ok([found(None)?, found(Some(2.0))?])
+}
+
 /// Draws the legend.
-fn explain(picture: &mut Picture, [left, top]: [f64; 2]) {
+fn explain(
+    study: &CaseStudy,
+    picture: &mut Picture,
+    [left, top]: [f64; 2],
+) -> Result<(), StudyError> {
     let entries = [
-        (Sample::Line(palette::BORDER), "exact border of the set"),
+        (Sample::SuccessSet, "success set S at this heading"),
         (
-            Sample::Patch(palette::CELLS),
-            "covered by the table: proven",
+            Sample::Disc(palette::PAPER_SET),
+            "pose-set X\u{302} about the goal, where its yaw interval has the heading",
         ),
-        (Sample::Disc(palette::INSIDE), "pose-set that is inside"),
-        (
-            Sample::Disc(palette::NOT_INSIDE),
-            "pose-set that is not inside",
-        ),
-        (Sample::Line(palette::EXTENT), "end of the table"),
         (Sample::Line(palette::TAG), "tag t7, facing the goal"),
     ];
     legend(picture, [left, top], &entries);
-    let notes = [
-        "Pose-sets are about the goal, and drawn",
-        "where their yaw interval has the heading.",
-    ];
-    for (index, note) in notes.into_iter().enumerate() {
-        let at = [left, top + 144.0 + 16.0 * index as f64];
-        picture.text(at, note, &Font::new(12.0, palette::FAINT));
+    for (number, (inscribed, style)) in boxes(study)?.into_iter().zip(BOXES).enumerate() {
+        let text = format!("box TSR_l in S_l, proven: {}", in_words(&inscribed));
+        let at = [left, top + 63.0 + 21.0 * number as f64];
+        legend(picture, at, &[(Sample::Line(style), &text)]);
     }
+    Ok(())
 }
 
-/// Returns the outline of S_l's table.
-pub(super) fn end_of_table(study: &CaseStudy) -> Result<[Vec<[f64; 2]>; 1], StudyError> {
-    let spec = study.site.table_spec(study.task(SEE)?);
-    let extent = spec.ok_or_else(|| StudyError::NoTable(SEE.into()))?.extent;
-    let [[x0, x1], [y0, y1]] = [extent.x, extent.y];
-    Ok([std::vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]]])
+fn in_words(inscribed: &InscribedBox) -> String {
+    let ends = |[lo, hi]: [f64; 2]| format!("{} to {}", signed(lo), signed(hi));
+    format!(
+        "x {} m, y {} m, yaw {}°",
+        ends(inscribed.x),
+        ends(inscribed.y),
+        ends(inscribed.yaw_deg)
+    )
 }
 
 /// Draws the tag's edge from above.
@@ -168,7 +190,7 @@ fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
         y_title: index == 0,
     };
     for (index, yaw_deg) in DOCK_DEG.into_iter().enumerate() {
-        row.draw(picture, &square(index, 0.12), yaw_deg, "", |inside| {
+        row.draw(picture, &square(index, 0.12), "", yaw_deg, "", |inside| {
             inside.label([-0.115, -0.113], [0.0, 0.0], &fits, 108.0, fits_colour);
             let text = format!("{sticks_out}, covers all");
             inside.label([-0.115, 0.1], [0.0, 0.0], &text, 196.0, out_colour);
@@ -176,7 +198,7 @@ fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
     }
     let wide = Row { tick: 0.6, ..row };
     let note = ", ten times as wide";
-    wide.draw(picture, &square(3, 1.2), 0.0, note, |inside| {
+    wide.draw(picture, &square(3, 1.2), "", 0.0, note, |inside| {
         inside.label([-1.15, 1.06], [0.0, 0.0], &sticks_out, 128.0, out_colour);
         inside.label([0.1, 0.0], [2.0, 4.0], "S_w", 24.0, palette::INK);
     })

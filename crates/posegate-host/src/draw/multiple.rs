@@ -1,11 +1,10 @@
-//! One of several small panels: a success set, its table and pose-sets about the goal, at one
-//! heading.
+//! One of several small panels: a success set and pose-sets about the goal, at one heading.
 
 use super::palette;
 use super::panel::{Inside, Panel, signed};
-use super::section::{covered, outline};
+use super::section::outline;
 use super::study::{Answer, CaseStudy, PoseSetSpec, StudyError};
-use super::svg::{Picture, Style};
+use super::svg::Picture;
 
 /// The data that all panels of a row share.
 pub struct Row<'a> {
@@ -20,11 +19,12 @@ pub struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Draws the panel of a heading; `more` adds to its content.
+    /// Draws the panel of a heading, titled with a name, the heading and a note; `more` adds to its content.
     pub fn draw(
         &self,
         picture: &mut Picture,
         panel: &Panel,
+        name: &str,
         yaw_deg: f64,
         note: &str,
         more: impl FnOnce(&mut Inside<'_>),
@@ -32,30 +32,24 @@ impl Row<'_> {
         let success = &self.study.task(self.task)?.success;
         // A finer border than a pixel is not visible.
         let border = outline(success, yaw_deg, &panel.window, 1.0 / panel.scale);
-        let cells = covered(&self.study.table(self.task)?, yaw_deg);
-        let title = format!("yaw {}°{note}", signed(yaw_deg));
+        let title = format!("{name}yaw {}°{note}", signed(yaw_deg));
         panel.draw(picture, &title, self.tick, |inside| {
-            // Pose-sets that do not fit are drawn below the success set: the part visible on white
-            // sticks out.
-            self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE);
-            inside.cells(&cells, &palette::CELLS);
-            inside.polygons(&border, &palette::BORDER);
-            self.pose_sets(inside, yaw_deg, false, &palette::NOT_INSIDE.without_fill());
-            self.pose_sets(inside, yaw_deg, true, &palette::INSIDE);
+            inside.success_set(&border);
+            self.pose_sets(inside, yaw_deg);
             more(inside);
         });
         Ok(())
     }
 
-    fn pose_sets(&self, inside: &mut Inside<'_>, yaw_deg: f64, holds: bool, style: &Style) {
-        for answer in self.answers.iter().filter(|a| a.holds() == holds) {
+    fn pose_sets(&self, inside: &mut Inside<'_>, yaw_deg: f64) {
+        for answer in self.answers {
             if let PoseSetSpec::Bounded {
                 translation,
                 yaw_deg: bound,
             } = answer.known
                 && yaw_deg.abs() <= bound
             {
-                inside.disc([0.0, 0.0], translation, style);
+                inside.disc([0.0, 0.0], translation, &palette::PAPER_SET);
             }
         }
     }

@@ -40,6 +40,19 @@ pub const VIEW: Style = Style::outlined("#8a6d00", 1.4)
 /// A tag.
 pub const TAG: Style = Style::outlined("#222222", 5.0);
 
+/// The inside of a success set in the paper's figures: red, and also hatched.
+pub const PAPER_AREA: Style = Style::filled("#f6c9c4");
+/// The hatching of a success set in the paper's figures.
+pub const PAPER_HATCH: Style = Style::outlined("#b3001b", 0.6);
+/// The border of a success set in the paper's figures: red and solid.
+pub const PAPER_BORDER: Style = Style::outlined("#b3001b", 1.8);
+/// A pose-set in the paper's figures: blue, and also dashed.
+pub const PAPER_SET: Style = Style::outlined("#0050a0", 2.0)
+    .with_fill_opacity("#0072b2", 0.28)
+    .dashed("6 3");
+/// A box inside a success set: black and dotted.
+pub const PAPER_BOX: Style = Style::outlined("#222222", 1.6).dashed("2 2");
+
 /// Returns the style of a pose-set.
 #[must_use]
 pub const fn of_set(inside: bool) -> Style {

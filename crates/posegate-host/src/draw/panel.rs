@@ -158,6 +158,16 @@ impl Inside<'_> {
         self.picture.path(&data, style);
     }
 
+    /// Draws the inside and the border of a success set as the paper's figures do.
+    pub fn success_set(&mut self, polygons: &[Vec<[f64; 2]>]) {
+        self.polygons(polygons, &palette::PAPER_AREA);
+        for polygon in polygons {
+            let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
+            self.picture.path(&hatching(&points), &palette::PAPER_HATCH);
+        }
+        self.polygons(polygons, &palette::PAPER_BORDER);
+    }
+
     /// Draws a convex polygon with a hatched inside.
     pub fn hatched(&mut self, polygon: &[[f64; 2]], style: &Style) {
         let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
@@ -230,7 +240,7 @@ impl Inside<'_> {
     }
 }
 
-/// Returns path data of lines from the lower left to the upper right over a convex polygon, in pixels.
+/// Returns path data of lines from the lower left to the upper right over a polygon, in pixels.
 pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
     // Lines x + y = c.
     let heights = || polygon.iter().map(|[x, y]| x + y);
@@ -247,7 +257,11 @@ pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
                 crossed.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
             }
         }
-        if let [from, to] = crossed.as_slice() {
+        // Along a line the inside begins and ends in turn.
+        if crossed.len() > 2 {
+            crossed.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        }
+        for [from, to] in crossed.as_chunks().0 {
             data += &points_path(&[*from, *to]);
         }
     }

@@ -50,7 +50,7 @@ pub fn placement_picture(title: &str, columns: &[Column]) -> String {
         .fold(2.0, |reach: f64, column| reach.max(wide(column)));
     let bottom = FLOOR + FLOOR_HEIGHT;
     let width = LEFT + PITCH * columns.len().max(2) as f64;
-    let mut picture = Picture::new(width, bottom + 216.0, title);
+    let mut picture = Picture::new(width, bottom + 256.0, title);
     picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
     for (number, column) in columns.iter().enumerate() {
         let left = LEFT + PITCH * number as f64;
@@ -61,19 +61,23 @@ pub fn placement_picture(title: &str, columns: &[Column]) -> String {
             image(&mut picture, left, column, view);
         }
         floor(&mut picture, left, column, &views, reach, number == 0);
-        words(&mut picture, [left, bottom + 52.0], &column.placed);
+        words(&mut picture, [left, bottom + 52.0], column);
     }
     legend(
         &mut picture,
-        [LEFT, bottom + 166.0],
+        [LEFT, bottom + 182.0],
         &[
             (
                 Sample::Patch(FROM_GOAL),
                 "image: the tag from the goal; dots: its four corners from the pose-set's border",
             ),
             (
-                Sample::Line(palette::BORDER),
-                "floor: S at the goal's heading, the tag and where it looks, and the pose-set about the goal (green: proven inside)",
+                Sample::SuccessSet,
+                "floor: S_l at the goal's heading, with the tag and where it looks",
+            ),
+            (
+                Sample::Disc(palette::PAPER_SET),
+                "floor: the pose-set X\u{302} about the goal; the line of the margin says whether all of it is in S_l",
             ),
         ],
     );
@@ -180,10 +184,9 @@ fn floor(
     let inside = |[x, y]: [f64; 2]| column.set.membership([x, y, heading]).inside;
     let area = border(&inside, &panel.window, 1.5 / scale);
     panel.draw(picture, "", tick_at_scale(scale, 48.0), |inside| {
-        inside.polygons(&area, &palette::AREA);
-        inside.polygons(&area, &palette::BORDER);
+        inside.success_set(&area);
         if let Some(section) = drawn(column).and_then(|belief| belief.section(heading)) {
-            inside.polygons(&[section], &palette::of_set(column.placed.contained));
+            inside.polygons(&[section], &palette::PAPER_SET);
         }
         inside.pose(goal, &Style::outlined(palette::INK, 2.0));
         for view in views {
@@ -202,7 +205,41 @@ fn direction(column: &Column, goal: PoseDeg) -> [f64; 2] {
     }
 }
 
-fn words(picture: &mut Picture, [left, top]: [f64; 2], placed: &Placed) {
+/// Returns the distance from the goal to the nearest border of the set at the goal's heading, metres, for a picture: along 120
+/// directions, by steps of 2 cm and then halving. `None` if the goal is not in the set.
+fn to_border(set: &SuccessSet) -> Option<f64> {
+    let [x, y, heading] = radians(set.goal);
+    let holds = |angle: f64, far: f64| {
+        let at = [x + far * libm::cos(angle), y + far * libm::sin(angle)];
+        set.membership([at[0], at[1], heading]).inside
+    };
+    if !holds(0.0, 0.0) {
+        return None;
+    }
+    const STEP: f64 = 0.02;
+    let mut nearest = 20.0;
+    for direction in 0..120 {
+        let angle = f64::from(direction) * core::f64::consts::TAU / 120.0;
+        let mut far = 0.0;
+        while far < nearest && holds(angle, far + STEP) {
+            far += STEP;
+        }
+        let (mut inside, mut outside) = (far, far + STEP);
+        for _ in 0..12 {
+            let middle = 0.5 * (inside + outside);
+            if holds(angle, middle) {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        nearest = inside.min(nearest);
+    }
+    Some(nearest)
+}
+
+fn words(picture: &mut Picture, [left, top]: [f64; 2], column: &Column) {
+    let placed = &column.placed;
     let pose = placed.pose;
     let mut lines = std::vec![
         format!(
@@ -231,6 +268,10 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], placed: &Placed) {
             }
         ));
     }
+    lines.push(match to_border(&column.set) {
+        Some(distance) => format!("border of S_l: {distance:.2} m from the goal"),
+        None => "the goal is not in S_l".to_owned(),
+    });
     let off = placed.tolerance();
     if !off.is_none() {
         lines.push(format!(

@@ -1,10 +1,10 @@
 //! The floor plan of Fig. 3: the camera's view at the goal, and the robot's pose-sets.
 
 use super::legend::{Sample, legend, verdict, words};
-use super::localization::{end_of_table, tag};
+use super::localization::tag;
 use super::palette;
 use super::panel::{Inside, Panel, Window};
-use super::section::{covered, outline};
+use super::section::outline;
 use super::study::{CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
 use super::svg::{Font, Picture, Style};
 use posegate::shape::{Shape, Visibility};
@@ -39,20 +39,15 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
         y_title: true,
     };
     let border = outline(success, 0.0, &panel.window, 1.0 / panel.scale);
-    let cells = covered(&study.table(SEE)?, 0.0);
-    let end = end_of_table(study)?;
     panel.draw(&mut picture, "S_l at yaw 0°", 1.0, |inside| {
         let wedge = [view(sight)];
         inside.polygons(&wedge, &VIEW);
-        inside.cells(&cells, &palette::CELLS);
+        inside.success_set(&border);
         inside.polygons(&wedge, &VIEW.without_fill());
-        inside.polygons(&border, &palette::BORDER);
-        inside.polygons(&end, &palette::EXTENT);
         inside.line(&facing(sight), &CONE);
         for answer in [&before, &after] {
             if let PoseSetSpec::Bounded { translation, .. } = answer.known {
-                let style = palette::of_set(answer.holds());
-                inside.disc([0.0, 0.0], translation, &style);
+                inside.disc([0.0, 0.0], translation, &palette::PAPER_SET);
             }
         }
         robot(inside, sight);
@@ -93,18 +88,13 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
         &mut picture,
         [left, 176.0],
         &[
-            (
-                Sample::Line(palette::BORDER),
-                "exact border of S_l at yaw 0°",
-            ),
-            (
-                Sample::Patch(palette::CELLS),
-                "covered by S_l's table: proven",
-            ),
-            (Sample::Line(palette::EXTENT), "end of S_l's table"),
+            (Sample::SuccessSet, "S_l at yaw 0°"),
             (Sample::Patch(VIEW), "the camera's view at the goal"),
             (Sample::Line(CONE), &psi),
-            (Sample::Disc(palette::INSIDE), "pose-sets about the goal"),
+            (
+                Sample::Disc(palette::PAPER_SET),
+                "pose-sets X\u{302} about the goal",
+            ),
         ],
     );
     Ok(picture.finish())

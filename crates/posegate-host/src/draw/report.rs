@@ -96,10 +96,12 @@ struct Numbers<'a> {
 struct TableNumbers<'a> {
     task: &'a str,
     bytes: usize,
+    layout: &'static str,
     /// Columns, rows, slabs.
     cells: [u16; 3],
     proven_cells: u64,
     proven_runs: u64,
+    proven_corners: u64,
     bake_s: f64,
     prove_s: f64,
 }
@@ -180,9 +182,11 @@ pub fn numbers(study: &CaseStudy) -> Result<String, StudyError> {
         tables.push(TableNumbers {
             task: &proven.task,
             bytes: proven.bytes.len(),
+            layout: "facets",
             cells: [cells.columns, cells.rows, cells.slabs],
             proven_cells: proven.proof.cells,
             proven_runs: proven.proof.runs,
+            proven_corners: proven.proof.corners,
             bake_s: proven.bake_s,
             prove_s: proven.prove_s,
         });
@@ -243,10 +247,10 @@ pub fn summary(study: &CaseStudy) -> Result<String, StudyError> {
     for table in &study.tables {
         let _ = writeln!(
             text,
-            "  {:<8} {:>6} bytes, {:>7} cells inside; baked in {:.0} ms, proven in {:.0} ms",
+            "  {:<8} {:>6} bytes of facets, {:>5} corners; baked in {:.0} ms, proven in {:.0} ms",
             table.task,
             table.bytes.len(),
-            table.proof.cells,
+            table.proof.corners,
             table.bake_s * 1e3,
             table.prove_s * 1e3,
         );

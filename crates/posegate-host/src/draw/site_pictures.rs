@@ -7,7 +7,7 @@ use crate::site::Site;
 /// Draws the pictures of a site. Returns file names and SVG texts.
 #[must_use]
 pub fn site_pictures(site: &Site) -> Vec<(String, String)> {
-    let mut files = vec![("site.svg".to_owned(), site_plan(site))];
+    let mut files = vec![("site.svg".to_owned(), site_plan(site, &[]))];
     let mut add = |kind: &str, name: &str, text: String| {
         // Names may contain any character; keep only those that every system accepts in file names.
         let plain = |c: char| {

@@ -15,7 +15,7 @@ use super::fig4;
 use super::placement::Column;
 use crate::log::{coordinates, factor, factor_text};
 use crate::site::{Site, SiteError, Task, UnknownTask};
-use posegate::bake::{self, BakeError, BakeInput};
+use posegate::bake::{self, BakeError, BakeInput, Layout};
 use posegate::contain::Margin;
 use posegate::gate::{Verdict, judge};
 use posegate::set::{Estimate, InputError, PoseSet};
@@ -367,9 +367,10 @@ fn proven(
     task: &Task,
     progress: &(dyn Fn() + Sync),
 ) -> Result<ProvenTable, StudyError> {
-    let order = order(site, name, task)?;
+    let mut order = order(site, name, task)?;
+    order.spec.layout = Layout::Facets;
     let started = Instant::now();
-    let bytes = bake::grid(&order, progress).map_err(|e| StudyError::Bake(name.into(), e))?;
+    let bytes = bake::table(&order, progress).map_err(|e| StudyError::Bake(name.into(), e))?;
     let bake_s = started.elapsed().as_secs_f64();
     let claim = ExpectedTable {
         task: name,

@@ -4,15 +4,15 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::figures::base64;
+use super::start::first_sigmas;
 use crate::draw::panel::Window;
 use crate::draw::site_plan;
-use crate::draw::{DrawError, Mounted, Subject, chain_picture, mounting_sheet};
+use crate::draw::{DrawError, Mounted, Subject, chain_picture, mounting_sheet, success_of};
 use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
 use crate::plan::{ChainReport, Options, Plans, evaluate};
 use crate::site::{Site, Task};
 use posegate::bake;
 use posegate::chain::StartAssumption;
-use posegate::shape::SuccessSet;
 use posegate::table::Table;
 use posegate::verify::{Proof, build};
 
@@ -118,12 +118,22 @@ impl Contents {
                 (name.clone(), shown)
             })
             .collect();
+        let (chains, plans) = (chains(site), plans(site));
+        let found = |list: &[ShownChain]| -> Vec<ChainReport> {
+            let found = list.iter().filter_map(|shown| shown.found.as_ref().ok());
+            found.map(|(report, _)| report.clone()).collect()
+        };
+        // Routes that the planner found; without plans those of the chains in the site file.
+        let mut routes = found(&plans);
+        if routes.is_empty() {
+            routes = found(&chains);
+        }
         let mut contents = Self {
-            plan: site_plan(site),
+            plan: site_plan(site, &routes.iter().collect::<Vec<_>>()),
             tasks: Vec::new(),
             left_out: Vec::new(),
-            chains: chains(site),
-            plans: plans(site),
+            chains,
+            plans,
             sheet: sheet(site),
         };
         for (name, shown) in tasks {
@@ -243,12 +253,8 @@ fn plans(site: &Site) -> Vec<ShownChain> {
 }
 
 fn with_picture(site: &Site, name: &str, report: ChainReport) -> (ChainReport, String) {
-    let success = |name: &str| -> Option<&SuccessSet> {
-        let made = site.planner.looks.get(name).map(|look| &look.success);
-        let own = site.tasks.get(name).map(|task| &task.success);
-        own.or(made)
-    };
-    let picture = chain_picture(name, &report, &success);
+    let success = |name: &str| success_of(site, name);
+    let picture = chain_picture(name, &report, &success, Some(site));
     (report, picture)
 }
 
@@ -262,10 +268,9 @@ fn sheet(site: &Site) -> Option<String> {
             tag: tag.tag,
             reserve: (!tag.tolerance.is_none()).then_some(tag.tolerance),
             left: None,
-            on: "where the site file says".to_owned(),
         })
         .collect();
-    (!tags.is_empty()).then(|| mounting_sheet("Mounting sheet", &tags))
+    (!tags.is_empty()).then(|| mounting_sheet("Mounting sheet", &tags, &site.walls))
 }
 
 impl Shown {
@@ -282,20 +287,11 @@ impl Shown {
             .iter()
             .map(|(_, rings)| rings.iter().map(flat).collect())
             .collect();
-        let radius = self
-            .table
-            .as_ref()
-            .ok()
-            .and_then(|(bytes, _)| Table::parse(bytes).ok())
-            .map_or(3.0, |table| {
-                libm::sqrt(f64::from(table.radius_squared().q16()) / 65_536.0)
-            });
-        // Standard deviations whose pose-set is as large as the expected one, or a twentieth of the window.
+        // The sigmas whose pose-set is as large as the expected one, or well inside.
         let wide = (self.window.x[1] - self.window.x[0]).min(self.window.y[1] - self.window.y[0]);
-        let (translation, turn_deg) = task.wish.expected.map_or((0.05 * wide, 1.0), |expected| {
-            (expected.translation, expected.turn_deg)
-        });
-        let sigma = |reach: f64| libm::round(reach / radius * 1e4) / 1e4;
+        let table = self.table.as_ref().ok();
+        let table = table.and_then(|(bytes, _)| Table::parse(bytes).ok());
+        let sigma = first_sigmas(task, wide, table.as_ref());
         Some(json!({
             "name": self.name,
             "goal": { "x": goal.x, "y": goal.y, "yaw_deg": goal.yaw_deg },
@@ -305,7 +301,7 @@ impl Shown {
             "sections": { "headings": headings, "polygons": polygons },
             "start": {
                 "at": [0.0, 0.0, 0.0],
-                "sigma": [sigma(translation), sigma(translation), sigma(turn_deg)],
+                "sigma": sigma,
             },
         }))
     }

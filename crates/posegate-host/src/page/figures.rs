@@ -62,6 +62,14 @@ pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
+/// Returns content that is folded under a title.
+pub(super) fn folded(title: &str, inside: &str) -> String {
+    format!(
+        "<details><summary>{}</summary>\n{inside}</details>\n",
+        escaped(title)
+    )
+}
+
 /// Returns the numbers of a figure as a folded table with a title.
 pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     format!(

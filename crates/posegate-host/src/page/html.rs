@@ -2,8 +2,10 @@
 
 use serde_json::{Value, json};
 
+use super::alike::{alike, area};
 use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
-use super::figures::{base64, escaped, figure, numbers, table};
+use super::figures::{base64, escaped, figure, folded, numbers, table};
+use super::summary::{summary, text as margin_text, worst};
 use crate::draw::{SeenFrom, Subject, borders_picture, task_plan};
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind};
@@ -30,8 +32,8 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         .collect();
     let sections = [
         ("plan", "The site", plan(site, contents)),
+        ("chains", "Plans and chains", chains(contents)),
         ("tasks", "Tasks", tasks(site, contents)),
-        ("chains", "Chains", chains(contents)),
         ("placements", "Where tags hang best", placements),
         ("pictures", "Pictures", pictures.join("")),
         ("tags", "Mounting sheet", tags(site, contents)),
@@ -70,6 +72,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         ("version", env!("CARGO_PKG_VERSION").to_string()),
         ("digest", digest),
         ("nav", nav.join("")),
+        ("summary", summary(site, contents)),
         ("options", options.join("")),
         ("style", STYLE.trim().into()),
         ("core", CORE_SCRIPT.into()),
@@ -98,7 +101,7 @@ fn filled(template: &str, parts: &[(&str, String)]) -> String {
 fn plan(site: &Site, contents: &Contents) -> String {
     let mut text = figure(
         &contents.plan,
-        "The site from above: walls, tags and which way they look, goals",
+        "The site from above: walls, tags and which way they look, goals, routes and where the robots look",
     );
     let rows: Vec<Vec<String>> = site
         .tasks
@@ -191,15 +194,40 @@ fn tasks(site: &Site, contents: &Contents) -> String {
         ],
         &rows,
     );
-    for shown in &contents.tasks {
-        text += &one_task(shown);
+    for group in alike(site, &contents.tasks) {
+        let Some((first, others)) = group.split_first() else {
+            continue;
+        };
+        text += &one_task(first, others);
     }
     text
 }
 
-fn one_task(shown: &Shown) -> String {
+/// Returns the figures of a task. Those of tasks that are alike are folded.
+fn one_task(shown: &Shown, others: &[&Shown]) -> String {
     let name = escaped(&shown.name);
     let mut text = format!("<h3 id=\"task-{name}\">{name}</h3>\n");
+    if !others.is_empty() {
+        let names: Vec<&str> = others.iter().map(|other| other.name.as_str()).collect();
+        text += &format!(
+            "<p>{} tasks are alike in the frames of their goals. The pictures are those of {name}; the same holds for {}.</p>\n",
+            others.len() + 1,
+            escaped(&names.join(", "))
+        );
+    }
+    text += &figures_of(shown);
+    let folds = others.iter().map(|other| {
+        let name = escaped(&other.name);
+        folded(
+            &format!("the pictures of {}", other.name),
+            &format!("<h3 id=\"task-{name}\">{name}</h3>\n{}", figures_of(other)),
+        )
+    });
+    text + &folds.collect::<String>()
+}
+
+fn figures_of(shown: &Shown) -> String {
+    let mut text = String::new();
     text += &figure(
         &borders_picture(
             &format!("Success set S of {}", shown.name),
@@ -298,40 +326,62 @@ fn seen_from(seen: &SeenFrom) -> Vec<String> {
     ]
 }
 
-/// Returns the area of a ring, negative if it is clockwise.
-fn area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    let twice: f64 = ring
-        .iter()
-        .zip(next)
-        .map(|([ax, ay], [bx, by])| ax * by - ay * bx)
-        .sum();
-    0.5 * twice
-}
-
 fn chains(contents: &Contents) -> String {
-    let mut text = String::new();
+    let mut rows = Vec::new();
+    let mut more = String::new();
     for (what, list) in [("chain", &contents.chains), ("plan of", &contents.plans)] {
         for ShownChain { name, found } in list {
-            text += &format!("<h3>{what} {}</h3>\n", escaped(name));
+            let mut row = vec![format!("{what} {name}")];
             match found {
                 Ok((report, picture)) => {
                     let end = match report.first_failure() {
                         None => format!("succeeds; risk at most {}", report.risk_text()),
                         Some((step, _)) => format!("FAILS at step {}", step + 1),
                     };
-                    text += &figure(picture, &format!("{name}, step by step: {end}"));
-                    text += &numbers(
-                        &format!("the steps of {what} {name}"),
-                        &STEP_HEAD,
-                        &steps(report),
-                    );
+                    row.extend([
+                        end.clone(),
+                        worst(report).map_or_else(
+                            || "unknown".into(),
+                            |(margin, step)| {
+                                format!("{} at step {}", margin_text(margin), step + 1)
+                            },
+                        ),
+                        way(report),
+                    ]);
+                    let inside = figure(picture, &format!("{name}, step by step: {end}"))
+                        + &numbers(
+                            &format!("the steps of {what} {name}"),
+                            &STEP_HEAD,
+                            &steps(report),
+                        );
+                    more += &folded(&format!("{what} {name}, step by step"), &inside);
                 }
-                Err(why) => text += &format!("<p>{}</p>\n", escaped(why)),
+                Err(why) => row.extend([format!("none: {why}"), "unknown".into(), String::new()]),
             }
+            rows.push(row);
         }
     }
-    text
+    if rows.is_empty() {
+        return String::new();
+    }
+    table(&["", "result", "worst margin", "steps"], &rows) + &more
+}
+
+/// Returns the steps of a chain in words.
+fn way(report: &ChainReport) -> String {
+    let steps = report.steps.iter().map(|step| {
+        let task = step.task.as_deref().unwrap_or_default();
+        let ends = [step.before.pose, step.after.pose];
+        match step.kind {
+            StepKind::Localization => format!("look {task}"),
+            StepKind::Work => format!("work {task}"),
+            StepKind::Navigation => format!(
+                "drive {:.2} m",
+                libm::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1])
+            ),
+        }
+    });
+    steps.collect::<Vec<_>>().join(", ")
 }
 
 const STEP_HEAD: [&str; 6] = [
@@ -466,7 +516,7 @@ fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
     let pose = |key: &str| place["tag_pose"][key].as_f64();
     let number = |key: &str, text: fn(f64) -> String| {
         let value = place[key].as_f64();
-        value.map_or_else(|| "–".into(), text)
+        value.map_or_else(|| "unknown".into(), text)
     };
     Some(vec![
         name.into(),
@@ -498,10 +548,14 @@ fn tags(site: &Site, contents: &Contents) -> String {
             ];
             row.extend([pose.x, pose.y, pose.z].map(|v| format!("{v:.4}")));
             row.extend(degrees.map(|v| format!("{v:.2}")));
-            row.push(format!(
-                "{:.3} m, {:.2} deg",
-                tag.tolerance.translation, tag.tolerance.turn_deg
-            ));
+            row.push(if tag.tolerance.is_none() {
+                "unknown".to_owned()
+            } else {
+                format!(
+                    "{:.3} m, {:.2} deg",
+                    tag.tolerance.translation, tag.tolerance.turn_deg
+                )
+            });
             row
         })
         .collect();
@@ -520,9 +574,12 @@ fn tags(site: &Site, contents: &Contents) -> String {
         ],
         &rows,
     );
-    text += &figure(
-        sheet,
-        "The mounting sheet: each tag with its place and size",
+    text += &folded(
+        "the mounting sheet",
+        &figure(
+            sheet,
+            "The mounting sheet: each tag with its place and size",
+        ),
     );
     text
 }

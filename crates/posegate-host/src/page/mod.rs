@@ -30,9 +30,12 @@
 pub use self::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 pub use self::html::page;
 
+mod alike;
 mod contents;
 mod figures;
 mod html;
+mod start;
+mod summary;
 
 /// The core as WebAssembly.
 pub const CORE: &[u8] = include_bytes!("core.wasm");

@@ -207,12 +207,14 @@ pub fn place(
     if optimizer.refines_internally() {
         polished = core::mem::take(&mut found);
     }
-    for Solution { point, .. } in found {
+    // Each solution has budgets of its own, so they are polished at the same time with the same results.
+    let polish = |Solution { point, .. }: Solution| {
         let budget = Budget::new(share(DESCENT), tell);
         let value = budget.values(&searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
         let from = Solution { point, value };
         let found = Descent { from, sigma: 0.01 }.search(&searched, &budget, seed);
-        total += budget.spent();
+        let mut spent = budget.spent();
+        let mut ends = Vec::new();
         for from in found {
             let budget = Budget::new(share(LAST), tell);
             let last = Polish {
@@ -220,9 +222,16 @@ pub fn place(
                 step: 1e-3,
                 smallest: 1e-8,
             };
-            polished.extend(last.search(&searched, &budget, seed));
-            total += budget.spent();
+            ends.extend(last.search(&searched, &budget, seed));
+            spent += budget.spent();
         }
+        (ends, spent)
+    };
+    let ends: Vec<(Vec<Solution>, u64)> =
+        found.into_par_iter().with_max_len(1).map(polish).collect();
+    for (ends, spent) in ends {
+        polished.extend(ends);
+        total += spent;
     }
     let found = super::search::distinct(&searched, polished);
     let placed: Vec<Result<Placed, PlaceError>> = found

@@ -28,6 +28,7 @@ pub(super) fn row(
         &keys::FAMILY,
         &keys::SIZE,
         &keys::CANDIDATE_COST,
+        &keys::TOLERANCE,
     ])?;
     let wall = success::named(&table.required(&keys::ROW_WALL)?, "wall", walls)?;
     let every = table.required(&keys::ROW_EVERY)?;
@@ -62,6 +63,10 @@ pub(super) fn row(
         Some(node) => node.number()?,
         None => 1.0,
     };
+    let tolerance = match table.optional(&keys::TOLERANCE) {
+        Some(node) => super::places::tolerance(&node)?,
+        None => Tolerance::NONE,
+    };
     let mut found = Vec::new();
     for place in &places {
         for z in &heights {
@@ -88,7 +93,7 @@ pub(super) fn row(
             let tag = SiteTag {
                 family: family.clone(),
                 tag,
-                tolerance: Tolerance::NONE,
+                tolerance,
             };
             found.push((
                 format!("{name}-{}", number + 1),

@@ -181,6 +181,7 @@ function drawn() {
   const picture = find("panel");
   const part = section();
   const paths = part.polygons.map((ring) => `M${points(pairs(ring))}Z`).join("");
+  axes();
   find("set").setAttribute("d", paths);
   find("cross").setAttribute("d", `M${px([0, 0])}m-7 0h14m-7 -7v14`);
   const radius = state.task.judge ? state.task.judge.radiusSquared : 0;
@@ -203,6 +204,44 @@ function drawn() {
     mark.setAttribute("transform", `translate(${wx} ${wy}) rotate(${-turn})`);
   }
   say(verdict, worst, took, fault ?? state.task.why);
+}
+
+// Draws the axes with their ticks. Text is 12 px high, however narrow the panel is.
+function axes() {
+  const wide = find("panel").getBoundingClientRect().width;
+  const unit = wide > 0 ? WIDTH / wide : 1;
+  const least = (50 * unit) / scale;
+  const decade = 10 ** Math.floor(Math.log10(least));
+  const step = decade * [1, 2, 5, 10].find((digit) => digit * decade >= least * (1 - 1e-9));
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const group = find("axes");
+  group.replaceChildren();
+  group.setAttribute("font-size", 12 * unit);
+  group.setAttribute("stroke-width", 3 * unit);
+  let marks = "";
+  const label = (text, x, y, anchor) => {
+    element("text", { x, y, "text-anchor": anchor }, group).textContent = text;
+  };
+  const ends = [WIDTH, HEIGHT].map((size, axis) => [middle[axis] - size / 2 / scale, middle[axis] + size / 2 / scale]);
+  ends.forEach(([low, high], axis) => {
+    for (let k = Math.ceil(low / step); k * step <= high; k += 1) {
+      const value = k * step;
+      const text = value.toFixed(digits).replace("-", "\u2212").replace(/^\u2212(0(\.0*)?)$/, "$1");
+      const at = px(axis === 0 ? [value, middle[1]] : [middle[0], value])[axis];
+      if (axis === 0) {
+        if (at < 60 * unit || at > WIDTH - 60 * unit) continue;
+        marks += `M${at.toFixed(2)} ${HEIGHT}v${(-7 * unit).toFixed(2)}`;
+        label(text, at, HEIGHT - 10 * unit, "middle");
+      } else {
+        if (at < 34 * unit || at > HEIGHT - 34 * unit) continue;
+        marks += `M0 ${at.toFixed(2)}h${(7 * unit).toFixed(2)}`;
+        label(text, 10 * unit, at + 4 * unit, "start");
+      }
+    }
+  });
+  label("x, m", WIDTH - 8 * unit, HEIGHT - 10 * unit, "end");
+  label("y, m", 8 * unit, 16 * unit, "start");
+  element("path", { d: marks, "stroke-width": 1.2 * unit }, group);
 }
 
 function pairs(flat) {
@@ -359,6 +398,7 @@ function listen() {
   });
   find("follows").addEventListener("change", moved);
   find("task").addEventListener("change", () => choose(Number(find("task").value)));
+  addEventListener("resize", draw);
   // A browser may restore old values of the fields, so reset fields and verdict together.
   addEventListener("pageshow", (event) => event.persisted || choose(state.number));
 }
@@ -366,6 +406,7 @@ function listen() {
 function frame() {
   const picture = find("panel");
   element("path", { id: "set", "fill-rule": "evenodd" }, picture);
+  element("g", { id: "axes", "aria-hidden": "true" }, picture);
   element("path", { id: "cross" }, picture);
   element("polygon", { id: "poses" }, picture);
   const worst = element("g", { id: "worst", visibility: "hidden" }, picture);

@@ -10,6 +10,22 @@ fn with(row: &str) -> String {
 
 const ROW: &str = "[candidates.n]\nwall = \"north\"\nevery = 1.5\nz = [1.0, 1.4]\nid = 40\nfamily = \"tag36h11\"\nsize = 0.2\ncost = 2.0\n";
 
+/// What the installer may be off by is part of each candidate: without it a cover promises nothing for a tag that is mounted by hand.
+#[test]
+fn a_tolerance_is_that_of_every_candidate_of_the_row() {
+    let row = ROW.to_owned() + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let site = Site::parse(&with(&row), FILE).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(site.candidates.len(), 8);
+    for (name, made) in &site.candidates {
+        let tolerance = made.tag.tolerance;
+        assert_eq!(
+            (tolerance.translation, tolerance.turn_deg),
+            (0.01, 0.5),
+            "{name}"
+        );
+    }
+}
+
 #[test]
 fn rows_are_on_the_side_of_the_goals() {
     let site = Site::parse(&with(ROW), FILE).unwrap_or_else(|error| panic!("{error}"));

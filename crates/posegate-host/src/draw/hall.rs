@@ -1,0 +1,224 @@
+//! The hall from above: walls, tags, the goals of its tasks, the routes of robots, and where they look at which tag.
+
+use super::floor::Labels;
+use super::ingredients::{Eye, Ingredients, radians};
+use super::legend::{LINE, Sample, legend};
+use super::palette;
+use super::panel::{Panel, tick_at_scale};
+use super::svg::{Picture, Style, literal};
+use super::task_plan::about;
+use crate::plan::{ChainReport, StepKind, StepReport};
+use crate::site::Site;
+use posegate::shape::SuccessSet;
+
+const CAMERA: Style = Style::outlined("#8a6d00", 1.8).dashed("5 2");
+const GOAL: Style = Style::outlined(palette::INK, 2.2);
+const ROUTE: Style = Style::outlined("#0072b2", 1.8);
+/// Every place where the robot may be when it looks: blue and dashed.
+const LOOK: Style = Style::outlined("#0072b2", 1.4)
+    .with_fill_opacity("#0072b2", 0.22)
+    .dashed("4 2");
+const SIGHT: Style = Style::outlined("#444444", 1.0).dashed("1 3");
+
+/// Returns the success set of a task or of a look that the planner made.
+pub fn success_of<'s>(site: &'s Site, name: &str) -> Option<&'s SuccessSet> {
+    let made = site.planner.looks.get(name).map(|look| &look.success);
+    let own = site.tasks.get(name).map(|task| &task.success);
+    own.or(made)
+}
+
+/// A robot's place before a step: x, y in metres, and the distance of the farthest possible place from it.
+fn place(step: &StepReport) -> ([f64; 2], f64) {
+    let [x, y, _] = step.before.pose;
+    ([x, y], step.before.enclosing()[0] + step.before.spread[0])
+}
+
+fn looks<'r>(routes: &[&'r ChainReport]) -> Vec<&'r StepReport> {
+    let steps = routes.iter().flat_map(|report| &report.steps);
+    steps
+        .filter(|step| step.kind == StepKind::Localization)
+        .collect()
+}
+
+/// Returns the corners of all that is drawn, in the world.
+fn points(site: &Site, routes: &[&ChainReport]) -> Vec<[f64; 2]> {
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    points.extend(site.tags.values().map(|t| [t.tag.pose.x, t.tag.pose.y]));
+    let walls = site.walls.iter();
+    points.extend(walls.flat_map(|wall| wall.corners.iter().copied()));
+    let goals = || site.tasks.values().map(|task| task.success.goal);
+    points.extend(goals().map(|goal| [goal.x, goal.y]));
+    for camera in site.cameras.values() {
+        points.extend(goals().map(|goal| {
+            let [x, y, _] = Eye::of(&camera.mount, radians(goal)).centre;
+            [x, y]
+        }));
+    }
+    for step in routes.iter().flat_map(|report| &report.steps) {
+        let ([x, y], reach) = place(step);
+        points.extend([[x - reach, y - reach], [x + reach, y + reach]]);
+        let [x, y, _] = step.after.pose;
+        points.push([x, y]);
+    }
+    if points.is_empty() {
+        points.push([0.0; 2]);
+    }
+    points
+}
+
+/// Draws the hall into a panel with its left upper corner at a point, at most as large as `largest` (pixels). Returns the panel.
+pub(super) fn hall(
+    picture: &mut Picture,
+    site: &Site,
+    routes: &[&ChainReport],
+    title: &str,
+    [left, top]: [f64; 2],
+    largest: [f64; 2],
+) -> Panel {
+    let window = about(&points(site, routes));
+    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
+    let scale = (largest[0] / wide[0]).min(largest[1] / wide[1]);
+    let panel = Panel {
+        window,
+        left,
+        top,
+        scale,
+        y_title: true,
+    };
+    let goals = || site.tasks.values().map(|task| task.success.goal);
+    panel.draw(picture, title, tick_at_scale(scale, 60.0), |inside| {
+        site.walls.iter().for_each(|wall| inside.wall(wall));
+        for task in site.tasks.values() {
+            for outline in Ingredients::of(&task.success.shape).outlines {
+                inside.robot(&outline, radians(task.success.goal));
+            }
+        }
+        for step in looks(routes) {
+            let (at, reach) = place(step);
+            inside.disc(at, reach, &LOOK);
+            let set = step.task.as_deref().and_then(|name| success_of(site, name));
+            for tag in set.map(SuccessSet::tags).unwrap_or_default() {
+                inside.line(&[at, [tag.pose.x, tag.pose.y]], &SIGHT);
+            }
+        }
+        for step in routes.iter().flat_map(|report| &report.steps) {
+            if step.kind == StepKind::Navigation {
+                let ends = [step.before.pose, step.after.pose].map(|[x, y, _]| [x, y]);
+                inside.arrow(ends[0], ends[1], &ROUTE);
+            }
+        }
+        if routes.is_empty() {
+            for goal in goals() {
+                for camera in site.cameras.values() {
+                    let eye = Eye::of(&camera.mount, radians(goal));
+                    let ([x, y, _], [fx, fy, _]) = (eye.centre, eye.axes[0]);
+                    let ahead = 24.0 / scale;
+                    inside.arrow([x, y], [x + ahead * fx, y + ahead * fy], &CAMERA);
+                }
+            }
+        }
+        goals().for_each(|goal| inside.pose(goal, &GOAL));
+        site.tags.values().for_each(|tag| inside.tag(&tag.tag));
+        let mut labels = Labels::default();
+        for step in looks(routes) {
+            let (at, reach) = place(step);
+            labels.avoid(inside, at, reach * scale);
+        }
+        for step in routes.iter().flat_map(|report| &report.steps) {
+            let [from, to] = [step.before.pose, step.after.pose];
+            let between = |t: f64| [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]));
+            let length = libm::hypot(to[0] - from[0], to[1] - from[1]) * scale;
+            let count = libm::ceil(length / 14.0).min(100.0) as u32;
+            for k in 0..=count {
+                let t = f64::from(k) / f64::from(count.max(1));
+                labels.avoid(inside, between(t), 3.0);
+            }
+        }
+        for goal in goals() {
+            let yaw = goal.yaw_deg.to_radians();
+            let ahead = 13.0 / scale;
+            let middle = [
+                goal.x + ahead * libm::cos(yaw),
+                goal.y + ahead * libm::sin(yaw),
+            ];
+            labels.avoid(inside, middle, 9.0);
+        }
+        for tag in site.tags.values() {
+            labels.avoid(inside, [tag.tag.pose.x, tag.tag.pose.y], 6.0);
+        }
+        // Tasks that share a goal share a label.
+        let mut tasks: Vec<([f64; 2], String)> = Vec::new();
+        for (name, task) in &site.tasks {
+            let at = [task.success.goal.x, task.success.goal.y];
+            match tasks.iter_mut().find(|(known, _)| *known == at) {
+                Some((_, text)) => *text += &format!(", {}", literal(name)),
+                None => tasks.push((at, literal(name))),
+            }
+        }
+        for (at, text) in &tasks {
+            labels.place(inside, *at, text);
+        }
+        for (name, tag) in &site.tags {
+            let text = format!("{}, id {}", literal(name), tag.tag.id);
+            labels.place(inside, [tag.tag.pose.x, tag.tag.pose.y], &text);
+        }
+        for (number, report) in routes.iter().enumerate() {
+            let Some(first) = report.steps.first() else {
+                continue;
+            };
+            let ([x, y], _) = place(first);
+            inside.disc([x, y], 0.0, &Style::filled("#0072b2"));
+            let begun = routes[..number]
+                .iter()
+                .filter_map(|other| other.steps.first());
+            if !begun.map(place).any(|(other, _)| other == [x, y]) {
+                labels.place(inside, [x, y], "start");
+            }
+        }
+        for wall in &site.walls {
+            // A wall's name is at its end, a block's at its middle.
+            let at = match wall.corners.as_slice() {
+                [from, _] => Some(*from),
+                corners => inside.middle(corners),
+            };
+            if let Some(at) = at {
+                labels.place(inside, at, &literal(&wall.name));
+            }
+        }
+    });
+    panel
+}
+
+/// Draws the legend of a hall in two columns; the point is the upper left corner. Returns its height, pixels.
+pub(super) fn hall_legend(picture: &mut Picture, [left, top]: [f64; 2], has_routes: bool) -> f64 {
+    let mut entries = vec![
+        (
+            Sample::Line(palette::TAG),
+            "tags; arrows: where their faces look",
+        ),
+        (Sample::Line(GOAL), "goals of the tasks, and their headings"),
+        (Sample::Hatched(palette::WALL), "blocks"),
+        (
+            Sample::Line(palette::WALL.with_outline("#444444", 3.5)),
+            "walls",
+        ),
+    ];
+    if has_routes {
+        entries.extend([
+            (Sample::Line(ROUTE), "routes from the start to the goals"),
+            (
+                Sample::Disc(LOOK),
+                "looks: every place where the robot may be",
+            ),
+            (Sample::Line(SIGHT), "the tag that is looked at there"),
+        ]);
+    } else {
+        entries.push((Sample::Line(CAMERA), "cameras there, where they look"));
+    }
+    entries.push((Sample::Patch(palette::BODY), "robots at their goals"));
+    let rows = entries.len().div_ceil(2);
+    for (column, entries) in entries.chunks(rows).enumerate() {
+        legend(picture, [left + 320.0 * column as f64, top], entries);
+    }
+    LINE * rows as f64
+}

@@ -1,0 +1,108 @@
+//! The mounting sheet: A4 pages with one block per tag, for the person who mounts the tags and measures where they are.
+
+mod block;
+mod elevation;
+mod place;
+#[cfg(test)]
+mod tests;
+
+use super::letters::{escaped, literal};
+use super::measure::fitted;
+use super::palette;
+use super::svg::{Anchor, Font, Picture, Style, number};
+use posegate::shape::{Tag, Tolerance, Wall};
+
+/// A tag that is to be mounted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mounted {
+    /// Its name in the site file.
+    pub name: String,
+    /// Its family, `tag36h11`.
+    pub family: String,
+    /// Its number, size and pose.
+    pub tag: Tag,
+    /// Installation error for which the tasks are proven; `None` if none is known.
+    pub reserve: Option<Tolerance>,
+    /// What is left beyond the reserve, in centimetres and degrees; `None` if it is not known.
+    pub left: Option<f64>,
+}
+
+/// Width and height of an A4 page, pixels of 1/96 inch.
+const PAGE: [f64; 2] = [794.0, 1123.0];
+/// The printable part: printers leave 1 cm at each side.
+const SIDES: [f64; 2] = [40.0, 754.0];
+const TOP: f64 = 84.0;
+const BLOCK: f64 = 494.0;
+const BLOCKS_A_PAGE: usize = 2;
+/// Space between pages in one picture, pixels.
+const GAP: f64 = 24.0;
+
+const NOTES: [&str; 2] = [
+    "Places are those of the tag's middle. Heights are above the site's floor (z = 0); angles are counter-clockwise from above.",
+    "Left and right are those of a person who faces the wall. Write the measured values into the site file, and check it again.",
+];
+
+/// Draws the sheet: the A4 pages one below the other, 794 pixels (210 mm) wide. Pages have the same content as those of
+/// [`mounting_sheet_html`], which prints each on its own sheet of paper.
+#[must_use]
+pub fn mounting_sheet(title: &str, tags: &[Mounted], walls: &[Wall]) -> String {
+    let mut pages = pages(title, tags, walls);
+    if pages.len() == 1 {
+        return pages.remove(0);
+    }
+    let step = PAGE[1] + GAP;
+    let height = step * pages.len() as f64 - GAP;
+    let body: String = (0..)
+        .zip(&pages)
+        .map(|(index, page)| {
+            let top = number(step * f64::from(index));
+            page.replacen("<svg ", &format!("<svg y=\"{top}\" "), 1)
+        })
+        .collect();
+    let [width, height] = [PAGE[0], height].map(number);
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n<title>{}</title>\n<rect width=\"{width}\" height=\"{height}\" fill=\"#dddddd\"/>\n{body}</svg>\n",
+        escaped(title)
+    )
+}
+
+/// Returns the sheet as an HTML file that prints on A4, one page of it on each sheet of paper.
+#[must_use]
+pub fn mounting_sheet_html(title: &str, tags: &[Mounted], walls: &[Wall]) -> String {
+    let title_text = escaped(title);
+    let pages = pages(title, tags, walls).concat();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title_text}</title>\n<style>\n@page {{ size: A4 portrait; margin: 0; }}\nbody {{ margin: 0; }}\nsvg {{ display: block; width: 210mm; height: 296.9mm; margin: 0 auto; break-after: page; }}\nsvg:last-child {{ break-after: auto; }}\n</style>\n</head>\n<body>\n{pages}</body>\n</html>\n"
+    )
+}
+
+/// Draws each page as a picture of its own.
+fn pages(title: &str, tags: &[Mounted], walls: &[Wall]) -> Vec<String> {
+    let of = tags.len().div_ceil(BLOCKS_A_PAGE).max(1);
+    let blocks: Vec<&[Mounted]> = if tags.is_empty() {
+        vec![&[]]
+    } else {
+        tags.chunks(BLOCKS_A_PAGE).collect()
+    };
+    let page = |(index, tags): (usize, &&[Mounted])| {
+        let mut picture = Picture::new(PAGE[0], PAGE[1], &literal(title));
+        let font = Font::new(19.0, palette::INK).bold();
+        let heading = fitted(&literal(title), 19.0, true, 560.0);
+        picture.text([SIDES[0], 52.0], &heading, &font);
+        let count = format!("page {} of {of}", index + 1);
+        let right = Font::new(12.0, palette::FAINT).anchored(Anchor::End);
+        picture.text([SIDES[1], 52.0], &count, &right);
+        for (row, mounted) in tags.iter().enumerate() {
+            let top = TOP + BLOCK * row as f64;
+            let rule = [[SIDES[0], top - 14.0], [SIDES[1], top - 14.0]];
+            picture.line(&rule, &Style::outlined(palette::FRAME, 1.0));
+            block::draw(&mut picture, top, mounted, walls);
+        }
+        let foot = Font::new(11.0, palette::FAINT);
+        for (row, note) in NOTES.into_iter().enumerate() {
+            picture.text([SIDES[0], 1084.0 + 15.0 * row as f64], note, &foot);
+        }
+        picture.finish()
+    };
+    blocks.iter().enumerate().map(page).collect()
+}
