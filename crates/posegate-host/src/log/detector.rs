@@ -267,6 +267,12 @@ impl Detector {
         &self.name
     }
 
+    /// Returns how detections are used.
+    #[must_use]
+    pub const fn settings(&self) -> DetectorSettings {
+        self.settings
+    }
+
     /// Returns the camera with a published calibration, if that is the site's camera. The numbers are those of the calibration. Takes some
     /// milliseconds for a camera with distortion.
     ///

@@ -41,6 +41,9 @@ const AROUND: f64 = 1.02;
 /// Most steps of a search at a fixed heading, and of the growth of one direction.
 const PLACE_STEPS: u32 = 30;
 const GROWTH_STEPS: u32 = 12;
+/// Most times that a search is continued, and how near to its start it then ends: metres and radians.
+const SEARCHES: u32 = 6;
+const SETTLED: f64 = 1e-6;
 
 /// Estimates the robot's pose: the best fit first, then the other one if the corners leave it open. The robot is at one of them. The
 /// arguments are those of [`super::locate`].
@@ -66,14 +69,20 @@ pub fn locate_all(
     let balls = survey::balls(&view, eye, seen);
     let room = radius_squared * variance;
     let mut basins: Vec<Basin> = Vec::new();
-    for minimum in found {
+    let clearer = clearer(radius_squared) * variance;
+    for found in found {
+        // A search that has not come to an end is no minimum: what matters is where it leads, or that it fits where it is.
+        let settled = view.settled(found);
+        let minimum = settled.unwrap_or(found);
         if basins.iter().any(|basin| basin.has(&minimum)) {
             continue;
         }
-        let clearer = clearer(radius_squared) * variance;
-        let is_open = minimum.0 - best.0 < clearer
-            || minimum.0 - best.0 - view.bias(&best.1, &minimum.1, &balls) < clearer;
-        if !is_open {
+        let worse = minimum.0 - best.0;
+        let bias = match settled {
+            Some(_) if !basins.is_empty() => view.bias(&best, &minimum, &balls),
+            _ => 0.0,
+        };
+        if !(worse - bias < clearer) {
             continue;
         }
         if basins.len() == MOST {
@@ -296,20 +305,37 @@ impl View<'_> {
         Ok(())
     }
 
+    /// Continues a search until it stays where it is. `None` if it does not.
+    fn settled(&self, found: (f64, Vector3<f64>)) -> Option<(f64, Vector3<f64>)> {
+        let mut now = found;
+        for _ in 0..SEARCHES {
+            let next = self.descended(now.1)?;
+            if apart(&next.1, &now.1) < SETTLED {
+                return Some(next);
+            }
+            now = next;
+        }
+        None
+    }
+
     /// Returns by how much tags and camera within their tolerances can change the difference of the costs of two minima, to first order.
     fn bias(
         &self,
-        best: &Vector3<f64>,
-        other: &Vector3<f64>,
+        best: &(f64, Vector3<f64>),
+        other: &(f64, Vector3<f64>),
         balls: &[survey::Ball<'_, '_>],
     ) -> f64 {
+        let own = other.0 - best.0;
         let difference = |view: &View<'_>| {
-            let (best, _) = view.descended(*best)?;
-            let (other, _) = view.descended(*other)?;
-            Some(other - best)
-        };
-        let Some(own) = difference(self) else {
-            return f64::INFINITY;
+            let (best, beside) = view.descended(best.1)?;
+            let minimum = view.descended(other.1).filter(|(_, pose)| {
+                // Not if the other minimum is gone, and the search leads to the best one.
+                apart(pose, &beside) > 0.5 * apart(&other.1, &beside)
+            });
+            let other = minimum
+                .map(|(cost, _)| cost)
+                .or_else(|| view.cost(&other.1));
+            Some(other? - best)
         };
         let of_ball = |ball: &survey::Ball<'_, '_>| {
             let mut sum = 0.0;

@@ -244,6 +244,43 @@ fn a_tag_that_is_seen_head_on_has_two_solutions() {
     assert_eq!(all.len(), 1, "{all:?}");
 }
 
+/// Two tags side by side have one solution, near as it is to the mirrored one of each alone; a minimum at infinity does not count.
+#[test]
+fn several_tags_are_fitted_together() {
+    let camera = Camera::pinhole([1280.0, 960.0], [1720.0, 1720.0], [640.0, 480.0]);
+    let eye = MountedCamera {
+        camera,
+        ..eye(LEVEL)
+    };
+    let tag = |size: f64, x: f64, y: f64, yaw_deg: f64| Tag {
+        id: 1,
+        size,
+        pose: Pose3Deg {
+            x,
+            y,
+            z: 0.5,
+            yaw_deg,
+            ..LEVEL
+        },
+    };
+    let tags = [tag(0.04, 1.25, 0.0, 200.0), tag(0.15, 1.35, 0.2, 225.0)];
+    let pixels = tags.map(|tag| projected(&camera, &LEVEL, &tag, [0.0; 3], 75.0).unwrap());
+    let alone = locate_all(&eye, &[seen(&tags[0], pixels[0])], 0.3, R2).unwrap();
+    assert_eq!(alone.len(), 2);
+    for tolerance in [0.0, 0.001] {
+        let both = [0, 1].map(|k| TagObservation {
+            tolerance: Tolerance {
+                translation: tolerance,
+                turn_deg: 100.0 * tolerance,
+            },
+            ..seen(&tags[k], pixels[k])
+        });
+        let together = locate_all(&eye, &both, 0.3, R2).unwrap();
+        assert_eq!(together.len(), 1, "{together:?}");
+        assert!(share(&together[0], [0.0; 3]) < 1e-9);
+    }
+}
+
 /// Exactly the stated noise, from oblique to head-on and from near to far: the union of the sets holds the truth in at least 99 % of all
 /// observations that are not refused, and few are refused.
 #[test]
