@@ -1,4 +1,4 @@
-//! The command line: `posegate-node TABLE [--site-digest HEX] [--serial DEV [--baud N]] [--ros-args ...]`.
+//! The command line: `posegate-node TABLE [--site-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args ...]`.
 
 use crate::names::{NameError, Names};
 use crate::parameters::{ParameterError, Parameters};
@@ -8,10 +8,11 @@ use std::path::PathBuf;
 pub const USAGE: &str = "\
 Decide whether a robot is localized well enough for a task, as a ROS 2 node
 
-Usage: posegate-node TABLE [--site-digest HEX] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
+Usage: posegate-node TABLE [--site-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
 
   TABLE                the table of the task, made by `posegate table build`
   --site-digest HEX    SHA-256 of the site file that the table must be made from (`posegate table info` prints it)
+  --site FILE          the site file that the table must be made from: its tags and cameras, for the parameter use_detections
   --serial DEV         the serial line of a controller whose gate decides: poses are passed to it, and the permit is the controller's;
                        TABLE is the table in its flash
   --baud N             the speed of that line, bits per second [default: 115200]
@@ -19,6 +20,7 @@ Usage: posegate-node TABLE [--site-digest HEX] [--serial DEV [--baud N]] [--ros-
 
 Examples:
   posegate-node dock.posegate --ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -r pose:=/amcl_pose
+  posegate-node dock.posegate --site site.toml --ros-args -p use_detections:=true -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0
   posegate-node dock.posegate --serial /dev/ttyUSB0 --ros-args -r pose:=/amcl_pose
 
 The parameters, the topics and what a consumer of the permit must do: docs/for-ros.md.";
@@ -41,6 +43,8 @@ pub struct Arguments {
     pub table: PathBuf,
     /// The digest of the site file, as it was given.
     pub site_digest: Option<String>,
+    /// The site file, for its tags and cameras.
+    pub site: Option<PathBuf>,
     /// The serial line of a controller, and its speed in bits per second.
     pub serial: Option<(PathBuf, u32)>,
     /// The ROS parameters for this node.
@@ -64,7 +68,7 @@ pub enum ArgumentError {
     TwoTables(String, String),
     /// An option that does not exist.
     #[error(
-        "`{0}` is not an option of posegate-node: expected a table, --site-digest, --serial, --baud or --ros-args; see --help"
+        "`{0}` is not an option of posegate-node: expected a table, --site-digest, --site, --serial, --baud or --ros-args; see --help"
     )]
     Unknown(String),
     /// An option of ROS that does not exist.
@@ -100,6 +104,7 @@ impl Command {
     pub fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
         let mut words = given.into_iter();
         let (mut table, mut site_digest, mut serial, mut baud) = (None, None, None, None);
+        let mut site = None;
         let mut ros = Ros::default();
         while let Some(word) = words.next() {
             match word.as_str() {
@@ -109,6 +114,13 @@ impl Command {
                     let digest = words.next();
                     site_digest =
                         Some(digest.ok_or(ArgumentError::NoValue("--site-digest", "HEX"))?);
+                }
+                "--site" => {
+                    site = Some(
+                        words
+                            .next()
+                            .ok_or(ArgumentError::NoValue("--site", "FILE"))?,
+                    );
                 }
                 "--serial" => {
                     serial = Some(
@@ -158,6 +170,7 @@ impl Command {
         Ok(Self::Run(Box::new(Arguments {
             table,
             site_digest,
+            site: site.map(PathBuf::from),
             serial,
             parameters,
             names,
@@ -248,6 +261,7 @@ mod tests {
             ("a.posegate --speed 3", "`--speed` is not an option"),
             ("a.posegate --site-digest", "needs a value"),
             ("a.posegate --serial", "needs a value"),
+            ("a.posegate --site", "needs a value"),
             ("a.posegate --baud 9600", "without --serial"),
             ("a.posegate --serial /dev/ttyS0 --baud 1", "--baud is `1`"),
             ("a.posegate --ros-args -p", "needs a value"),

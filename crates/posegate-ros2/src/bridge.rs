@@ -6,7 +6,8 @@ use crate::decider::Decider;
 use crate::diagnostics::explanation;
 use crate::link::{Link, SOURCE};
 use crate::message::{
-    DiagnosticStatus, ERROR, KeyValue, MarkerArray, OK, Odometry, PoseWithCovarianceStamped, Time,
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, MarkerArray, OK,
+    Odometry, PoseWithCovarianceStamped, Time,
 };
 use crate::permission::{DENY, PERMIT};
 use crate::permit_gate::{Answer, Order, Origin, estimate};
@@ -190,6 +191,12 @@ impl Decider for Bridge {
         }
         self.answer(now)
     }
+
+    fn detections(&mut self, now: Now, _: &AprilTagDetectionArray, _: Origin) -> Answer {
+        self.answer(now)
+    }
+
+    fn camera_info(&mut self, _: Option<&CameraInfo>) {}
 
     fn odometry(&mut self, now: Now, _: &Odometry, _: Origin) -> Answer {
         self.answer(now)

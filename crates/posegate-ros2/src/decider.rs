@@ -4,10 +4,12 @@ use crate::clock::Now;
 use crate::diagnostics::explanation;
 use crate::markers::markers;
 use crate::message::{
-    DiagnosticStatus, KeyValue, MarkerArray, Odometry, PoseWithCovarianceStamped,
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, MarkerArray, Odometry,
+    PoseWithCovarianceStamped,
 };
 use crate::permission::report_values;
 use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::tags::Tags;
 use posegate::gate::Reason;
 use std::time::Duration;
 
@@ -15,6 +17,12 @@ use std::time::Duration;
 pub trait Decider {
     /// Takes a pose with its covariance.
     fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer;
+
+    /// Takes the detections of an image.
+    fn detections(&mut self, now: Now, message: &AprilTagDetectionArray, origin: Origin) -> Answer;
+
+    /// Takes a camera info; `None` if it could not be read.
+    fn camera_info(&mut self, message: Option<&CameraInfo>);
 
     /// Takes a pose of the odometry.
     fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer;
@@ -58,6 +66,14 @@ impl Decider for PermitGate<'_> {
         Self::pose(self, now, message, origin)
     }
 
+    fn detections(&mut self, now: Now, message: &AprilTagDetectionArray, origin: Origin) -> Answer {
+        Self::detections(self, now, message, origin)
+    }
+
+    fn camera_info(&mut self, message: Option<&CameraInfo>) {
+        Self::camera_info(self, message);
+    }
+
     fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer {
         Self::odometry(self, now, message, origin)
     }
@@ -95,11 +111,15 @@ impl Decider for PermitGate<'_> {
     }
 
     fn diagnostics(&self, _: Now) -> Vec<DiagnosticStatus> {
-        Vec::new()
+        self.tags().map(Tags::status).into_iter().collect()
     }
 
     fn explain(&self, answer: &Answer) -> String {
-        explanation(answer, self.last().and_then(|last| last.step.err()))
+        let words = explanation(answer, self.last().and_then(|last| last.step.err()));
+        match self.tags().and_then(Tags::problem) {
+            Some(problem) if !answer.is_open => format!("{words} Detections: {problem}."),
+            _ => words,
+        }
     }
 
     fn markers(&self, answer: &Answer) -> Option<MarkerArray> {

@@ -82,7 +82,7 @@ pub fn diagnostics(
     settings: &NodeSettings,
     frame: Option<&str>,
     pose: &Received,
-    odometry: Option<&Received>,
+    others: [(&str, Option<&Received>); 2],
     clock_steps: u64,
     more: Vec<DiagnosticStatus>,
 ) -> DiagnosticArray {
@@ -95,8 +95,15 @@ pub fn diagnostics(
             )
         })
     });
-    status.push(pose.status("pose", answer.now, wrong_frame));
-    status.extend(odometry.map(|odometry| odometry.status("odometry", answer.now, None)));
+    let input = match settings.detector {
+        None => "pose",
+        Some(_) => "detections",
+    };
+    status.push(pose.status(input, answer.now, wrong_frame));
+    let others = others.into_iter();
+    status.extend(
+        others.filter_map(|(name, received)| Some(received?.status(name, answer.now, None))),
+    );
     status.extend(more);
     array(answer.now, status)
 }

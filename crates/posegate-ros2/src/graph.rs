@@ -2,8 +2,8 @@
 
 use crate::diagnostics::Received;
 use crate::message::{
-    Bool, DiagnosticArray, MarkerArray, Odometry, PoseWithCovarianceStamped, TriggerRequest,
-    TriggerResponse,
+    AprilTagDetectionArray, Bool, CameraInfo, DiagnosticArray, MarkerArray, Odometry,
+    PoseWithCovarianceStamped, TriggerRequest, TriggerResponse,
 };
 use crate::names::Names;
 use crate::peers::Peers;
@@ -108,14 +108,29 @@ impl Environment {
     }
 }
 
+/// What poses come from.
+pub enum Input {
+    /// A topic of poses.
+    Poses(Subscription<PoseWithCovarianceStamped>),
+    /// Detections, and the camera info.
+    Detections(
+        Subscription<AprilTagDetectionArray>,
+        Box<Subscription<CameraInfo>>,
+    ),
+}
+
+const POSE: [&str; 2] = ["geometry_msgs", "PoseWithCovarianceStamped"];
+const DETECTIONS: [&str; 2] = ["apriltag_msgs", "AprilTagDetectionArray"];
+const CAMERA_INFO: [&str; 2] = ["sensor_msgs", "CameraInfo"];
+
 /// The node in the graph.
 pub struct Graph {
     /// Waits for messages.
     pub poll: Poll,
     /// Events of discovery.
     pub events: DomainParticipantStatusListener,
-    /// The poses.
-    pub pose: Subscription<PoseWithCovarianceStamped>,
+    /// The poses, or the detections from which they are computed.
+    pub input: Input,
     /// The odometry, if it is used.
     pub odom: Option<Subscription<Odometry>>,
     /// The fail-safe permit.
@@ -164,8 +179,23 @@ impl Graph {
             node: node.map_err(|error| GraphError::Dds(error.to_string()))?,
             services: environment.services,
         };
-        let pose_type = ["geometry_msgs", "PoseWithCovarianceStamped"];
-        let mut pose = builder.subscription(&names.pose, pose_type, settings.pose_delivery)?;
+        let mut input = match settings.detector {
+            None => {
+                Input::Poses(builder.subscription(&names.pose, POSE, settings.pose_delivery)?)
+            }
+            Some(_) => Input::Detections(
+                builder.subscription(
+                    &names.detections,
+                    DETECTIONS,
+                    settings.detections_delivery,
+                )?,
+                Box::new(builder.subscription(
+                    &names.camera_info,
+                    CAMERA_INFO,
+                    settings.camera_info_delivery,
+                )?),
+            ),
+        };
         let mut odom = match settings.tracker {
             Some(_) => Some(builder.subscription(
                 &names.odom,
@@ -191,7 +221,13 @@ impl Graph {
         let mut events = events;
         let poll = Poll::new()?;
         let registry = poll.registry();
-        registry.register(&mut pose, Token(0), Interest::READABLE)?;
+        match &mut input {
+            Input::Poses(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
+            Input::Detections(detections, camera_info) => {
+                registry.register(detections, Token(0), Interest::READABLE)?;
+                registry.register(camera_info.as_mut(), Token(5), Interest::READABLE)?;
+            }
+        }
         registry.register(&mut reset, Token(1), Interest::READABLE)?;
         registry.register(&mut explain, Token(2), Interest::READABLE)?;
         registry.register(events.as_status_source_mio1(), Token(3), Interest::READABLE)?;
@@ -201,7 +237,7 @@ impl Graph {
         Ok(Self {
             poll,
             events,
-            pose,
+            input,
             odom,
             permission,
             permit,
@@ -223,14 +259,21 @@ impl Graph {
         self.threads.run()
     }
 
-    /// Begins to count what is received of the poses.
+    /// Begins to count what is received of the poses or of the detections.
     #[must_use]
     pub fn received_poses(&self, names: &Names, settings: &NodeSettings) -> Received {
-        let peers = Peers::new(
-            &names.pose,
-            ["geometry_msgs", "PoseWithCovarianceStamped"],
-            self.pose.guid(),
-        );
+        let pose = match &self.input {
+            Input::Poses(pose) => pose,
+            Input::Detections(detections, _) => {
+                return Received::new(
+                    names.detections.clone(),
+                    "detections_reliability to best_effort, or detections_durability to volatile",
+                    settings.detections_delivery,
+                    Peers::new(&names.detections, DETECTIONS, detections.guid()),
+                );
+            }
+        };
+        let peers = Peers::new(&names.pose, POSE, pose.guid());
         let parameters = "pose_reliability to best_effort, or pose_durability to volatile";
         Received::new(
             names.pose.clone(),
@@ -238,6 +281,20 @@ impl Graph {
             settings.pose_delivery,
             peers,
         )
+    }
+
+    /// Begins to count what is received of the camera info. `None` if it is not used.
+    #[must_use]
+    pub fn received_camera_info(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
+        let Input::Detections(_, camera_info) = &self.input else {
+            return None;
+        };
+        Some(Received::new(
+            names.camera_info.clone(),
+            "camera_info_reliability to best_effort",
+            settings.camera_info_delivery,
+            Peers::new(&names.camera_info, CAMERA_INFO, camera_info.guid()),
+        ))
     }
 
     /// Begins to count what is received of the odometry. `None` if it is not used.

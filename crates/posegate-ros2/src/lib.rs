@@ -1,6 +1,6 @@
 //! Posegate as a ROS 2 node: poses with covariance in, a fail-safe permit out.
 //!
-//! [`permit_gate::PermitGate`] is the gate of the core behind ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate
+//! [`tags::Tags`] makes poses from detections of tags. [`permit_gate::PermitGate`] is the gate of the core behind ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate
 //! on a controller instead. [`run::Runner`] is the node. The program
 //! `posegate-node` parses a command line ([`arguments::Command`]) and runs it. What the topics mean and what a consumer of the permit
 //! must do is described in `docs/for-ros.md`.
@@ -22,3 +22,4 @@ pub mod permit_gate;
 pub mod run;
 pub mod serial;
 pub mod settings;
+pub mod tags;

@@ -59,11 +59,15 @@ fn start() -> Result<(), Box<dyn Error>> {
         );
         runner.run(&stop)?;
     } else {
-        let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?;
+        let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?
+            .with_tags([names.detections.clone(), names.camera_info.clone()]);
         let mut runner = Runner::join(environment, names, gate, &settings)?;
         eprintln!(
             "posegate-node: {node} decides on the task `{task}` by {}, in domain {domain}",
-            names.pose
+            match settings.detector {
+                None => &names.pose,
+                Some(_) => &names.detections,
+            }
         );
         runner.run(&stop)?;
     }

@@ -75,6 +75,99 @@ pub struct Odometry {
     pub twist: TwistWithCovariance,
 }
 
+/// `apriltag_msgs/msg/AprilTagDetection`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AprilTagDetection {
+    /// The family, such as `tag36h11`.
+    pub family: String,
+    /// The number of the tag.
+    pub id: i32,
+    /// The number of bits that were corrected.
+    pub hamming: i32,
+    /// Unused.
+    pub goodness: f32,
+    /// How clearly bits are black or white.
+    pub decision_margin: f32,
+    /// Column and row of the middle, pixels.
+    pub centre: [f64; 2],
+    /// Columns and rows of the corners, pixels, from the bottom left one against the clock as a viewer sees the upright tag.
+    pub corners: [[f64; 2]; 4],
+    /// Unused: from the tag's square to pixels, by rows.
+    pub homography: [f64; 9],
+}
+
+/// `apriltag_msgs/msg/AprilTagDetectionArray`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AprilTagDetectionArray {
+    /// Time of the image, and the frame of the camera.
+    pub header: Header,
+    /// The tags of one image.
+    pub detections: Vec<AprilTagDetection>,
+}
+
+/// `sensor_msgs/msg/RegionOfInterest`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RegionOfInterest {
+    /// First column of the whole image.
+    pub x_offset: u32,
+    /// First row of the whole image.
+    pub y_offset: u32,
+    /// Rows; 0 for all.
+    pub height: u32,
+    /// Columns; 0 for all.
+    pub width: u32,
+    /// Unused.
+    pub do_rectify: bool,
+}
+
+/// `sensor_msgs/msg/CameraInfo`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CameraInfo {
+    /// Time of the image, and the frame of the camera.
+    pub header: Header,
+    /// Rows of the whole image.
+    pub height: u32,
+    /// Columns of the whole image.
+    pub width: u32,
+    /// The name of the lens model.
+    pub distortion_model: String,
+    /// Its coefficients.
+    pub d: Vec<f64>,
+    /// The matrix of the raw camera, by rows.
+    pub k: [f64; 9],
+    /// The rectification matrix, by rows.
+    pub r: [f64; 9],
+    /// The projection matrix of the rectified image, by rows.
+    pub p: [f64; 12],
+    /// Columns that are combined into one; 0 for 1.
+    pub binning_x: u32,
+    /// Rows that are combined into one; 0 for 1.
+    pub binning_y: u32,
+    /// The part of the image that is published.
+    pub roi: RegionOfInterest,
+}
+
+impl CameraInfo {
+    /// Returns `true` if frame and calibration are equal, bit for bit: all but the stamp.
+    #[must_use]
+    pub fn is_same_calibration(&self, other: &Self) -> bool {
+        let bits = |info: &Self| {
+            let all = info.d.iter().chain(&info.k).chain(&info.r).chain(&info.p);
+            all.map(|number| number.to_bits()).collect::<Vec<u64>>()
+        };
+        let rest = |info: &Self| {
+            (
+                info.header.frame_id.clone(),
+                [info.height, info.width, info.binning_x, info.binning_y],
+                info.distortion_model.clone(),
+                info.roi,
+                info.d.len(),
+            )
+        };
+        rest(self) == rest(other) && bits(self) == bits(other)
+    }
+}
+
 /// `std_msgs/msg/Bool`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bool {

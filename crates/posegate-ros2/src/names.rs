@@ -11,6 +11,10 @@ pub struct Names {
     pub pose: String,
     /// Subscribed if odometry is used: `nav_msgs/msg/Odometry`.
     pub odom: String,
+    /// Subscribed if detections are used: `apriltag_msgs/msg/AprilTagDetectionArray`.
+    pub detections: String,
+    /// Subscribed if detections are used: `sensor_msgs/msg/CameraInfo`.
+    pub camera_info: String,
     /// Published: `diagnostic_msgs/msg/DiagnosticArray`, the fail-safe permit.
     pub permission: String,
     /// Published: `std_msgs/msg/Bool`, for eyes only.
@@ -33,7 +37,7 @@ pub enum NameError {
     NotARule(String),
     /// A rule for a name that the node does not have.
     #[error(
-        "the remapping `{0}` changes no name of this node: expected one of pose, odom, /posegate/permission, /posegate/permit, /diagnostics, /posegate/markers, /posegate/reset, /posegate/explain, __node, __ns"
+        "the remapping `{0}` changes no name of this node: expected one of pose, odom, detections, camera_info, /posegate/permission, /posegate/permit, /diagnostics, /posegate/markers, /posegate/reset, /posegate/explain, __node, __ns"
     )]
     NoSuchName(String),
     /// Not a name of ROS.
@@ -54,6 +58,8 @@ impl Names {
             node: "posegate".into(),
             pose: "/amcl_pose".into(),
             odom: "odom".into(),
+            detections: "detections".into(),
+            camera_info: "camera_info".into(),
             permission: "/posegate/permission".into(),
             permit: "/posegate/permit".into(),
             diagnostics: "/diagnostics".into(),
@@ -87,6 +93,8 @@ impl Names {
         Some(match from {
             "pose" | "amcl_pose" | "/amcl_pose" => &mut self.pose,
             "odom" | "/odom" => &mut self.odom,
+            "detections" | "/detections" => &mut self.detections,
+            "camera_info" | "/camera_info" => &mut self.camera_info,
             "permission" | "/posegate/permission" => &mut self.permission,
             "permit" | "/posegate/permit" => &mut self.permit,
             "diagnostics" | "/diagnostics" => &mut self.diagnostics,
@@ -111,6 +119,8 @@ impl Names {
         for name in [
             &mut self.pose,
             &mut self.odom,
+            &mut self.detections,
+            &mut self.camera_info,
             &mut self.permission,
             &mut self.permit,
             &mut self.diagnostics,
@@ -165,15 +175,22 @@ mod tests {
             (plain.pose.as_str(), plain.odom.as_str()),
             ("/amcl_pose", "/odom")
         );
+        assert_eq!(
+            (plain.detections.as_str(), plain.camera_info.as_str()),
+            ("/detections", "/camera_info")
+        );
         let given = names(&[
             "pose:=filter/pose",
             "__ns:=/robot1",
             "__node:=dock_gate",
             "/posegate/permission:=~/permission",
+            "camera_info:=/front/camera_info",
         ]);
         let given = given.unwrap();
         assert_eq!(given.pose, "/robot1/filter/pose");
         assert_eq!(given.odom, "/robot1/odom");
+        assert_eq!(given.detections, "/robot1/detections");
+        assert_eq!(given.camera_info, "/front/camera_info");
         assert_eq!(given.permit, "/posegate/permit");
         assert_eq!(given.permission, "/robot1/dock_gate/permission");
         assert_eq!(given.full_node(), "/robot1/dock_gate");

@@ -4,11 +4,17 @@
 //! last report. Everything that decides is [`posegate::gate::Gate`] and [`posegate::track::Tracker`].
 
 use crate::clock::Now;
-use crate::message::{Odometry, PoseWithCovariance, PoseWithCovarianceStamped, Time};
+use crate::message::{
+    AprilTagDetectionArray, CameraInfo, Odometry, PoseWithCovariance, PoseWithCovarianceStamped,
+    Time,
+};
 use crate::settings::NodeSettings;
-use posegate::gate::{Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
+use crate::tags::{Look, Tags};
+use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::pose::Pose;
-use posegate::report::{FrameId, PoseEstimate, Report, ros};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
+use posegate::set::{Growth, Inflation, Uncertainty};
+use posegate::task::Risk;
 use posegate::track::{Increment, Tracker, TrackerSettings};
 
 /// How many increments of the odometry are kept for fixes that come late: 2.5 s at 50 Hz.
@@ -69,6 +75,7 @@ pub struct PermitGate<'a> {
     gate: Gate<'a>,
     settings: &'a NodeSettings,
     poses: Order,
+    tags: Option<Box<Tags>>,
     carried: Option<Box<Carried>>,
     last: Option<LastReport>,
 }
@@ -88,6 +95,7 @@ impl<'a> PermitGate<'a> {
             gate: Gate::new(table, gate, now.ms())?,
             settings,
             poses: Order::default(),
+            tags: None,
             carried: settings.tracker.and_then(Carried::new).map(Box::new),
             last: None,
         })
@@ -103,6 +111,103 @@ impl<'a> PermitGate<'a> {
     #[must_use]
     pub const fn last(&self) -> Option<&LastReport> {
         self.last.as_ref()
+    }
+
+    /// Uses detections, with the tags of the settings. The topics are named in messages: detections, camera info.
+    #[must_use]
+    pub fn with_tags(mut self, topics: [String; 2]) -> Self {
+        let detector = self.settings.detector.clone();
+        self.tags = detector.map(|detector| Box::new(Tags::new(detector, topics)));
+        self
+    }
+
+    /// Returns what is known of the tags, if detections are used.
+    #[must_use]
+    pub fn tags(&self) -> Option<&Tags> {
+        self.tags.as_deref()
+    }
+
+    /// Takes a camera info; `None` if it could not be read.
+    pub fn camera_info(&mut self, message: Option<&CameraInfo>) {
+        match (&mut self.tags, message) {
+            (Some(tags), Some(message)) => tags.camera_info(message),
+            (Some(tags), None) => tags.camera_info_lost(),
+            (None, _) => {}
+        }
+    }
+
+    /// Takes the detections of an image. The gate permits only if every pose that they leave open is inside.
+    ///
+    /// Detections that say nothing of the pose are no report: a permit then ends when its time is over. Detections that contradict what
+    /// is known are a report without a pose, which is denied.
+    pub fn detections(
+        &mut self,
+        now: Now,
+        message: &AprilTagDetectionArray,
+        origin: Origin,
+    ) -> Answer {
+        let Some(tags) = &mut self.tags else {
+            return self.tick(now);
+        };
+        let look = tags.look(message);
+        let now_ms = now.ms();
+        let (sequence, has_changed) = self.poses.next(origin);
+        if has_changed {
+            let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
+        }
+        let mut poses = match look {
+            Look::Poses(poses) => poses,
+            Look::Nothing => {
+                self.poses.leave_out();
+                return self.tick(now);
+            }
+            Look::Contradiction => Vec::new(),
+        };
+        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
+        let stamp_ms = now.stamp_ms(message.header.stamp);
+        let report = Report {
+            source: 0,
+            frame: FrameId::of(&self.settings.frame),
+            sequence,
+            stamp_ms: stamp_ms.unwrap_or(now_ms.wrapping_sub(stale)),
+            belief: poses.first().copied().unwrap_or(NO_POSE),
+        };
+        let (estimate, step, verdict) = if poses.len() == 1 {
+            let (step, verdict) = self.take_report(now_ms, &report);
+            (report.belief, step, verdict)
+        } else {
+            // One pose of several cannot be carried, and none after a contradiction.
+            if let Some(carried) = &mut self.carried {
+                carried.tracker.drop_fix();
+                // The gate's source has no inflation of its own: the tracker applies it.
+                for pose in &mut poses {
+                    *pose = inflated(pose, self.settings.trust.inflation);
+                }
+            }
+            let report = Report {
+                belief: poses.first().copied().unwrap_or(NO_POSE),
+                ..report
+            };
+            let evidence = Evidence {
+                report: &report,
+                others: poses.get(1..).unwrap_or_default(),
+                beside: Growth::NONE,
+                elsewhere: Risk::NONE,
+                since_fix_ms: None,
+            };
+            let step = self.gate.step_on(now_ms, &evidence);
+            let (number, verdict) = self.gate.examine_on(&evidence);
+            let about = poses.get(usize::from(number)).copied();
+            (about.unwrap_or(report.belief), step, verdict)
+        };
+        self.last = Some(LastReport {
+            stamp: message.header.stamp,
+            frame: self.settings.frame.clone(),
+            estimate,
+            verdict,
+            step: step.verdict,
+        });
+        answer(now, step)
     }
 
     /// Takes a pose with its covariance.
@@ -235,6 +340,27 @@ impl<'a> PermitGate<'a> {
     }
 }
 
+/// A report without a pose, which every gate denies.
+const NO_POSE: PoseEstimate = PoseEstimate {
+    x_m: f64::INFINITY,
+    y_m: f64::INFINITY,
+    heading: Heading::Radians(f64::INFINITY),
+    spread: None,
+};
+
+/// Returns an estimate with its covariance inflated, rounded up.
+fn inflated(pose: &PoseEstimate, inflation: Inflation) -> PoseEstimate {
+    let factor = f64::from(inflation.q16()) / 65_536.0 * (1.0 + 1e-9);
+    let spread = match pose.spread {
+        Some(Uncertainty::Gaussian(rows)) => Some(Uncertainty::Gaussian(
+            rows.map(|row| row.map(|entry| entry * factor)),
+        )),
+        // No other one comes from corners.
+        _ => None,
+    };
+    PoseEstimate { spread, ..*pose }
+}
+
 fn answer(now: Now, step: Step) -> Answer {
     Answer {
         now,
@@ -277,6 +403,11 @@ impl Order {
         };
         self.sequence = self.sequence.wrapping_add(steps);
         (self.sequence, !is_same)
+    }
+
+    /// Leaves the last message out: it was no report. A message that was lost before it stays a gap.
+    pub(crate) fn leave_out(&mut self) {
+        self.sequence = self.sequence.wrapping_sub(1);
     }
 }
 

@@ -5,7 +5,7 @@
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
 use crate::diagnostics::{Received, diagnostics};
-use crate::graph::{Environment, Graph, GraphError};
+use crate::graph::{Environment, Graph, GraphError, Input};
 use crate::message::{Bool, TriggerResponse};
 use crate::names::Names;
 use crate::permission::Heartbeat;
@@ -28,6 +28,9 @@ const SHORTEST: Duration = Duration::from_millis(2);
 /// Messages of a topic that are taken before the rest of the cycle is done.
 const BATCH: usize = 64;
 
+/// As [`BATCH`], of detections: each takes some milliseconds.
+const DETECTIONS: usize = 4;
+
 /// A node that runs.
 pub struct Runner<'a, D> {
     graph: Graph,
@@ -39,6 +42,7 @@ pub struct Runner<'a, D> {
     watch: ClockWatch,
     clock_steps: u64,
     pose: Received,
+    camera_info: Option<Received>,
     odometry: Option<Received>,
     was_open: bool,
     has_report: bool,
@@ -71,6 +75,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         let graph = Graph::join(environment, names, settings)?;
         Ok(Self {
             pose: graph.received_poses(names, settings),
+            camera_info: graph.received_camera_info(names, settings),
             odometry: graph.received_odometry(names, settings),
             graph,
             environment,
@@ -94,11 +99,17 @@ impl<'a, D: Decider> Runner<'a, D> {
         let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
         let graph = Graph::join(self.environment, self.names, self.settings)?;
         self.pose.peers = graph.received_poses(self.names, self.settings).peers;
-        if let (Some(odometry), Some(again)) = (
-            &mut self.odometry,
-            graph.received_odometry(self.names, self.settings),
-        ) {
-            odometry.peers = again.peers;
+        let (names, settings) = (self.names, self.settings);
+        for (received, again) in [
+            (&mut self.odometry, graph.received_odometry(names, settings)),
+            (
+                &mut self.camera_info,
+                graph.received_camera_info(names, settings),
+            ),
+        ] {
+            if let (Some(received), Some(again)) = (received, again) {
+                received.peers = again.peers;
+            }
         }
         // What has no threads cannot leave in order.
         std::mem::forget(std::mem::replace(&mut self.graph, graph));
@@ -144,11 +155,15 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
         while let Some(event) = self.graph.events.try_recv_status() {
             self.pose.peers.note(&event);
-            if let Some(odometry) = &mut self.odometry {
-                odometry.peers.note(&event);
+            for received in [&mut self.odometry, &mut self.camera_info]
+                .into_iter()
+                .flatten()
+            {
+                received.peers.note(&event);
             }
         }
         self.take_odometry();
+        self.take_camera_info();
         self.take_poses();
         let answer = self.gate.tick(Now::read());
         self.publish(&answer, Instant::now(), false);
@@ -175,9 +190,59 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
     }
 
-    fn take_poses(&mut self) {
+    fn take_camera_info(&mut self) {
+        let (Input::Detections(_, topic), Some(received)) =
+            (&self.graph.input, &mut self.camera_info)
+        else {
+            return;
+        };
         for _ in 0..BATCH {
-            match self.graph.pose.take() {
+            match topic.take() {
+                Ok(None) => return,
+                Ok(Some((message, _))) => {
+                    received.messages += 1;
+                    received.last = Some(message.header.stamp);
+                    self.gate.camera_info(Some(&message));
+                }
+                Err(_) => {
+                    received.unreadable += 1;
+                    self.gate.camera_info(None);
+                }
+            }
+        }
+    }
+
+    fn take_poses(&mut self) {
+        match &self.graph.input {
+            Input::Poses(_) => self.take_poses_of_topic(),
+            Input::Detections(..) => self.take_detections(),
+        }
+    }
+
+    fn take_detections(&mut self) {
+        for _ in 0..DETECTIONS {
+            let Input::Detections(topic, _) = &self.graph.input else {
+                return;
+            };
+            match topic.take() {
+                Ok(None) => return,
+                Ok(Some((message, info))) => {
+                    self.pose.messages += 1;
+                    self.pose.last = Some(message.header.stamp);
+                    self.has_report = true;
+                    let _ = self.gate.detections(Now::read(), &message, origin(&info));
+                }
+                Err(_) => self.pose.unreadable += 1,
+            }
+        }
+    }
+
+    fn take_poses_of_topic(&mut self) {
+        let Input::Poses(topic) = &self.graph.input else {
+            return;
+        };
+        for _ in 0..BATCH {
+            match topic.take() {
                 Ok(None) => return,
                 Ok(Some((message, info))) => {
                     self.pose.messages += 1;
@@ -225,7 +290,10 @@ impl<'a, D: Decider> Runner<'a, D> {
                 self.settings,
                 self.gate.frame(),
                 &self.pose,
-                self.odometry.as_ref(),
+                [
+                    ("odometry", self.odometry.as_ref()),
+                    ("camera info", self.camera_info.as_ref()),
+                ],
                 self.clock_steps,
                 self.gate.diagnostics(answer.now),
             );

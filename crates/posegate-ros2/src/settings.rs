@@ -8,6 +8,7 @@ use posegate::report::FrameId;
 use posegate::set::{Aging, Trust};
 use posegate::table::{Table, TableError};
 use posegate::track::TrackerSettings;
+use posegate_host::log::detector::{Detector, DetectorError};
 use std::path::PathBuf;
 
 mod reader;
@@ -63,6 +64,12 @@ pub struct NodeSettings {
     pub pose_delivery: Delivery,
     /// How odometry is received.
     pub odom_delivery: Delivery,
+    /// The tags and the camera, if detections are used in place of poses.
+    pub detector: Option<Detector>,
+    /// How detections are received.
+    pub detections_delivery: Delivery,
+    /// How the camera info is received.
+    pub camera_info_delivery: Delivery,
     /// The tracker, if odometry is used.
     pub tracker: Option<TrackerSettings>,
     /// Whether markers are published.
@@ -131,6 +138,31 @@ pub enum SettingsError {
         "link_timeout_ms is given without --serial: it is for a controller on a serial line; give --serial DEV, or leave it out"
     )]
     NoSerial,
+    /// Detections without a site file.
+    #[error(
+        "use_detections is true and no site file is given: give --site FILE, the file that the table was made from; it has the tags and the camera"
+    )]
+    NoSite,
+    /// A site file that cannot be used.
+    #[error("the site file cannot be used: {0}")]
+    Site(String),
+    /// A site without the camera or a tag.
+    #[error("{0}; the parameter `camera` names the camera")]
+    Detector(#[from] DetectorError),
+    /// A parameter of detections without them, or of poses with detections.
+    #[error(
+        "{place}: the parameter `{name}` is for {of}: leave it out, or set use_detections to {instead}"
+    )]
+    OtherInput {
+        /// The name.
+        name: String,
+        /// Where it was given.
+        place: String,
+        /// What it is for.
+        of: &'static str,
+        /// The value of `use_detections` with which it would count.
+        instead: bool,
+    },
     /// Times that do not fit each other.
     #[error("{0}")]
     Times(&'static str),
@@ -187,8 +219,10 @@ impl NodeSettings {
             });
         }
         let serial = reader.serial(arguments)?;
+        let site = reader.site_file(arguments.site.as_deref(), &table)?;
+        let detector = reader.detector(site.as_ref(), &table)?;
         let frame = reader.text("frame_id", "map")?;
-        let trust = reader.trust()?;
+        let trust = reader.trust(detector.is_some())?;
         let bounds = match serial {
             Some(_) => MotionBounds::STANDS_STILL,
             None => reader.bounds()?,
@@ -208,7 +242,7 @@ impl NodeSettings {
         let settings = Self {
             task,
             site_digest: digest,
-            site_is_checked,
+            site_is_checked: site_is_checked || site.is_some(),
             sources: [source],
             frame,
             trust,
@@ -237,6 +271,13 @@ impl NodeSettings {
             valid_ms: reader.ms("valid_ms", 250)?,
             pose_delivery: reader.delivery("pose_reliability", "pose_durability", true)?,
             odom_delivery: reader.delivery("odom_reliability", "odom_durability", false)?,
+            detections_delivery: reader.delivery(
+                "detections_reliability",
+                "detections_durability",
+                false,
+            )?,
+            camera_info_delivery: reader.best_effort("camera_info_reliability")?,
+            detector,
             tracker,
             markers: reader.bool("markers", true)?,
             serial,

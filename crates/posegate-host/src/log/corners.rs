@@ -10,7 +10,8 @@
 //! or a tilted robot is not covered.
 //!
 //! A tag that is small in the image fits nearly as well in its mirrored orientation (a pose flip). If the pixels do not
-//! distinguish the two poses, or fit no pose, there is no fix.
+//! distinguish the two poses, or fit no pose, [`locate`] returns no fix. [`locate_all`] returns both poses instead, each
+//! with its own covariance, and follows the valley of the least squares however it is curved.
 //!
 //! ```
 //! use posegate_host::log::corners::{MountedCamera, TagObservation, locate};
@@ -37,9 +38,12 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use posegate::shape::{Camera, Mount, Pose3Deg, Tag, Tolerance};
 
+mod solutions;
 mod survey;
 #[cfg(test)]
 mod tests;
+
+pub use self::solutions::locate_all;
 
 /// A camera of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +75,8 @@ pub struct Fix {
     /// The covariance by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the
     /// wanted radius holds the true pose.
     pub covariance: [[f64; 3]; 3],
-    /// The factor between that covariance and the first-order one, 1 to 4.
+    /// The factor between that covariance and the first-order one, before tolerances: 1 to 4 from [`locate`]; from
+    /// [`locate_all`] at least 1, in the direction in which it is largest.
     pub grown: f64,
     /// The root mean square of the pixel residuals.
     pub rms_px: f64,
@@ -141,33 +146,15 @@ pub fn locate(
     sigma_px: f64,
     radius_squared: f64,
 ) -> Result<Fix, FixError> {
-    let view = View::of(eye, seen);
-    if seen.is_empty() {
-        return Err(FixError::NoTag);
-    }
-    let finite = seen
-        .iter()
-        .flat_map(|seen| seen.corners_px.as_flattened())
-        .all(|pixel| pixel.is_finite());
-    let positive = |value: f64| value > 0.0 && value.is_finite();
-    if !(finite && positive(sigma_px) && positive(radius_squared)) {
-        return Err(FixError::NotFinite);
-    }
-    let mut found: Vec<(f64, Vector3<f64>)> = (0..STARTS)
-        .filter_map(|k| view.descended(view.start(f64::from(k) / f64::from(STARTS))?))
-        .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let view = View::checked(eye, seen, sigma_px, radius_squared)?;
+    let found = view.minima();
     let (cost, pose) = *found.first().ok_or(FixError::NoPose)?;
     let variance = sigma_px * sigma_px;
-    let other = found.iter().find(|(_, other)| {
-        let mut apart = other - pose;
-        apart.z = wrapped(apart.z);
-        apart.norm() > APART
-    });
+    let other = found.iter().find(|(_, other)| apart(other, &pose) > APART);
     if cost > variance * misfit(8 * seen.len() - 3) {
         return Err(FixError::Misfit);
     }
-    let clearer = CLEARER.max(1.5 * radius_squared) * variance;
+    let clearer = clearer(radius_squared) * variance;
     if other.is_some_and(|(other, _)| other - cost < clearer) {
         return Err(FixError::Ambiguous);
     }
@@ -176,16 +163,40 @@ pub fn locate(
     let level = cost + radius_squared * variance;
     let root = covariance.cholesky().ok_or(FixError::NoPose)?.unpack() * libm::sqrt(radius_squared);
     let grown = view.grown(&pose, &root, level).ok_or(FixError::Ambiguous)?;
-    let shifts = survey::shifts(&view, &pose, eye, seen).ok_or(FixError::NoPose)?;
+    let balls = survey::balls(&view, eye, seen);
+    let shifts = survey::shifts(&view, &pose, &balls).ok_or(FixError::NoPose)?;
     let covariance = survey::widened(covariance * grown, radius_squared, &shifts);
     let covariance = covariance.ok_or(FixError::NoPose)?;
-    let rows = [0, 1, 2].map(|row| [0, 1, 2].map(|column| covariance[(row, column)]));
-    Ok(Fix {
-        pose: [pose.x, pose.y, wrapped(pose.z)],
-        covariance: rows,
-        grown,
-        rms_px: libm::sqrt(cost / (8 * seen.len()) as f64),
-    })
+    Ok(Fix::of(&pose, &covariance, grown, cost, seen.len()))
+}
+
+impl Fix {
+    fn of(
+        pose: &Vector3<f64>,
+        covariance: &Matrix3<f64>,
+        grown: f64,
+        cost: f64,
+        tags: usize,
+    ) -> Self {
+        Self {
+            pose: [pose.x, pose.y, wrapped(pose.z)],
+            covariance: [0, 1, 2].map(|row| [0, 1, 2].map(|column| covariance[(row, column)])),
+            grown,
+            rms_px: libm::sqrt(cost / (8 * tags) as f64),
+        }
+    }
+}
+
+/// Returns by how much another pose must fit worse to be left out, as a difference of the sums of squares over sigma^2.
+fn clearer(radius_squared: f64) -> f64 {
+    CLEARER.max(1.5 * radius_squared)
+}
+
+/// Returns how far two poses are apart: metres and radians as one norm.
+fn apart(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    let mut apart = a - b;
+    apart.z = wrapped(apart.z);
+    apart.norm()
 }
 
 /// Returns the value that a sum of squares over sigma^2 with this many degrees of freedom exceeds once in 30,000 times:
@@ -231,6 +242,36 @@ struct View<'e> {
 }
 
 impl<'e> View<'e> {
+    /// Returns the view if there is a tag, and all numbers are usable.
+    fn checked(
+        eye: &'e MountedCamera,
+        seen: &[TagObservation<'_>],
+        sigma_px: f64,
+        radius_squared: f64,
+    ) -> Result<Self, FixError> {
+        if seen.is_empty() {
+            return Err(FixError::NoTag);
+        }
+        let finite = seen
+            .iter()
+            .flat_map(|seen| seen.corners_px.as_flattened())
+            .all(|pixel| pixel.is_finite());
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        if !(finite && positive(sigma_px) && positive(radius_squared)) {
+            return Err(FixError::NotFinite);
+        }
+        Ok(Self::of(eye, seen))
+    }
+
+    /// Returns the local minima of the cost that are reached from all directions, best first. One minimum may be there several times.
+    fn minima(&self) -> Vec<(f64, Vector3<f64>)> {
+        let mut found: Vec<(f64, Vector3<f64>)> = (0..STARTS)
+            .filter_map(|k| self.descended(self.start(f64::from(k) / f64::from(STARTS))?))
+            .collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
+    }
+
     fn of(eye: &'e MountedCamera, seen: &[TagObservation<'_>]) -> Self {
         let corners = seen.iter().flat_map(|seen| {
             let half = 0.5 * seen.tag.size;

@@ -15,6 +15,7 @@
 //! ```
 
 pub mod corners;
+pub mod detector;
 pub mod metrics;
 pub mod recording;
 pub mod replay;

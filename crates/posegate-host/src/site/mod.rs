@@ -25,6 +25,7 @@ use posegate::shape::{Camera, Intrinsics, Mount, PoseDeg, SuccessSet, Tag, Toler
 
 pub use posegate::bake::{Extent, Layout, Step, TableSpec};
 
+pub(crate) use self::calibration::lens_of_ros;
 pub use self::chain::{
     ChainStart, ChainStep, DriveModel, Navigation, SiteChain, StartFrame, StartUncertainty,
 };

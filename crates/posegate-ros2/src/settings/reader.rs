@@ -8,11 +8,19 @@ use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate::table::Table;
 use posegate::track::{OdometryErrors, TrackerSettings};
+use posegate_host::log::detector::{Detector, DetectorSettings};
+use posegate_host::site::Site;
+use std::path::Path;
 
 /// Every parameter.
-const NAMES: [&str; 37] = [
+const NAMES: [&str; 44] = [
+    "camera",
+    "camera_info_reliability",
+    "corner_sigma_px",
     "cross_terms",
     "cycle_ms",
+    "detections_durability",
+    "detections_reliability",
     "frame_id",
     "heartbeat_ms",
     "inflation",
@@ -20,6 +28,7 @@ const NAMES: [&str; 37] = [
     "link_timeout_ms",
     "look_at",
     "markers",
+    "max_hamming",
     "max_speed",
     "max_speed_across",
     "max_yaw_rate_deg",
@@ -45,6 +54,7 @@ const NAMES: [&str; 37] = [
     "site_digest",
     "stands_still",
     "task",
+    "use_detections",
     "use_odometry",
     "use_sim_time",
     "valid_ms",
@@ -62,6 +72,22 @@ const WITH_CONTROLLER: [&str; 9] = [
     "task",
     "valid_ms",
 ];
+
+/// What counts only if detections are used.
+const OF_DETECTIONS: [&str; 6] = [
+    "camera",
+    "camera_info_reliability",
+    "corner_sigma_px",
+    "detections_durability",
+    "detections_reliability",
+    "max_hamming",
+];
+
+/// What counts only for poses. The covariance from corners has all its terms.
+const OF_POSES: [&str; 3] = ["cross_terms", "pose_durability", "pose_reliability"];
+
+/// The standard deviation of a corner's coordinates, pixels. Detectors are often better; what is measured with the own camera counts.
+const CORNER_SIGMA_PX: f64 = 0.5;
 
 const TIME: &str = "milliseconds, a whole number from 1 to 60000";
 const NUMBER: &str = "a number that is not below zero";
@@ -230,7 +256,76 @@ impl Reader<'_> {
         }
     }
 
-    pub(super) fn trust(&self) -> Result<Trust, SettingsError> {
+    /// Reads the site file. The table must be made from it.
+    pub(super) fn site_file(
+        &self,
+        path: Option<&Path>,
+        table: &Table<'_>,
+    ) -> Result<Option<Site>, SettingsError> {
+        let Some(path) = path else {
+            return Ok(None);
+        };
+        let site = Site::read(path).map_err(|error| SettingsError::Site(error.to_string()))?;
+        if site.digest == table.site_digest() {
+            return Ok(Some(site));
+        }
+        Err(SettingsError::WrongSite {
+            found: hex(&table.site_digest()),
+            expected: format!("{} (of {})", hex(&site.digest), path.display()),
+        })
+    }
+
+    /// Returns the tags and the camera, if detections are used.
+    pub(super) fn detector(
+        &self,
+        site: Option<&Site>,
+        table: &Table<'_>,
+    ) -> Result<Option<Detector>, SettingsError> {
+        let is_used = self.bool("use_detections", false)?;
+        let foreign: &[&str] = if is_used { &OF_POSES } else { &OF_DETECTIONS };
+        if let Some(name) = foreign.iter().find(|name| self.0.get(name).is_some()) {
+            return Err(SettingsError::OtherInput {
+                name: (*name).to_owned(),
+                place: self.0.place(name).to_owned(),
+                of: if is_used {
+                    "poses"
+                } else {
+                    "detections of tags"
+                },
+                instead: !is_used,
+            });
+        }
+        if !is_used {
+            return Ok(None);
+        }
+        let site = site.ok_or(SettingsError::NoSite)?;
+        let camera = match self.0.get("camera") {
+            None => None,
+            Some(_) => Some(self.text("camera", "")?),
+        };
+        let corner_sigma_px = self.number("corner_sigma_px")?.unwrap_or(CORNER_SIGMA_PX);
+        if !(0.01..=100.0).contains(&corner_sigma_px) {
+            return Err(self.invalid("corner_sigma_px", "pixels from 0.01 to 100"));
+        }
+        let settings = DetectorSettings {
+            corner_sigma_px,
+            max_hamming: self.whole("max_hamming", 0, "a whole number from 0 to 3", 0..=3)? as i32,
+            radius_squared: f64::from(table.radius_squared().q16()) / 65_536.0,
+        };
+        Ok(Some(Detector::new(site, camera.as_deref(), settings)?))
+    }
+
+    /// Returns the delivery of a topic of which only the last message counts: best effort is received from every publisher.
+    pub(super) fn best_effort(&self, reliability: &'static str) -> Result<Delivery, SettingsError> {
+        let choices = ["best_effort", "reliable"];
+        let reliable = self.choice(reliability, choices, "`reliable` or `best_effort`")? == 1;
+        Ok(Delivery {
+            reliable,
+            transient_local: false,
+        })
+    }
+
+    pub(super) fn trust(&self, is_filled: bool) -> Result<Trust, SettingsError> {
         let inflation = Inflation::new(self.number("inflation")?.unwrap_or(1.0))
             .ok_or_else(|| self.invalid("inflation", "a factor from 1 to 4096"))?;
         let expected = "`yaw_unknown` (AMCL), `all_unknown` (variances alone) or `filled` (all terms are the filter's)";
@@ -239,6 +334,7 @@ impl Reader<'_> {
             ["yaw_unknown", "all_unknown", "filled"],
             expected,
         )? {
+            _ if is_filled => CrossTerms::Filled,
             0 => CrossTerms::YawUnknown(SplitWeight::HALF),
             1 => CrossTerms::AllUnknown(SplitWeight::HALF),
             _ => CrossTerms::Filled,

@@ -13,6 +13,37 @@ fn settings(line: &str) -> Result<NodeSettings, SettingsError> {
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";
+const DETECTIONS: &str = "--ros-args -p stands_still:=true -p use_detections:=true";
+
+/// The site of the table.
+fn site() -> String {
+    concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/sites/dock.toml"
+    )
+    .into()
+}
+
+fn other_site() -> String {
+    concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/tags.toml").into()
+}
+
+#[test]
+fn a_site_file_gives_the_detector() {
+    let line = format!("--site {} {DETECTIONS} -p max_hamming:=1", site());
+    let given = settings(&line).unwrap();
+    let detector = given.detector.as_ref().unwrap();
+    assert_eq!(detector.camera_name(), "front");
+    assert_eq!(detector.settings().corner_sigma_px, 0.5);
+    assert_eq!(detector.settings().max_hamming, 1);
+    assert!(given.site_is_checked);
+    assert_eq!(given.trust.cross_terms, CrossTerms::Filled);
+    let [detections, camera_info] = [given.detections_delivery, given.camera_info_delivery];
+    assert!(detections.reliable && !detections.transient_local && !camera_info.reliable);
+    // The file alone is checked, too.
+    let alone = settings(&format!("--site {} {STILL}", site())).unwrap();
+    assert!(alone.site_is_checked && alone.detector.is_none());
+}
 
 #[test]
 fn parameters_become_settings() {
@@ -116,6 +147,38 @@ fn wrong_parameters_are_refused_with_words() {
         (
             format!("{STILL} -p use_sim_time:=true"),
             "clock that cannot stop",
+        ),
+        (
+            format!("{STILL} -p use_detections:=true"),
+            "give --site FILE",
+        ),
+        (
+            format!("{STILL} -p corner_sigma_px:=0.3"),
+            "is for detections of tags: leave it out, or set use_detections to true",
+        ),
+        (
+            format!("{STILL} -p use_detections:=true -p cross_terms:=filled"),
+            "is for poses",
+        ),
+        (
+            format!("--site {} {STILL}", other_site()),
+            "made from another site file",
+        ),
+        (
+            format!("--site /no/such.toml {STILL}"),
+            "the site file cannot be used",
+        ),
+        (
+            format!("--site {} {DETECTIONS} -p camera:=rear", site()),
+            "no camera `rear`: it has front",
+        ),
+        (
+            format!("--site {} {DETECTIONS} -p corner_sigma_px:=0", site()),
+            "pixels from 0.01 to 100",
+        ),
+        (
+            format!("--site {} {DETECTIONS} -p max_hamming:=4", site()),
+            "from 0 to 3",
         ),
         (format!("{STILL} -p task:=park"), "for the task `dock`"),
         (

@@ -12,63 +12,98 @@
 use super::{MountedCamera, STEP, TagObservation, View, dot, slopes};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
-/// Returns the ellipsoids `{ e : e' Q^-1 e <= 1 }` of the possible pose errors, one for each tolerance above 0.
-pub(super) fn shifts<'e>(
-    view: &View<'e>,
-    pose: &Vector3<f64>,
+/// A tolerance: a ball of displacements of a tag or of the camera.
+pub(super) struct Ball<'v, 'e> {
+    /// Its radius, metres or radians, above 0.
+    pub(super) size: f64,
+    /// The view after a displacement along each of its axes.
+    pub(super) axes: Vec<Moved<'v, 'e>>,
+}
+
+/// Returns the view after a displacement, metres or radians.
+type Moved<'v, 'e> = Box<dyn Fn(f64) -> View<'e> + 'v>;
+
+/// Returns the tolerances above 0.
+pub(super) fn balls<'v, 'e>(
+    view: &'v View<'e>,
     eye: &MountedCamera,
     seen: &[TagObservation<'_>],
-) -> Option<Vec<Matrix3<f64>>> {
-    let jacobian = view.jacobian(pose)?;
-    let information = Matrix3::from_fn(|r, c| dot(&jacobian[r], &jacobian[c]));
-    let inverse = information.cholesky()?.inverse();
-    let mut all = Vec::new();
-    // Adds the ellipsoid of a ball with these axes. Each axis changes the view by a step.
-    let mut add = |size: f64, axes: &[Vector3<f64>], moved: &dyn Fn(Vector3<f64>) -> View<'e>| {
-        if !(size > 0.0) {
-            return Some(());
-        }
-        let mut sum = Matrix3::zeros();
-        for axis in axes {
-            let ahead = moved(axis * STEP).residuals(pose)?;
-            let behind = moved(axis * -STEP).residuals(pose)?;
-            let column = slopes(&ahead, &behind)?;
-            let off = inverse * Vector3::from_fn(|r, _| dot(&jacobian[r], &column)) * size;
-            sum += off * off.transpose();
-        }
-        all.push(sum);
-        Some(())
-    };
+) -> Vec<Ball<'v, 'e>> {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let mut all: Vec<Ball<'v, 'e>> = Vec::new();
+    let mut add = |size: f64, axes: Vec<Moved<'v, 'e>>| {
+        if size > 0.0 {
+            all.push(Ball { size, axes });
+        }
+    };
     for (number, seen) in seen.iter().enumerate() {
-        let by = seen.tolerance;
-        let moved = |motion: Isometry3<f64>| {
+        let moved = move |motion: Isometry3<f64>| {
             let mut moved = view.clone();
             for (corner, _) in moved.corners.iter_mut().skip(4 * number).take(4) {
                 *corner = motion * *corner;
             }
             moved
         };
+        let shift = |axis: Vector3<f64>| -> Moved<'v, 'e> {
+            Box::new(move |by| moved(Translation3::from(axis * by).into()))
+        };
         let at = seen.tag.pose;
         let centre = Translation3::new(at.x, at.y, at.z);
-        add(by.translation, &axes, &|way| {
-            moved(Translation3::from(way).into())
-        })?;
-        add(by.turn_deg.to_radians(), &axes[2..], &|turn| {
-            moved(centre * UnitQuaternion::from_scaled_axis(turn) * centre.inverse())
-        })?;
+        let turn = |axis: Vector3<f64>| -> Moved<'v, 'e> {
+            Box::new(move |by| {
+                moved(centre * UnitQuaternion::from_scaled_axis(axis * by) * centre.inverse())
+            })
+        };
+        add(seen.tolerance.translation, axes.map(shift).into());
+        add(
+            seen.tolerance.turn_deg.to_radians(),
+            Vec::from([turn(Vector3::z())]),
+        );
     }
-    let by = eye.mount_tolerance;
-    add(by.translation, &axes, &|way| {
-        let mut moved = view.clone();
-        moved.mount.translation.vector += way;
-        moved
-    })?;
-    add(by.turn_deg.to_radians(), &axes, &|turn| {
-        let mut moved = view.clone();
-        moved.mount.rotation = UnitQuaternion::from_scaled_axis(turn) * moved.mount.rotation;
-        moved
-    })?;
+    let shift = |axis: Vector3<f64>| -> Moved<'v, 'e> {
+        Box::new(move |by| {
+            let mut moved = view.clone();
+            moved.mount.translation.vector += axis * by;
+            moved
+        })
+    };
+    let turn = |axis: Vector3<f64>| -> Moved<'v, 'e> {
+        Box::new(move |by| {
+            let mut moved = view.clone();
+            let turn = UnitQuaternion::from_scaled_axis(axis * by);
+            moved.mount.rotation = turn * moved.mount.rotation;
+            moved
+        })
+    };
+    add(eye.mount_tolerance.translation, axes.map(shift).into());
+    add(
+        eye.mount_tolerance.turn_deg.to_radians(),
+        axes.map(turn).into(),
+    );
+    all
+}
+
+/// Returns the ellipsoids `{ e : e' Q^-1 e <= 1 }` of the possible pose errors, one for each tolerance above 0.
+pub(super) fn shifts(
+    view: &View<'_>,
+    pose: &Vector3<f64>,
+    balls: &[Ball<'_, '_>],
+) -> Option<Vec<Matrix3<f64>>> {
+    let jacobian = view.jacobian(pose)?;
+    let information = Matrix3::from_fn(|r, c| dot(&jacobian[r], &jacobian[c]));
+    let inverse = information.cholesky()?.inverse();
+    let mut all = Vec::new();
+    for ball in balls {
+        let mut sum = Matrix3::zeros();
+        for moved in &ball.axes {
+            let ahead = moved(STEP).residuals(pose)?;
+            let behind = moved(-STEP).residuals(pose)?;
+            let column = slopes(&ahead, &behind)?;
+            let off = inverse * Vector3::from_fn(|r, _| dot(&jacobian[r], &column)) * ball.size;
+            sum += off * off.transpose();
+        }
+        all.push(sum);
+    }
     Some(all)
 }
 

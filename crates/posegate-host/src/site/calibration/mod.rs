@@ -150,3 +150,9 @@ pub(super) fn lens(model: &str, coefficients: &[f64]) -> Option<Result<Lens, usi
         _ => return None,
     })
 }
+
+/// Returns the lens of a ROS model with its coefficients, as in a CameraInfo message; `None` if the model or the number of its
+/// coefficients is not known.
+pub(crate) fn lens_of_ros(model: &str, coefficients: &[f64]) -> Option<Lens> {
+    lens(model, coefficients)?.ok()
+}

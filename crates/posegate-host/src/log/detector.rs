@@ -1,0 +1,468 @@
+//! Poses from the detections of a tag detector and the calibration that it publishes, by the tags and the camera of a site.
+//!
+//! [`Detector::camera`] checks a calibration (ROS's CameraInfo) against the site's camera. [`Detector::look`] computes the poses that one
+//! image leaves open. Nothing here knows ROS: fields are those of `sensor_msgs/msg/CameraInfo` and
+//! `apriltag_msgs/msg/AprilTagDetection`.
+//!
+//! ```
+//! use posegate_host::log::detector::{CameraInfo, Detector, DetectorSettings, FoundTag};
+//! use posegate_host::site::{SAMPLE, Site};
+//!
+//! let site = Site::parse(SAMPLE, "site.toml")?;
+//! let settings = DetectorSettings { corner_sigma_px: 0.3, max_hamming: 0, radius_squared: 11.3449 };
+//! let detector = Detector::new(&site, Some("front"), settings)?;
+//! let info = CameraInfo {
+//!     width: 640,
+//!     height: 480,
+//!     k: [615.0, 0.0, 320.0, 0.0, 615.0, 240.0, 0.0, 0.0, 1.0],
+//!     ..CameraInfo::default()
+//! };
+//! let camera = detector.camera(&info)?;
+//! // The corners of a tag that is seen from 27 degrees off its normal, at 3.1 m, in pixels.
+//! let corners_px = [[284.9, 269.1], [338.1, 270.4], [338.1, 209.6], [284.9, 210.9]];
+//! let found = FoundTag { family: "tag36h11".into(), id: 7, hamming: 0, corners_px };
+//! let fixes = detector.look(&camera, &[found])?;
+//! assert!((fixes[0].pose[0] - 1.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use super::corners::{Fix, FixError, MountedCamera, TagObservation, locate_all};
+use crate::site::{Site, SiteCamera, SiteTag, lens_of_ros};
+use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
+use posegate::shape::{Camera, Lens};
+use std::collections::{BTreeMap, BTreeSet};
+
+#[cfg(test)]
+mod tests;
+
+/// The largest difference of two calibrations of one camera anywhere in the image, pixels. The tolerance of the site's camera is added.
+const AGREES_PX: f64 = 1.0;
+/// Points along a side of the image at which calibrations are compared.
+const GRID: u32 = 9;
+/// By how much a corner may be outside of the image: detectors fit lines beyond the last pixel.
+const OUTSIDE_PX: f64 = 1.0;
+
+/// How detections are used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetectorSettings {
+    /// The standard deviation of each coordinate of a corner, pixels, above 0.
+    pub corner_sigma_px: f64,
+    /// Detections with more corrected bits are not used.
+    pub max_hamming: i32,
+    /// The squared radius of the pose-sets.
+    pub radius_squared: f64,
+}
+
+/// A calibration as it is published with each image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CameraInfo {
+    /// Columns of the whole image.
+    pub width: u32,
+    /// Rows of the whole image.
+    pub height: u32,
+    /// `plumb_bob`, `rational_polynomial` or `equidistant`; empty without distortion.
+    pub distortion_model: String,
+    /// The coefficients of the model.
+    pub d: Vec<f64>,
+    /// The raw camera's matrix by rows.
+    pub k: [f64; 9],
+    /// The rectification matrix by rows; zeros for the identity.
+    pub r: [f64; 9],
+    /// The rectified image's projection matrix by rows; zeros if it is that of the raw image.
+    pub p: [f64; 12],
+    /// Columns and rows that are combined into one; 0 for 1.
+    pub binning: [u32; 2],
+    /// The part of the image that is published: first column, first row, columns, rows; zeros for all.
+    pub roi: [u32; 4],
+}
+
+/// A detected tag.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundTag {
+    /// The family, with or without the prefix `tag`.
+    pub family: String,
+    /// The number.
+    pub id: i32,
+    /// Corrected bits.
+    pub hamming: i32,
+    /// The corners in AprilTag's order (bottom left, bottom right, top right, top left as a viewer sees the upright tag), pixels.
+    pub corners_px: [[f64; 2]; 4],
+}
+
+/// Why a site gives no detector.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DetectorError {
+    /// The site has no camera.
+    #[error("the site has no camera: add [camera.NAME] to it")]
+    NoCamera,
+    /// It has several.
+    #[error("the site has the cameras {0}: name one of them")]
+    SeveralCameras(String),
+    /// It has no camera of this name.
+    #[error("the site has no camera `{name}`: it has {all}")]
+    UnknownCamera {
+        /// The name.
+        name: String,
+        /// The names of the site.
+        all: String,
+    },
+    /// It has no tag.
+    #[error("the site has no tag: add [tag.NAME] to it")]
+    NoTag,
+}
+
+/// Why a calibration is not used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraInfoError {
+    /// All numbers are 0.
+    #[error("the camera info has no calibration (fx is 0): calibrate the camera")]
+    NotCalibrated,
+    /// The distortion is not one of the known models.
+    #[error(
+        "the camera info has the distortion model `{model}` with {count} coefficients: expected plumb_bob with 5, rational_polynomial with 8, or equidistant with 4"
+    )]
+    Distortion {
+        /// The model.
+        model: String,
+        /// The number of coefficients.
+        count: usize,
+    },
+    /// The rectified image is turned.
+    #[error(
+        "the camera info has a rectification matrix that turns the image, as for a stereo pair: let the detector read the raw image, and write image = \"raw\" in the site"
+    )]
+    Turned,
+    /// The numbers are not those of a camera.
+    #[error("the camera info is not that of a camera: {0}")]
+    Invalid(#[from] LensError),
+    /// Another size.
+    #[error(
+        "the camera info is for an image of {found}, and the site's camera `{camera}` has {expected}: remap camera_info to that camera, or correct the site"
+    )]
+    Size {
+        /// The site's camera.
+        camera: String,
+        /// The size in the message.
+        found: String,
+        /// The size in the site.
+        expected: String,
+    },
+    /// Another calibration.
+    #[error(
+        "the camera info differs from the site's camera `{camera}` by up to {apart_px:.1} px (at most {most_px:.1}): another camera, another calibration, or another image (rect or raw); correct the site, then build its tables again"
+    )]
+    Differs {
+        /// The site's camera.
+        camera: String,
+        /// The largest difference.
+        apart_px: f64,
+        /// The largest allowed one.
+        most_px: f64,
+    },
+}
+
+/// Why an image gives no pose.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LookError {
+    /// No tag was detected.
+    #[error("no tag is detected")]
+    Nothing,
+    /// No detected tag is in the site.
+    #[error("the detected tag {family} {id} is not in the site, which has {known}")]
+    Unknown {
+        /// The detected family.
+        family: String,
+        /// The detected number.
+        id: i32,
+        /// The tags of the site.
+        known: String,
+    },
+    /// Too many corrected bits.
+    #[error(
+        "the detection of tag {id} has {hamming} corrected bits, at most {most} are accepted (max_hamming)"
+    )]
+    Hamming {
+        /// The number.
+        id: i32,
+        /// The corrected bits.
+        hamming: i32,
+        /// The largest accepted number.
+        most: i32,
+    },
+    /// A tag is there twice: one of them is not the site's.
+    #[error("tag {0} is detected twice in one image: remove the copy, or the reflection")]
+    Twice(i32),
+    /// A corner is not in the image.
+    #[error(
+        "a corner of tag {0} is not in the image of the camera info: the detector reads another image"
+    )]
+    NotInImage(i32),
+    /// The corners give no pose.
+    #[error("the corners of the detected tags give no pose: {0}")]
+    Corners(#[from] FixError),
+}
+
+impl LookError {
+    /// Returns `true` if a known tag was detected and contradicts what is known, so that an earlier pose must not be used any more.
+    #[must_use]
+    pub const fn is_contradiction(&self) -> bool {
+        matches!(
+            self,
+            Self::Twice(_) | Self::NotInImage(_) | Self::Corners(_)
+        )
+    }
+}
+
+/// The tags and one camera of a site.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    name: String,
+    camera: SiteCamera,
+    tags: BTreeMap<(String, i64), SiteTag>,
+    settings: DetectorSettings,
+}
+
+impl Detector {
+    /// Makes a detector for a camera of a site; the name may be left out if the site has only one.
+    ///
+    /// # Errors
+    /// [`DetectorError`]
+    pub fn new(
+        site: &Site,
+        camera: Option<&str>,
+        settings: DetectorSettings,
+    ) -> Result<Self, DetectorError> {
+        let all = || {
+            let names: Vec<&str> = site.cameras.keys().map(String::as_str).collect();
+            names.join(", ")
+        };
+        let (name, camera) =
+            match camera {
+                Some(name) => site.cameras.get_key_value(name).ok_or_else(|| {
+                    DetectorError::UnknownCamera {
+                        name: name.into(),
+                        all: all(),
+                    }
+                })?,
+                None if site.cameras.len() > 1 => return Err(DetectorError::SeveralCameras(all())),
+                None => site.cameras.iter().next().ok_or(DetectorError::NoCamera)?,
+            };
+        if site.tags.is_empty() {
+            return Err(DetectorError::NoTag);
+        }
+        let keyed = |tag: &SiteTag| ((bare(&tag.family), i64::from(tag.tag.id)), tag.clone());
+        Ok(Self {
+            name: name.clone(),
+            camera: *camera,
+            tags: site.tags.values().map(keyed).collect(),
+            settings,
+        })
+    }
+
+    /// Returns the name of the camera in the site.
+    #[must_use]
+    pub fn camera_name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns how detections are used.
+    #[must_use]
+    pub const fn settings(&self) -> DetectorSettings {
+        self.settings
+    }
+
+    /// Returns the camera with a published calibration, if that is the site's camera. The numbers are those of the calibration. Takes some
+    /// milliseconds for a camera with distortion.
+    ///
+    /// The image is the one that the site says its detector reads. A site without distortion says that it reads a pinhole's image: then it
+    /// may be the rectified one.
+    ///
+    /// # Errors
+    /// [`CameraInfoError`]
+    pub fn camera(&self, info: &CameraInfo) -> Result<MountedCamera, CameraInfoError> {
+        let site = &self.camera;
+        let read = |image| {
+            let camera = CertifiedCamera::of(&calibration(info, image)?)?.camera;
+            self.agrees(&camera).map(|()| camera)
+        };
+        let camera = match site.calibration.image {
+            Image::Rect(_) => read(rectified(info)?),
+            _ if site.calibration.lens != Lens::Pinhole => read(Image::Raw),
+            _ => read(Image::Raw).or_else(|error| match rectified(info) {
+                Ok(image) => read(image),
+                Err(_) => Err(error),
+            }),
+        };
+        Ok(MountedCamera {
+            camera: camera?,
+            mount: site.mount,
+            mount_tolerance: site.mount_tolerance,
+        })
+    }
+
+    /// Compares a camera with the site's.
+    fn agrees(&self, camera: &Camera) -> Result<(), CameraInfoError> {
+        let own = &self.camera.camera;
+        let size = |camera: &Camera| [camera.width_px, camera.height_px];
+        if size(camera) != size(own) {
+            let words = |camera: &Camera| format!("{} x {}", camera.width_px, camera.height_px);
+            return Err(CameraInfoError::Size {
+                camera: self.name.clone(),
+                found: words(camera),
+                expected: words(own),
+            });
+        }
+        let [width, height] = size(own);
+        let mut apart_px = 0.0f64;
+        for (column, row) in (0..GRID).flat_map(|k| (0..GRID).map(move |l| (k, l))) {
+            let at = |k: u32, size: f64| size * f64::from(k) / f64::from(GRID - 1);
+            let ray = [
+                (at(column, width) - own.cx) / own.fx,
+                (at(row, height) - own.cy) / own.fy,
+            ];
+            let [[u, v], [other_u, other_v]] = [own.project(ray), camera.project(ray)];
+            // Through a lens, the corners of this grid may be outside of the image.
+            if (0.0..=width).contains(&u) && (0.0..=height).contains(&v) {
+                let apart = libm::hypot(other_u - u, other_v - v);
+                apart_px = apart_px.max(if apart.is_finite() { apart } else { 1e9 });
+            }
+        }
+        let reach_px = self
+            .camera
+            .tolerance
+            .reach_px([width, height], [own.cx, own.cy]);
+        let most_px = AGREES_PX + reach_px;
+        if apart_px <= most_px {
+            return Ok(());
+        }
+        Err(CameraInfoError::Differs {
+            camera: self.name.clone(),
+            apart_px,
+            most_px,
+        })
+    }
+
+    /// Returns the poses of the robot that the detections of one image leave open, best first: one or two
+    /// ([`locate_all`]). Detections of other tags are ignored, as are those with too many corrected bits.
+    ///
+    /// # Errors
+    /// [`LookError`]. If no detection can be used, the reason of the first one.
+    pub fn look(&self, camera: &MountedCamera, found: &[FoundTag]) -> Result<Vec<Fix>, LookError> {
+        let mut seen = Vec::new();
+        let mut ids = BTreeSet::new();
+        let mut ignored = None;
+        for found in found {
+            let key = (bare(&found.family), i64::from(found.id));
+            let most = self.settings.max_hamming;
+            let Some(tag) = self.tags.get(&key) else {
+                ignored.get_or_insert_with(|| LookError::Unknown {
+                    family: found.family.clone(),
+                    id: found.id,
+                    known: self.known(),
+                });
+                continue;
+            };
+            if !(0..=most).contains(&found.hamming) {
+                let (id, hamming) = (found.id, found.hamming);
+                ignored.get_or_insert(LookError::Hamming { id, hamming, most });
+                continue;
+            }
+            if !ids.insert(key) {
+                return Err(LookError::Twice(found.id));
+            }
+            let pixels = found.corners_px.as_flattened();
+            if !pixels.iter().all(|pixel| pixel.is_finite()) {
+                return Err(FixError::NotFinite.into());
+            }
+            let is_in = |[u, v]: [f64; 2]| {
+                let is_within = |at: f64, size: f64| at >= -OUTSIDE_PX && at <= size + OUTSIDE_PX;
+                is_within(u, camera.camera.width_px) && is_within(v, camera.camera.height_px)
+            };
+            if !found.corners_px.into_iter().all(is_in) {
+                return Err(LookError::NotInImage(found.id));
+            }
+            seen.push(TagObservation {
+                tag: &tag.tag,
+                tolerance: tag.tolerance,
+                corners_px: found.corners_px,
+            });
+        }
+        if seen.is_empty() {
+            return Err(ignored.unwrap_or(LookError::Nothing));
+        }
+        let DetectorSettings {
+            corner_sigma_px,
+            radius_squared,
+            ..
+        } = self.settings;
+        Ok(locate_all(camera, &seen, corner_sigma_px, radius_squared)?)
+    }
+
+    /// Returns the first tags of the site, in words.
+    fn known(&self) -> String {
+        let names = self.tags.values();
+        let mut words: Vec<String> = names
+            .take(5)
+            .map(|tag| format!("{} {}", tag.family, tag.tag.id))
+            .collect();
+        if self.tags.len() > words.len() {
+            words.push("others".into());
+        }
+        words.join(", ")
+    }
+}
+
+/// Returns a family without the prefix `tag` that some detectors write.
+fn bare(family: &str) -> String {
+    family.strip_prefix("tag").unwrap_or(family).to_string()
+}
+
+/// Returns the rectified image of a camera info.
+fn rectified(info: &CameraInfo) -> Result<Image, CameraInfoError> {
+    const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    if info.r != IDENTITY && info.r != [0.0; 9] {
+        return Err(CameraInfoError::Turned);
+    }
+    let [fx, _, cx, _, _, fy, cy, ..] = info.p;
+    let [raw_fx, _, raw_cx, _, raw_fy, raw_cy, ..] = info.k;
+    Ok(Image::Rect(if fx == 0.0 {
+        [raw_fx, raw_fy, raw_cx, raw_cy]
+    } else {
+        [fx, fy, cx, cy]
+    }))
+}
+
+/// Returns the calibration of a camera info, for one of its images.
+fn calibration(info: &CameraInfo, image: Image) -> Result<Calibration, CameraInfoError> {
+    let [fx, _, cx, _, fy, cy, ..] = info.k;
+    if fx == 0.0 {
+        return Err(CameraInfoError::NotCalibrated);
+    }
+    let lens = if info.d.iter().all(|d| *d == 0.0) && info.distortion_model != "equidistant" {
+        Lens::Pinhole
+    } else {
+        let known = lens_of_ros(&info.distortion_model, &info.d);
+        known.ok_or_else(|| CameraInfoError::Distortion {
+            model: info.distortion_model.clone(),
+            count: info.d.len(),
+        })?
+    };
+    let [x_offset, y_offset, width, height] = info.roi;
+    Ok(Calibration {
+        size_px: [f64::from(info.width), f64::from(info.height)],
+        focal_px: [fx, fy],
+        axis_px: [cx, cy],
+        lens,
+        image,
+        roi: (info.roi != [0; 4]).then_some(Roi {
+            x_offset,
+            y_offset,
+            width,
+            height,
+        }),
+        binning: info.binning.map(|count| count.max(1)),
+        border_px: 0.0,
+    })
+}

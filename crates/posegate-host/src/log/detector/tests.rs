@@ -1,0 +1,184 @@
+use super::*;
+use crate::site::SAMPLE;
+
+const SETTINGS: DetectorSettings = DetectorSettings {
+    corner_sigma_px: 0.3,
+    max_hamming: 0,
+    radius_squared: 11.3449,
+};
+/// Tag 7 of the sample from x = 1 m, y = -1.5 m, yaw = 0.45 rad.
+const CORNERS: [[f64; 2]; 4] = [
+    [284.9, 269.1],
+    [338.1, 270.4],
+    [338.1, 209.6],
+    [284.9, 210.9],
+];
+
+fn detector() -> Detector {
+    let site = Site::parse(SAMPLE, "site.toml").unwrap();
+    Detector::new(&site, Some("front"), SETTINGS).unwrap()
+}
+
+fn info() -> CameraInfo {
+    CameraInfo {
+        width: 640,
+        height: 480,
+        distortion_model: "plumb_bob".into(),
+        d: vec![0.0; 5],
+        k: [615.0, 0.0, 320.0, 0.0, 615.0, 240.0, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [
+            615.0, 0.0, 320.0, 0.0, 0.0, 615.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0,
+        ],
+        ..CameraInfo::default()
+    }
+}
+
+fn tag() -> FoundTag {
+    FoundTag {
+        family: "36h11".into(),
+        id: 7,
+        hamming: 0,
+        corners_px: CORNERS,
+    }
+}
+
+#[test]
+fn a_known_tag_gives_a_pose() {
+    let detector = detector();
+    let camera = detector.camera(&info()).unwrap();
+    let other = FoundTag { id: 99, ..tag() };
+    for found in [vec![tag()], vec![other, tag()]] {
+        let fixes = detector.look(&camera, &found).unwrap();
+        let [x, y, yaw] = fixes[0].pose;
+        assert!((x - 1.0).abs() < 0.01 && (y + 1.5).abs() < 0.01 && (yaw - 0.45).abs() < 0.01);
+    }
+}
+
+#[test]
+fn detections_that_cannot_be_used_are_named() {
+    let detector = detector();
+    let camera = detector.camera(&info()).unwrap();
+    let change = |change: &dyn Fn(&mut FoundTag)| {
+        let mut tag = tag();
+        change(&mut tag);
+        tag
+    };
+    let moved = |by: f64| {
+        move |tag: &mut FoundTag| {
+            for [u, _] in &mut tag.corners_px {
+                *u += by;
+            }
+        }
+    };
+    for (found, words, contradicts) in [
+        (vec![], "no tag is detected", false),
+        (
+            vec![change(&|tag| tag.id = 8)],
+            "tag 36h11 8 is not in the site, which has tag36h11 7",
+            false,
+        ),
+        (vec![change(&|tag| tag.id = -1)], "not in the site", false),
+        (
+            vec![change(&|tag| tag.family = "tag25h9".into())],
+            "tag tag25h9 7 is not in the site",
+            false,
+        ),
+        (
+            vec![change(&|tag| tag.hamming = 1)],
+            "1 corrected bits, at most 0",
+            false,
+        ),
+        (
+            vec![change(&|tag| tag.hamming = -1)],
+            "corrected bits",
+            false,
+        ),
+        (vec![tag(), tag()], "detected twice", true),
+        (vec![change(&moved(400.0))], "not in the image", true),
+        (
+            vec![change(&|tag| tag.corners_px[3][1] = f64::NAN)],
+            "not finite",
+            true,
+        ),
+        (
+            vec![change(&|tag| tag.corners_px.rotate_left(1))],
+            "do not fit",
+            true,
+        ),
+    ] {
+        let error = detector.look(&camera, &found).unwrap_err();
+        let message = error.to_string();
+        assert!(message.contains(words), "{message}");
+        assert_eq!(error.is_contradiction(), contradicts, "{message}");
+    }
+}
+
+#[test]
+fn a_calibration_that_is_not_the_sites_is_refused() {
+    let detector = detector();
+    let change = |change: &dyn Fn(&mut CameraInfo)| {
+        let mut info = info();
+        change(&mut info);
+        info
+    };
+    for (info, words) in [
+        (CameraInfo::default(), "calibrate the camera"),
+        (
+            change(&|info| info.width = 1280),
+            "image of 1280 x 480, and the site's camera `front` has 640 x 480",
+        ),
+        (change(&|info| info.binning = [2, 2]), "image of 320 x 240"),
+        (
+            change(&|info| info.roi = [0, 0, 320, 240]),
+            "image of 320 x 240",
+        ),
+        (
+            change(&|info| info.k[0] = 618.0),
+            "differs from the site's camera `front` by up to",
+        ),
+        (change(&|info| info.k[2] = 330.0), "differs"),
+        (change(&|info| info.d[0] = -0.3), "differs"),
+        (change(&|info| info.k[0] = f64::NAN), "camera info"),
+        (
+            change(&|info| info.d = vec![0.1; 3]),
+            "`plumb_bob` with 3 coefficients",
+        ),
+    ] {
+        // The rectified image of a pinhole site is compared too: give it the same fault.
+        let mut info = info;
+        info.p = [
+            info.k[0], 0.0, info.k[2], 0.0, 0.0, info.k[4], info.k[5], 0.0, 0.0, 0.0, 1.0, 0.0,
+        ];
+        if info.d.iter().any(|d| *d != 0.0) {
+            info.r[1] = 0.1;
+        }
+        let error = detector.camera(&info).unwrap_err().to_string();
+        assert!(error.contains(words), "{words}: {error}");
+    }
+    // A pinhole site whose detector reads the rectified image of a lens.
+    let lens = change(&|info| {
+        info.d = vec![-0.2, 0.05, 0.0, 0.0, 0.0];
+        info.k = [600.0, 0.0, 318.0, 0.0, 601.0, 243.0, 0.0, 0.0, 1.0];
+    });
+    let camera = detector.camera(&lens).unwrap().camera;
+    assert_eq!((camera.fx, camera.lens()), (615.0, Lens::Pinhole));
+    // A small difference is the calibration's, and its numbers are used.
+    let near = change(&|info| info.k[0] = 616.0);
+    assert_eq!(detector.camera(&near).unwrap().camera.fx, 616.0);
+}
+
+#[test]
+fn a_site_without_the_camera_is_refused() {
+    let mut site = Site::parse(SAMPLE, "site.toml").unwrap();
+    let error = |site: &Site, name| Detector::new(site, name, SETTINGS).unwrap_err().to_string();
+    assert!(error(&site, Some("rear")).contains("no camera `rear`: it has front"));
+    let front = site.cameras["front"];
+    site.cameras.insert("rear".into(), front);
+    assert!(error(&site, None).contains("front, rear: name one"));
+    site.cameras.clear();
+    assert!(error(&site, None).contains("no camera: add"));
+    site.cameras.insert("front".into(), front);
+    site.tags.clear();
+    assert!(error(&site, None).contains("no tag: add"));
+}

@@ -1,0 +1,197 @@
+//! Detections of tags become poses: one, or two if a tag is seen head-on. No DDS in here.
+//!
+//! The geometry is in [`posegate_host::log::detector`]. [`Tags`] keeps the camera that the camera info describes, and what became of the
+//! last detections, in words.
+
+use crate::message::{
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, OK, WARN,
+};
+use posegate::report::PoseEstimate;
+use posegate::set::{Estimate, Uncertainty};
+use posegate_host::log::corners::{Fix, MountedCamera};
+use posegate_host::log::detector::{self, Detector, FoundTag};
+
+/// What one message of detections gives.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Look {
+    /// The poses at one of which the robot is, best first: one or two.
+    Poses(Vec<PoseEstimate>),
+    /// No pose. An earlier one is still right.
+    Nothing,
+    /// No pose, and the message contradicts what is known: an earlier pose must not be used.
+    Contradiction,
+}
+
+/// Makes poses from detections.
+#[derive(Clone, Debug)]
+pub struct Tags {
+    detector: Detector,
+    topics: [String; 2],
+    info: Option<CameraInfo>,
+    camera: Option<MountedCamera>,
+    /// Why the camera info is not used.
+    refused: Option<String>,
+    /// Why the last detections gave no pose.
+    unused: Option<String>,
+    counts: [u64; 4],
+}
+
+impl Tags {
+    /// Makes one without a camera info; the topics are those of the detections and of the camera info, for messages.
+    #[must_use]
+    pub const fn new(detector: Detector, topics: [String; 2]) -> Self {
+        Self {
+            detector,
+            topics,
+            info: None,
+            camera: None,
+            refused: None,
+            unused: None,
+            counts: [0; 4],
+        }
+    }
+
+    /// Takes a camera info. One that is not that of the site's camera is refused, and the one before is then not used either.
+    pub fn camera_info(&mut self, message: &CameraInfo) {
+        let is_same = self
+            .info
+            .as_ref()
+            .is_some_and(|info| info.is_same_calibration(message));
+        if is_same {
+            return;
+        }
+        let camera = self.detector.camera(&calibration(message));
+        self.info = Some(message.clone());
+        (self.camera, self.refused) = match camera {
+            Ok(camera) => (Some(camera), None),
+            Err(error) => (None, Some(error.to_string())),
+        };
+    }
+
+    /// Takes a camera info that could not be read: what it said is not known, so the one before is not used.
+    pub fn camera_info_lost(&mut self) {
+        (self.info, self.camera) = (None, None);
+        self.refused = Some(format!("a message of {} could not be read", self.topics[1]));
+    }
+
+    /// Takes detections.
+    pub fn look(&mut self, message: &AprilTagDetectionArray) -> Look {
+        let (look, unused) = self.looked(message);
+        self.unused = unused;
+        let kind = match &look {
+            Look::Poses(poses) if poses.len() == 1 => 0,
+            Look::Poses(_) => 1,
+            Look::Nothing => 2,
+            Look::Contradiction => 3,
+        };
+        self.counts[kind] += 1;
+        look
+    }
+
+    fn looked(&self, message: &AprilTagDetectionArray) -> (Look, Option<String>) {
+        // Without a camera info nothing is known of the camera: see `problem`.
+        let (Some(info), Some(camera)) = (&self.info, &self.camera) else {
+            return (Look::Nothing, None);
+        };
+        let (own, camera_frame) = (&message.header.frame_id, &info.header.frame_id);
+        if own != camera_frame {
+            let [detections, camera_info] = &self.topics;
+            let words = format!(
+                "{detections} is in the frame `{own}`, and {camera_info} in `{camera_frame}`: they are of two cameras; remap one of them"
+            );
+            return (Look::Contradiction, Some(words));
+        }
+        let found: Vec<FoundTag> = message
+            .detections
+            .iter()
+            .map(|detection| FoundTag {
+                family: detection.family.clone(),
+                id: detection.id,
+                hamming: detection.hamming,
+                corners_px: detection.corners,
+            })
+            .collect();
+        match self.detector.look(camera, &found) {
+            Ok(fixes) => (Look::Poses(fixes.iter().map(estimate).collect()), None),
+            Err(error) if error.is_contradiction() => {
+                (Look::Contradiction, Some(error.to_string()))
+            }
+            Err(error) => (Look::Nothing, Some(error.to_string())),
+        }
+    }
+
+    /// Returns why detections give no pose, in words; `None` if the last ones gave one.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let [detections, camera_info] = &self.topics;
+        if let Some(refused) = &self.refused {
+            return Some(format!(
+                "no detection is used, because of {camera_info}: {refused}"
+            ));
+        }
+        if self.camera.is_none() {
+            return Some(format!(
+                "no detection is used: no camera info has arrived on {camera_info}; start its publisher, or remap camera_info (-r)"
+            ));
+        }
+        let unused = self.unused.as_ref()?;
+        Some(format!(
+            "the last message of {detections} gives no pose: {unused}"
+        ))
+    }
+
+    /// Returns the state for the diagnostics.
+    #[must_use]
+    pub fn status(&self) -> DiagnosticStatus {
+        let problem = self.problem();
+        let level = match (&problem, &self.camera) {
+            (None, _) => OK,
+            (_, Some(_)) => WARN,
+            (_, None) => ERROR,
+        };
+        let [one, two, nothing, contradictions] = self.counts;
+        let settings = self.detector.settings();
+        DiagnosticStatus {
+            level,
+            name: "posegate: tags".into(),
+            message: problem.unwrap_or_else(|| "detections give poses".into()),
+            hardware_id: self.detector.camera_name().into(),
+            values: vec![
+                KeyValue::new("camera", self.detector.camera_name()),
+                KeyValue::new("corner_sigma_px", settings.corner_sigma_px),
+                KeyValue::new("one_pose", one),
+                KeyValue::new("two_poses", two),
+                KeyValue::new("no_pose", nothing),
+                KeyValue::new("contradictions", contradictions),
+            ],
+        }
+    }
+}
+
+/// Returns the estimate of a fix.
+fn estimate(fix: &Fix) -> PoseEstimate {
+    let [x_m, y_m, yaw_rad] = fix.pose;
+    PoseEstimate::new(
+        Estimate { x_m, y_m, yaw_rad },
+        Uncertainty::Gaussian(fix.covariance),
+    )
+}
+
+/// Returns the calibration of a message.
+fn calibration(message: &CameraInfo) -> detector::CameraInfo {
+    let roi = message.roi;
+    detector::CameraInfo {
+        width: message.width,
+        height: message.height,
+        distortion_model: message.distortion_model.clone(),
+        d: message.d.clone(),
+        k: message.k,
+        r: message.r,
+        p: message.p,
+        binning: [message.binning_x, message.binning_y],
+        roi: [roi.x_offset, roi.y_offset, roi.width, roi.height],
+    }
+}
+
+#[cfg(test)]
+mod tests;
