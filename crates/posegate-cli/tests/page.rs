@@ -204,6 +204,7 @@ fn chains_plans_and_the_sheet_are_there() {
     assert_ne!(narrow, text);
     let narrow = made(&narrow, |_| ()).expect("a page");
     assert!(narrow.contains("FAILS at step "), "no chain fails");
+    assert!(element(&narrow, "summary").ends_with(", 1 chain FAILS"));
 }
 
 /// The page has the numbers of the camera's view, from the goal and from the worst poses of the expected set.
@@ -294,9 +295,14 @@ fn the_command_writes_a_page_or_nothing() {
 
 const HALL: &str = include_str!("../../../examples/sites/hall.toml");
 
-/// Returns the hall with tags of 30 cm on its north wall, at these places along it in metres, and without candidates.
-fn hall(along: &[f64]) -> String {
-    let (site, _) = HALL.split_once("[candidates.").expect("candidates");
+/// Returns the hall with its first docks, with tags of 30 cm on its north wall, at these places along it in metres, and without
+/// candidates.
+fn hall(docks: u32, along: &[f64]) -> String {
+    let rest = format!("[task.dock-{}]", docks + 1);
+    let (site, _) = HALL
+        .split_once(&rest)
+        .or_else(|| HALL.split_once("[candidates."))
+        .expect("docks");
     let tags = along.iter().enumerate().map(|(id, x)| {
         format!("[tag.north-{id}]\nid = {id}\nfamily = \"tag36h11\"\nsize = 0.3\npose = {{ x = {x:?}, y = 9.0, z = 0.6, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }}\n")
     });
@@ -312,13 +318,16 @@ fn element<'p>(page: &'p str, id: &str) -> &'p str {
     rest.split_once('<').expect("an end").0
 }
 
+/// The tags that serve the first two docks.
+const TAGS_OF_TWO: [f64; 2] = [5.25, 8.25];
+
 /// The first thing that a manager reads is whether the docks are served, by how many tags, and how near to the limit.
 #[test]
 fn the_page_begins_with_a_summary() {
-    let all = made(&hall(&[5.25, 8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    let all = made(&hall(3, &[5.25, 8.25]), |_| ()).expect("a page");
     let summary = element(&all, "summary");
     assert!(
-        summary.starts_with("6 of 6 docks served by 4 tags, worst margin 1.0")
+        summary.starts_with("3 of 3 docks served by 2 tags, worst margin 1.0")
             && summary.ends_with(", proven"),
         "{summary}"
     );
@@ -342,14 +351,21 @@ fn the_page_begins_with_a_summary() {
     let (header, _) = all.split_once("<main>").expect("a header");
     assert!(header.contains("id=\"summary\""));
     // Without the first tag, the first dock is not served: this is said, not hidden.
-    let fewer = made(&hall(&[8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    let fewer = made(&hall(2, &TAGS_OF_TWO[1..]), |_| ()).expect("a page");
     let summary = element(&fewer, "summary");
     assert!(
-        summary.starts_with("5 of 6 docks served by 3 tags"),
+        summary.starts_with("1 of 2 docks served by 1 tag"),
         "{summary}"
     );
     assert!(fewer.contains("<p id=\"summary\" class=\"bad\">"));
     assert!(fewer.contains("<li>NOT served: dock-1: "));
+    // Docks that are alike are described once.
+    assert!(all.contains("<p>3 tasks are alike in the frames of their goals."));
+    assert_eq!(
+        all.matches("<details><summary>the pictures of dock-")
+            .count(),
+        2
+    );
     // Nothing is claimed of tasks without a start.
     let sample = made(SAMPLE, |_| ()).expect("a page");
     assert_eq!(element(&sample, "summary"), "3 of 3 success sets proven");
@@ -358,45 +374,37 @@ fn the_page_begins_with_a_summary() {
 
 #[test]
 fn tasks_that_are_alike_are_folded() {
-    let site = hall(&[5.25, 8.25, 14.25, 17.25]);
-    let page = made(&site, |_| ()).expect("a page");
-    assert!(page.contains("<p>6 tasks are alike in the frames of their goals."));
-    assert_eq!(
-        page.matches("<details><summary>the pictures of dock-")
-            .count(),
-        5
-    );
     // One that is narrower is shown by itself.
-    let (before, last) = site.split_once("[task.dock-6]").expect("a task");
+    let site = hall(3, &[5.25, 8.25]);
+    let (before, last) = site.split_once("[task.dock-3]").expect("a task");
     let narrow = last.replacen("x = [-0.1, 0.1]", "x = [-0.1, 0.09]", 1);
-    let page = made(&format!("{before}[task.dock-6]{narrow}"), |_| ()).expect("a page");
-    assert!(page.contains("<p>5 tasks are alike in the frames of their goals."));
+    let page = made(&format!("{before}[task.dock-3]{narrow}"), |_| ()).expect("a page");
+    assert!(page.contains("<p>2 tasks are alike in the frames of their goals."));
     assert_eq!(
         page.matches("<details><summary>the pictures of dock-")
             .count(),
-        4
+        1
     );
 }
 
 /// A stated error that the tag's tolerance alone exceeds makes a plan that is proven, and wrong: the summary says so.
 #[test]
 fn warnings_stand_beside_the_claim() {
-    let doubtful =
-        hall(&[5.25, 8.25, 14.25, 17.25]) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let doubtful = hall(2, &TAGS_OF_TWO) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
     let page = made(&doubtful, |_| ()).expect("a page");
-    assert!(page.contains("<p id=\"summary\" class=\"warned\">6 of 6 docks"));
+    assert!(page.contains("<p id=\"summary\" class=\"warned\">2 of 2 docks"));
     assert!(page.contains("<li>WARNING: "), "no warning");
-    let page = made(&hall(&[5.25, 8.25, 14.25, 17.25]), |_| ()).expect("a page");
+    let page = made(&hall(2, &TAGS_OF_TWO), |_| ()).expect("a page");
     assert!(page.contains("<p id=\"summary\" class=\"good\">") && !page.contains("WARNING"));
 }
 
 /// Where nothing is known the page says so: 0.000 m would promise that a tag is exactly where the file says.
 #[test]
 fn an_unknown_tolerance_is_not_zero() {
-    let page = made(&hall(&[5.25]), |_| ()).expect("a page");
+    let page = made(&hall(1, &[5.25]), |_| ()).expect("a page");
     let (_, tags) = page.split_once("<section id=\"tags\">").expect("tags");
     assert!(tags.contains("<td>unknown</td>") && !tags.contains("<td>0.000 m"));
-    let known = hall(&[5.25]) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let known = hall(1, &[5.25]) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
     let page = made(&known, |_| ()).expect("a page");
     assert!(page.contains("<td>0.010 m, 0.50 deg</td>"));
 }

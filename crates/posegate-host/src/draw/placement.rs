@@ -35,12 +35,7 @@ const FLOOR_HEIGHT: f64 = 230.0;
 
 /// The tag's corners seen from the goal, and from the pose-set's border.
 const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_fill_opacity("#222222", 0.12);
-const FROM_BORDER: [Style; 4] = [
-    Style::filled("#0072b2"),
-    Style::filled("#d55e00"),
-    Style::filled("#009e73"),
-    Style::filled("#cc79a7"),
-];
+const FROM_BORDER: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
 
 /// Draws places next to each other.
 #[must_use]
@@ -127,12 +122,14 @@ fn image(picture: &mut Picture, left: f64, column: &Column, view: &Visibility) {
             &Style::filled("#f7f7f4").with_outline("#222222", 1.6),
         );
         if let Some(belief) = drawn(column) {
+            let mut dots: [Vec<[f64; 2]>; 4] = Default::default();
             for pose in belief.border() {
-                for (corner, style) in corners(pose).into_iter().zip(&FROM_BORDER) {
-                    if let Some(corner) = corner {
-                        picture.circle(at(corner), 1.1, style);
-                    }
+                for (corner, dots) in corners(pose).into_iter().zip(&mut dots) {
+                    dots.extend(corner.map(at));
                 }
+            }
+            for (dots, colour) in dots.iter().zip(FROM_BORDER) {
+                picture.dots(dots, 1.1, colour);
             }
         }
         let seen: Option<Vec<[f64; 2]>> = corners(radians(column.set.goal))

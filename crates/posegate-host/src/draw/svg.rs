@@ -190,6 +190,16 @@ impl Picture {
         ));
     }
 
+    /// Draws many dots of one colour, as a single element.
+    pub fn dots(&mut self, points: &[[f64; 2]], radius: f64, colour: &str) {
+        let dot = |[x, y]: &[f64; 2]| format!("M{} {}h0", number(*x), number(*y));
+        self.element(format_args!(
+            "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{}\" stroke-linecap=\"round\"/>",
+            points.iter().map(dot).collect::<String>(),
+            number(2.0 * radius)
+        ));
+    }
+
     /// Draws a line through some points.
     pub fn line(&mut self, points: &[[f64; 2]], style: &Style) {
         self.path(&points_path(points), style);

@@ -53,6 +53,7 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
             without.join(", ")
         ));
     }
+    let mut failing = 0;
     for ShownChain { name, found } in &contents.chains {
         notes.push(match found {
             Ok((report, _)) => match report.first_failure() {
@@ -64,13 +65,20 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
                     ))
                 ),
                 Some((step, _)) => {
-                    good = false;
+                    failing += 1;
                     format!("chain {name} FAILS at step {}", step + 1)
                 }
             },
             Err(why) => format!("chain {name} is not evaluated: {why}"),
         });
     }
+    // The line is red, so it says why.
+    match failing {
+        0 => {}
+        1 => line.text += ", 1 chain FAILS",
+        more => line.text += &format!(", {more} chains FAIL"),
+    }
+    good &= failing == 0;
     // A proof is about the site file: what is doubtful in it stands beside the claim.
     let warnings = examine(site).warnings;
     let class = match (good, warnings.is_empty()) {
