@@ -62,6 +62,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                 below(xy),
                 below(yaw)
             ))?;
+            print(
+                &"with Nav2's goal at the task's goal, stateful: false, and symmetric_yaw_tolerance: false if it has that key; otherwise the robot may leave the box again",
+            )?;
         }
     } else {
         if arguments.json {

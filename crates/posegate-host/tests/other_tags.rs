@@ -117,7 +117,7 @@ fn bounds_are_scaled_to_tags_of_another_size() {
     let lever = MOUNT.x.abs();
     let small = learnt(0.1);
     let large = detections(0.2, 2, 6_000);
-    let scaled = small.for_tags_of(0.2, lever).unwrap();
+    let scaled = small.for_tags_of(0.2, lever, 0.0).unwrap();
     let (share, count) = held(&scaled, &large);
     println!("twice as large: {share:?} of {count}");
     assert!(
@@ -129,13 +129,13 @@ fn bounds_are_scaled_to_tags_of_another_size() {
         "{share:?}"
     );
     // Nearby, the robot is between camera and tag, and its position errs by less than the camera's.
-    let (share, _) = held(&small.for_tags_of(0.2, 0.0).unwrap(), &large);
+    let (share, _) = held(&small.for_tags_of(0.2, 0.0, 0.0).unwrap(), &large);
     println!("without the lever: {share:?}");
     assert!(share[1] < QUANTILE - 0.02, "{share:?}");
 
     let large = learnt(0.2);
     let small = detections(0.1, 3, 6_000);
-    let (share, count) = held(&large.for_tags_of(0.1, lever).unwrap(), &small);
+    let (share, count) = held(&large.for_tags_of(0.1, lever, 0.0).unwrap(), &small);
     println!("half as large: {share:?} of {count}");
     assert!(
         count > 1_000.0 && share[0] >= 2.0 * QUANTILE - 1.0,
@@ -145,8 +145,18 @@ fn bounds_are_scaled_to_tags_of_another_size() {
     println!("not scaled: {share:?}");
     assert!(share[0] < 0.6, "{share:?}");
 
+    // A lean of the detector's pose adds its part, and only where the size differs.
+    let at = [1.6, 10.0, 30.0];
+    let [(flat, yaw), (leaning, same)] = [0.0, 0.3].map(|rise| {
+        let scaled = large.for_tags_of(0.1, lever, rise).unwrap();
+        scaled.bounds_deg(at).unwrap()
+    });
+    assert!(
+        (leaning - flat - 0.15).abs() < 0.01 && yaw == same,
+        "{leaning} {flat}"
+    );
     // The size is that of the data again: nothing changes. A model that was scaled is not written.
-    let same = large.for_tags_of(0.2, lever).unwrap();
+    let same = large.for_tags_of(0.2, lever, 0.0).unwrap();
     assert_eq!(
         same.bounds_deg([3.0, 10.0, 30.0]),
         large.bounds_deg([3.0, 10.0, 30.0])
@@ -159,6 +169,6 @@ fn bounds_are_scaled_to_tags_of_another_size() {
         (0.2, -1.0),
         (0.2, f64::INFINITY),
     ] {
-        assert!(large.for_tags_of(size, lever).is_none());
+        assert!(large.for_tags_of(size, lever, 0.0).is_none());
     }
 }

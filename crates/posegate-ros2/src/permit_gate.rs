@@ -132,7 +132,13 @@ impl<'a> PermitGate<'a> {
         match (&mut self.tags, message) {
             (Some(tags), Some(message)) => tags.camera_info(message),
             (Some(tags), None) => tags.camera_info_lost(),
-            (None, _) => {}
+            (None, _) => return,
+        }
+        // What was seen through a camera that is in doubt now is not carried on.
+        if self.tags.as_ref().is_some_and(|tags| !tags.has_camera())
+            && let Some(carried) = &mut self.carried
+        {
+            carried.tracker.drop_fix();
         }
     }
 
@@ -173,7 +179,7 @@ impl<'a> PermitGate<'a> {
             belief: poses.first().copied().unwrap_or(NO_POSE),
         };
         let (estimate, step, verdict) = if poses.len() == 1 {
-            let (step, verdict) = self.take_report(now_ms, &report);
+            let (step, verdict) = self.take_report(now_ms, &report, stamp_ms.is_some());
             (report.belief, step, verdict)
         } else {
             // One pose of several cannot be carried, and none after a contradiction.
@@ -233,7 +239,7 @@ impl<'a> PermitGate<'a> {
             stamp_ms: stamp_ms.unwrap_or(now_ms.wrapping_sub(stale)),
             belief: estimate(&message.pose),
         };
-        let (step, verdict) = self.take_report(now_ms, &report);
+        let (step, verdict) = self.take_report(now_ms, &report, stamp_ms.is_some());
         self.last = Some(LastReport {
             stamp: message.header.stamp,
             frame: message.header.frame_id.clone(),
@@ -244,8 +250,17 @@ impl<'a> PermitGate<'a> {
         answer(now, step)
     }
 
-    fn take_report(&mut self, now_ms: u32, report: &Report) -> (Step, Verdict) {
-        let Some(carried) = &mut self.carried else {
+    fn take_report(
+        &mut self,
+        now_ms: u32,
+        report: &Report,
+        has_time: bool,
+    ) -> (Step, Verdict) {
+        // A pose of no known time cannot be carried: where the odometry was then is not known either. Its stamp is one that the gate denies.
+        if let Some(carried) = self.carried.as_mut().filter(|_| !has_time) {
+            carried.tracker.drop_fix();
+        }
+        let Some(carried) = self.carried.as_mut().filter(|_| has_time) else {
             let step = self.gate.step(now_ms, report);
             return (step, self.gate.examine(report));
         };

@@ -74,6 +74,12 @@ impl Tags {
         self.refused = Some(format!("a message of {} could not be read", self.topics[1]));
     }
 
+    /// Returns `true` if a camera info is known and is that of the site's camera.
+    #[must_use]
+    pub const fn has_camera(&self) -> bool {
+        self.camera.is_some()
+    }
+
     /// Takes detections.
     pub fn look(&mut self, message: &AprilTagDetectionArray) -> Look {
         let (look, unused) = self.looked(message);

@@ -80,7 +80,10 @@ fn a_site_with_another_camera_or_tag_is_refused() {
     // Larger tags are seen from farther away; the model is scaled if the site asks for it.
     let to = format!("size = {:?}", size * 1.5);
     let larger = changed("size", &key("size", size), &to);
-    let scaled = format!("file = \"m.toml\"\ntag_size = {:?}", size * 1.5);
+    let scaled = format!(
+        "file = \"m.toml\"\ntag_size = {:?}\nlean_deg = 0.0",
+        size * 1.5
+    );
     write(
         &folder,
         "there.toml",

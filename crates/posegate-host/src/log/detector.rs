@@ -29,7 +29,7 @@
 use super::corners::{Fix, FixError, MountedCamera, TagObservation, locate_all};
 use crate::site::{Site, SiteCamera, SiteTag, lens_of_ros};
 use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
-use posegate::shape::{Camera, Lens};
+use posegate::shape::{Camera, Intrinsics, Lens};
 use std::collections::{BTreeMap, BTreeSet};
 
 #[cfg(test)]
@@ -109,6 +109,21 @@ pub enum DetectorError {
     /// It has no tag.
     #[error("the site has no tag: add [tag.NAME] to it")]
     NoTag,
+    /// Two tags look the same.
+    #[error(
+        "the tags `{first}` and `{second}` have the same family and id, so an image does not tell which one is seen: hang another one, or leave one out of the site"
+    )]
+    Alike {
+        /// The name of one.
+        first: String,
+        /// The name of the other one.
+        second: String,
+    },
+    /// The calibration has a tolerance.
+    #[error(
+        "camera `{0}` has a `tolerance` of its calibration, which poses from corners do not include: calibrate it well enough to leave the tolerance out, or use poses of a filter"
+    )]
+    Calibration(String),
 }
 
 /// Why a calibration is not used.
@@ -252,11 +267,23 @@ impl Detector {
         if site.tags.is_empty() {
             return Err(DetectorError::NoTag);
         }
-        let keyed = |tag: &SiteTag| ((bare(&tag.family), i64::from(tag.tag.id)), tag.clone());
+        if camera.tolerance != Intrinsics::NONE {
+            return Err(DetectorError::Calibration(name.clone()));
+        }
+        let key = |tag: &SiteTag| (bare(&tag.family), i64::from(tag.tag.id));
+        let mut tags = BTreeMap::new();
+        let mut names = BTreeMap::new();
+        for (name, tag) in &site.tags {
+            if let Some(first) = names.insert(key(tag), name.clone()) {
+                let second = name.clone();
+                return Err(DetectorError::Alike { first, second });
+            }
+            tags.insert(key(tag), tag.clone());
+        }
         Ok(Self {
             name: name.clone(),
             camera: *camera,
-            tags: site.tags.values().map(keyed).collect(),
+            tags,
             settings,
         })
     }
@@ -329,11 +356,7 @@ impl Detector {
                 apart_px = apart_px.max(if apart.is_finite() { apart } else { 1e9 });
             }
         }
-        let reach_px = self
-            .camera
-            .tolerance
-            .reach_px([width, height], [own.cx, own.cy]);
-        let most_px = AGREES_PX + reach_px;
+        let most_px = AGREES_PX;
         if apart_px <= most_px {
             return Ok(());
         }
@@ -364,13 +387,13 @@ impl Detector {
                 });
                 continue;
             };
+            if !ids.insert(key) {
+                return Err(LookError::Twice(found.id));
+            }
             if !(0..=most).contains(&found.hamming) {
                 let (id, hamming) = (found.id, found.hamming);
                 ignored.get_or_insert(LookError::Hamming { id, hamming, most });
                 continue;
-            }
-            if !ids.insert(key) {
-                return Err(LookError::Twice(found.id));
             }
             let pixels = found.corners_px.as_flattened();
             if !pixels.iter().all(|pixel| pixel.is_finite()) {

@@ -399,6 +399,12 @@ pub(super) const MODEL_TAG_SIZE: Key = Key::number(
     "0.30",
     above_0,
 );
+pub(super) const MODEL_LEAN: Key = Key::number(
+    "lean_deg",
+    "the largest lean of the detector's poses in degrees, 0 to 90: 0 if they are fitted on the floor; default: 20",
+    "0.0",
+    |lean| (0.0..=90.0).contains(&lean),
+);
 pub(super) const MODEL_TRANSLATION: Key = Key::number(
     "translation",
     "[c0, c1, c2, c3] of c0 + c1 d^2 + c2 phi^2 + c3 psi^2 in metres (m, rad, rad); only c3 may be below 0",

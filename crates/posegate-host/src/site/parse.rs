@@ -94,11 +94,15 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         libm::hypot(camera.mount.x, camera.mount.y) + camera.mount_tolerance.translation
     });
     let lever = levers.fold(0.0, f64::max);
+    let heights = cameras.values().map(|camera: &super::SiteCamera| {
+        libm::fabs(camera.mount.z) + camera.mount_tolerance.translation
+    });
+    let reach = [lever, heights.fold(0.0, f64::max)];
     let mut error_models = BTreeMap::new();
     let mut learnt = BTreeMap::new();
     if let Some(node) = root.optional(&keys::ERROR_MODELS) {
         for (name, node) in node.any_table()?.named(&keys::ONE_ERROR_MODEL)? {
-            let (model, file) = places::error_model(&node, lever)?;
+            let (model, file) = places::error_model(&node, reach)?;
             error_models.insert(name.to_owned(), model);
             learnt.extend(file.map(|file| (name, file)));
         }

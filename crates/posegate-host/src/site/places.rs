@@ -111,19 +111,33 @@ pub(super) enum SiteModel {
     Learnt(learn::ErrorModel),
 }
 
+/// The largest lean of a detector's pose that is assumed, degrees, as for the tolerance of a mount.
+const LARGEST_LEAN_DEG: f64 = 20.0;
+
 /// Reads an error model. Also returns its file if it names one.
 ///
-/// `lever` is the largest distance of a camera from the robot's reference point along the floor, metres.
+/// The two lengths are the largest distance of a camera from the robot's reference point along the floor, and its largest height above it,
+/// metres.
 pub(super) fn error_model(
     node: &Node<'_>,
-    lever: f64,
+    [lever, height]: [f64; 2],
 ) -> Result<(SiteModel, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::MODEL_TRANSLATION,
         &keys::MODEL_YAW,
         &keys::MODEL_FILE,
         &keys::MODEL_TAG_SIZE,
+        &keys::MODEL_LEAN,
     ])?;
+    if table.has(keys::MODEL_LEAN.name) && !table.has(keys::MODEL_TAG_SIZE.name) {
+        return Err(table
+            .error_at_key(
+                keys::MODEL_LEAN.name,
+                format!("{} has a `lean_deg` and no `tag_size`", table.title()),
+            )
+            .expected("`lean_deg` only beside a `tag_size`")
+            .help("remove `lean_deg`"));
+    }
     if let Some(file) = table.optional(&keys::MODEL_FILE) {
         for key in [&keys::MODEL_TRANSLATION, &keys::MODEL_YAW] {
             if table.has(key.name) {
@@ -147,7 +161,10 @@ pub(super) fn error_model(
                 .help("learn the model without the columns `second_err_translation_m` and `second_err_yaw_rad`"));
         }
         if let Some(node) = table.optional(&keys::MODEL_TAG_SIZE) {
-            model = model.for_tags_of(node.number()?, lever).ok_or_else(|| {
+            let lean = table.optional(&keys::MODEL_LEAN);
+            let lean_deg = lean.map_or(Ok(LARGEST_LEAN_DEG), |node| node.number())?;
+            let rise = height * libm::sin(lean_deg.to_radians());
+            model = model.for_tags_of(node.number()?, lever, rise).ok_or_else(|| {
                 node.error(format!(
                     "the error model of {} does not record the size of its tags, so it cannot be scaled",
                     table.title()

@@ -94,6 +94,27 @@ fn good_poses_open_and_silence_closes() {
     assert_eq!(node.tick(at(ms)).reason(), Some(Reason::Silent));
 }
 
+/// With odometry, a pose of no known time would be carried as if it were of a guessed one.
+#[test]
+fn a_pose_without_a_time_is_not_carried() {
+    let settings = settings(ODOMETRY);
+    let gate = settings.gate();
+    let next = i64::from(OPENED / 100) + 1;
+    let now = OPENED + 20;
+    for nanosec in [0, u32::MAX] {
+        let mut node = opened(&settings, &gate);
+        let mut message = pose_at(now, 0.0, "map");
+        message.header.stamp = Time { sec: 0, nanosec };
+        let answer = node.pose(at(now), &message, origin(next));
+        assert!(!answer.is_open, "{nanosec}");
+        // The odometry that follows has no fix to carry.
+        for ms in (now + 20..now + 400).step_by(20) {
+            let _ = node.odometry(at(ms), &odometry_at(ms, 0.0), origin(i64::from(ms / 20)));
+            assert!(!node.tick(at(ms)).is_open, "{nanosec} {ms}");
+        }
+    }
+}
+
 #[test]
 fn reports_that_do_not_count_close_the_gate() {
     let settings = settings(STILL);

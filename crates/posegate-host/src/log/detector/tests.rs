@@ -182,3 +182,41 @@ fn a_site_without_the_camera_is_refused() {
     site.tags.clear();
     assert!(error(&site, None).contains("no tag: add"));
 }
+
+/// Two tags that look the same would be taken for each other, and a calibration that may be off is in no pose-set.
+#[test]
+fn sites_that_an_image_does_not_tell_apart_are_refused() {
+    let new = |site: &str| {
+        let site = Site::parse(site, "site.toml").unwrap();
+        Detector::new(&site, Some("front"), SETTINGS).map(|_| ())
+    };
+    let twin = "[tag.other]\nid = 7\nfamily = \"36h11\"\nsize = 0.3\npose = { x = 9.0, y = 9.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
+    let alike = DetectorError::Alike {
+        first: "other".into(),
+        second: "t7".into(),
+    };
+    assert_eq!(new(&format!("{SAMPLE}\n{twin}")), Err(alike));
+    assert_eq!(
+        new(&format!("{SAMPLE}\n{}", twin.replace("id = 7", "id = 8"))),
+        Ok(())
+    );
+    let loose = SAMPLE.replace(
+        "fx = 615.0",
+        "tolerance = { focal = 0.01, centre_px = 0.0 }\nfx = 615.0",
+    );
+    assert_eq!(new(&loose), Err(DetectorError::Calibration("front".into())));
+}
+
+/// A copy with corrected bits is a copy all the same.
+#[test]
+fn a_tag_that_is_seen_twice_is_a_contradiction_whatever_its_bits() {
+    let detector = detector();
+    let camera = detector.camera(&info()).unwrap();
+    let weak = FoundTag {
+        hamming: 1,
+        ..tag()
+    };
+    for found in [[weak.clone(), tag()], [tag(), weak]] {
+        assert_eq!(detector.look(&camera, &found), Err(LookError::Twice(7)));
+    }
+}
