@@ -250,12 +250,7 @@ impl<'a> PermitGate<'a> {
         answer(now, step)
     }
 
-    fn take_report(
-        &mut self,
-        now_ms: u32,
-        report: &Report,
-        has_time: bool,
-    ) -> (Step, Verdict) {
+    fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> (Step, Verdict) {
         // A pose of no known time cannot be carried: where the odometry was then is not known either. Its stamp is one that the gate denies.
         if let Some(carried) = self.carried.as_mut().filter(|_| !has_time) {
             carried.tracker.drop_fix();

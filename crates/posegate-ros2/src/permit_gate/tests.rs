@@ -97,7 +97,7 @@ fn good_poses_open_and_silence_closes() {
 /// With odometry, a pose of no known time would be carried as if it were of a guessed one.
 #[test]
 fn a_pose_without_a_time_is_not_carried() {
-    let settings = settings(ODOMETRY);
+    let settings = settings(&format!("{STILL} {ODOMETRY}"));
     let gate = settings.gate();
     let next = i64::from(OPENED / 100) + 1;
     let now = OPENED + 20;
