@@ -198,38 +198,19 @@ fn across(n: [f64; 3]) -> ([f64; 3], [f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Camera, Pose3Deg, Tag, Tolerance};
+    use crate::shape::Tolerance;
+    use crate::shape::visibility::test_view;
 
     /// A tolerance widens the cone at every width.
     #[test]
     fn square_views_grow_by_the_turn() {
-        let pose = Pose3Deg {
-            x: 0.0,
-            y: 0.0,
-            z: 0.5,
-            roll_deg: 0.0,
-            pitch_deg: 0.0,
-            yaw_deg: 0.0,
-        };
         let view = Visibility {
-            camera: Camera::pinhole([640.0, 480.0], [600.0, 600.0], [320.0, 240.0]),
-            mount: pose,
-            tag: Tag {
-                id: 1,
-                size: 0.2,
-                pose,
-            },
-            d_max: 5.0,
-            phi_max_deg: 40.0,
             psi_max_deg: 90.0,
-            z_near: 0.05,
             tag_tolerance: Tolerance {
                 translation: 0.01,
                 turn_deg: 2e-4,
             },
-            mount_tolerance: Tolerance::NONE,
-            sharpness: None,
-            error_room: None,
+            ..test_view()
         };
         for psi_min_deg in [1.0, 45.0, 89.9, 89.9995] {
             let (angle, back) = squarest(&view, psi_min_deg);

@@ -126,7 +126,7 @@ impl ErrorLimit {
     }
 
     /// Returns the largest distance up to the view's at which both bounds hold for angles up to `phi_deg` and between
-    /// `psi_deg`, metres, rounded down; 0 if there is none.
+    /// `psi_deg`: metres, rounded down. 0 if the bounds hold at no distance.
     fn farthest(&self, view: &Visibility, phi_deg: f64, psi_deg: [f64; 2]) -> f64 {
         let phi = phi_deg.to_radians();
         let [psi_min, psi_max] = psi_deg.map(f64::to_radians);
@@ -163,35 +163,7 @@ impl ErrorLimit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Camera, Pose3Deg, Tag, Tolerance};
-
-    fn view() -> Visibility {
-        let pose = Pose3Deg {
-            x: 0.0,
-            y: 0.0,
-            z: 0.5,
-            roll_deg: 0.0,
-            pitch_deg: 0.0,
-            yaw_deg: 0.0,
-        };
-        Visibility {
-            camera: Camera::pinhole([640.0, 480.0], [600.0, 600.0], [320.0, 240.0]),
-            mount: pose,
-            tag: Tag {
-                id: 1,
-                size: 0.2,
-                pose,
-            },
-            d_max: 5.0,
-            phi_max_deg: 40.0,
-            psi_max_deg: 70.0,
-            z_near: 0.05,
-            tag_tolerance: Tolerance::NONE,
-            mount_tolerance: Tolerance::NONE,
-            sharpness: None,
-            error_room: None,
-        }
-    }
+    use crate::shape::visibility::test_view;
 
     /// Every view of the parts is within the limit, and the parts hold most of the views that are.
     #[test]
@@ -213,7 +185,7 @@ mod tests {
                 translation: 0.045,
                 yaw_deg: 1.6,
             };
-            let parts = limit.views(&view());
+            let parts = limit.views(&test_view());
             let (mut within, mut held) = (0, 0);
             for i in 0..50 {
                 for j in 0..40 {
@@ -229,7 +201,7 @@ mod tests {
                             psi: psi_deg.to_radians(),
                             corners_px: [None; 4],
                         };
-                        let fits = limit.slack(&view(), &sight) >= 0.0;
+                        let fits = limit.slack(&test_view(), &sight) >= 0.0;
                         let is_held = parts.iter().any(|part| {
                             d <= part.view.d_max
                                 && phi_deg <= part.view.phi_max_deg
@@ -262,7 +234,7 @@ mod tests {
             psi: psi_deg.to_radians(),
             corners_px: [None; 4],
         };
-        let mut view = view();
+        let mut view = test_view();
         assert!(limit(4.5).slack(&view, &sight(23.0)) < 0.0);
         assert!(limit(4.5).slack(&view, &sight(24.0)) > 0.0);
         // Turned by up to 3 deg, which adds as much to the error.

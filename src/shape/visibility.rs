@@ -422,3 +422,33 @@ pub(super) fn distance_and_angles(
         libm::atan2(dot(across, across).root(), dot(normal, back)),
     ]
 }
+
+/// Returns a view for tests: the tag and a camera on the robot at one height, without tolerances.
+#[cfg(test)]
+pub(super) fn test_view() -> Visibility {
+    let pose = crate::shape::Pose3Deg {
+        x: 0.0,
+        y: 0.0,
+        z: 0.5,
+        roll_deg: 0.0,
+        pitch_deg: 0.0,
+        yaw_deg: 0.0,
+    };
+    Visibility {
+        camera: Camera::pinhole([640.0, 480.0], [600.0, 600.0], [320.0, 240.0]),
+        mount: pose,
+        tag: Tag {
+            id: 1,
+            size: 0.2,
+            pose,
+        },
+        d_max: 5.0,
+        phi_max_deg: 40.0,
+        psi_max_deg: 70.0,
+        z_near: 0.05,
+        tag_tolerance: Tolerance::NONE,
+        mount_tolerance: Tolerance::NONE,
+        sharpness: None,
+        error_room: None,
+    }
+}

@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         if arguments.json {
             print_json(&json!({
                 "x": found.x, "y": found.y, "yaw_deg": found.yaw_deg,
-                "nav2": { "xy_goal_tolerance": xy, "yaw_goal_tolerance": yaw },
+                "nav2": { "xy_goal_tolerance": xy, "yaw_goal_tolerance": yaw, "stateful": false, "symmetric_yaw_tolerance": false },
             }))?;
         } else {
             let [x0, x1] = found.x;

@@ -1,6 +1,6 @@
 //! `posegate predict`: evaluates a learnt model.
 
-use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use crate::learn::refused;
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{ErrorModel, InflationModel, Model, conditions, places};
@@ -40,6 +40,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let lines: Vec<Value> = match &model {
         Model::Bounds(model) => {
             let places = places(&bytes, &name).map_err(refused)?;
+            if model.is_of_better_pose() {
+                warn(
+                    &"the bounds hold for the better one of a detector's two poses: a gate must take both as hypotheses",
+                );
+            }
             places.iter().map(|at| bounds(model, *at)).collect()
         }
         Model::Inflation(model) => {

@@ -179,7 +179,7 @@ fn check_figures(out: &Path, numbers: &Value) {
         placement.matches("m from the goal</tspan></text>").count(),
         4
     );
-    // The sets of the paper are told apart without colours: S is hatched, pose-sets are dashed.
+    // The sets of the paper can be distinguished without colours: S is hatched, pose-sets are dashed.
     for figure in [&chain, &sections, &placement] {
         assert!(figure.contains("stroke=\"#b3001b\" stroke-width=\"0.6\""));
         assert!(figure.contains("stroke-dasharray=\"6 3\""));

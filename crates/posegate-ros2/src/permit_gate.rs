@@ -169,17 +169,16 @@ impl<'a> PermitGate<'a> {
             }
             Look::Contradiction => Vec::new(),
         };
-        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
-        let stamp_ms = now.stamp_ms(message.header.stamp);
+        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
         let report = Report {
             source: 0,
             frame: FrameId::of(&self.settings.frame),
             sequence,
-            stamp_ms: stamp_ms.unwrap_or(now_ms.wrapping_sub(stale)),
+            stamp_ms,
             belief: poses.first().copied().unwrap_or(NO_POSE),
         };
         let (estimate, step, verdict) = if poses.len() == 1 {
-            let (step, verdict) = self.take_report(now_ms, &report, stamp_ms.is_some());
+            let (step, verdict) = self.take_report(now_ms, &report, has_time);
             (report.belief, step, verdict)
         } else {
             // One pose of several cannot be carried, and none after a contradiction.
@@ -229,17 +228,15 @@ impl<'a> PermitGate<'a> {
             // Two publishers that alternate end every permit of each other.
             let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
         }
-        // A stamp that is not on the gate's clock is older than every permitted one.
-        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
-        let stamp_ms = now.stamp_ms(message.header.stamp);
+        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
         let report = Report {
             source: 0,
             frame: FrameId::of(&message.header.frame_id),
             sequence,
-            stamp_ms: stamp_ms.unwrap_or(now_ms.wrapping_sub(stale)),
+            stamp_ms,
             belief: estimate(&message.pose),
         };
-        let (step, verdict) = self.take_report(now_ms, &report, stamp_ms.is_some());
+        let (step, verdict) = self.take_report(now_ms, &report, has_time);
         self.last = Some(LastReport {
             stamp: message.header.stamp,
             frame: message.header.frame_id.clone(),
@@ -248,6 +245,17 @@ impl<'a> PermitGate<'a> {
             step: step.verdict,
         });
         answer(now, step)
+    }
+
+    /// Returns a stamp on the gate's clock, and whether it is a time. A stamp that is not on that clock counts as older than every
+    /// permitted one.
+    fn stamp(&self, now: Now, stamp: Time) -> (u32, bool) {
+        let known = now.stamp_ms(stamp);
+        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
+        (
+            known.unwrap_or(now.ms().wrapping_sub(stale)),
+            known.is_some(),
+        )
     }
 
     fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> (Step, Verdict) {

@@ -6,15 +6,19 @@ use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
 use crate::diagnostics::{Received, diagnostics};
 use crate::graph::{Environment, Graph, GraphError, Input};
-use crate::message::{Bool, TriggerResponse};
+use crate::message::{
+    AprilTagDetectionArray, Bool, CameraInfo, Odometry, PoseWithCovarianceStamped, Time,
+    TriggerResponse,
+};
 use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
 use crate::settings::NodeSettings;
 use posegate::gate::Reason;
-use ros2_client::MessageInfo;
+use ros2_client::{MessageInfo, Subscription};
 use rustdds::StatusEvented;
 use rustdds::mio1::Events;
+use serde::de::DeserializeOwned;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -55,6 +59,31 @@ struct Sent {
     heartbeat: Option<Instant>,
     permit: Option<Instant>,
     slow: Option<Instant>,
+}
+
+/// Takes the messages of a topic that have arrived, at most `most`, and counts them. `take` gets `None` for one that cannot be read.
+fn drain<M: DeserializeOwned + 'static>(
+    topic: &Subscription<M>,
+    most: usize,
+    received: &mut Received,
+    stamp: fn(&M) -> Time,
+    mut take: impl FnMut(Option<(M, MessageInfo)>),
+) {
+    for _ in 0..most {
+        let taken = match topic.take() {
+            Ok(None) => return,
+            Ok(taken) => taken,
+            Err(_) => None,
+        };
+        match &taken {
+            Some((message, _)) => {
+                received.messages += 1;
+                received.last = Some(stamp(message));
+            }
+            None => received.unreadable += 1,
+        }
+        take(taken);
+    }
 }
 
 fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
@@ -164,94 +193,60 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
         self.take_odometry();
         self.take_camera_info();
-        self.take_poses();
+        self.take_reports();
         let answer = self.gate.tick(Now::read());
         self.publish(&answer, Instant::now(), false);
         self.serve();
     }
 
     fn take_odometry(&mut self) {
-        let (Some(topic), Some(received)) = (&self.graph.odom, &mut self.odometry) else {
-            return;
-        };
-        for _ in 0..BATCH {
-            match topic.take() {
-                Ok(None) => return,
-                Ok(Some((message, info))) => {
-                    received.messages += 1;
-                    received.last = Some(message.header.stamp);
-                    let _ = self.gate.odometry(Now::read(), &message, origin(&info));
-                }
-                Err(_) => {
-                    received.unreadable += 1;
-                    let _ = self.gate.odometry_lost(Now::read());
-                }
-            }
+        if let (Some(topic), Some(received)) = (&self.graph.odom, &mut self.odometry) {
+            let stamp = |message: &Odometry| message.header.stamp;
+            drain(topic, BATCH, received, stamp, |taken| {
+                let _ = match taken {
+                    Some((message, info)) => {
+                        self.gate.odometry(Now::read(), &message, origin(&info))
+                    }
+                    None => self.gate.odometry_lost(Now::read()),
+                };
+            });
         }
     }
 
     fn take_camera_info(&mut self) {
-        let (Input::Detections(_, topic), Some(received)) =
+        if let (Input::Detections(_, topic), Some(received)) =
             (&self.graph.input, &mut self.camera_info)
-        else {
-            return;
-        };
-        for _ in 0..BATCH {
-            match topic.take() {
-                Ok(None) => return,
-                Ok(Some((message, _))) => {
-                    received.messages += 1;
-                    received.last = Some(message.header.stamp);
-                    self.gate.camera_info(Some(&message));
-                }
-                Err(_) => {
-                    received.unreadable += 1;
-                    self.gate.camera_info(None);
-                }
-            }
+        {
+            let stamp = |message: &CameraInfo| message.header.stamp;
+            drain(topic, BATCH, received, stamp, |taken| {
+                self.gate
+                    .camera_info(taken.as_ref().map(|(message, _)| message));
+            });
         }
     }
 
-    fn take_poses(&mut self) {
+    /// Takes poses or detections. After one that could not be read the next has a gap before it, and is denied.
+    fn take_reports(&mut self) {
+        let received = &mut self.pose;
+        let (gate, has_report) = (&mut self.gate, &mut self.has_report);
         match &self.graph.input {
-            Input::Poses(_) => self.take_poses_of_topic(),
-            Input::Detections(..) => self.take_detections(),
-        }
-    }
-
-    fn take_detections(&mut self) {
-        for _ in 0..DETECTIONS {
-            let Input::Detections(topic, _) = &self.graph.input else {
-                return;
-            };
-            match topic.take() {
-                Ok(None) => return,
-                Ok(Some((message, info))) => {
-                    self.pose.messages += 1;
-                    self.pose.last = Some(message.header.stamp);
-                    self.has_report = true;
-                    let _ = self.gate.detections(Now::read(), &message, origin(&info));
-                }
-                Err(_) => self.pose.unreadable += 1,
+            Input::Poses(topic) => {
+                let stamp = |message: &PoseWithCovarianceStamped| message.header.stamp;
+                drain(topic, BATCH, received, stamp, |taken| {
+                    if let Some((message, info)) = taken {
+                        *has_report = true;
+                        let _ = gate.pose(Now::read(), &message, origin(&info));
+                    }
+                });
             }
-        }
-    }
-
-    fn take_poses_of_topic(&mut self) {
-        let Input::Poses(topic) = &self.graph.input else {
-            return;
-        };
-        for _ in 0..BATCH {
-            match topic.take() {
-                Ok(None) => return,
-                Ok(Some((message, info))) => {
-                    self.pose.messages += 1;
-                    self.pose.last = Some(message.header.stamp);
-                    self.has_report = true;
-                    let _ = self.gate.pose(Now::read(), &message, origin(&info));
-                }
-                // The next message then has a gap before it, and denies.
-                Err(_) => self.pose.unreadable += 1,
+            Input::Detections(topic, _) => {
+                let stamp = |message: &AprilTagDetectionArray| message.header.stamp;
+                drain(topic, DETECTIONS, received, stamp, |taken| {
+                    if let Some((message, info)) = taken {
+                        *has_report = true;
+                        let _ = gate.detections(Now::read(), &message, origin(&info));
+                    }
+                });
             }
         }
     }

@@ -11,7 +11,7 @@ use posegate_host::log::recording::{
     Bag, Format, Recording, Role, TagLocalizer, Text, Wanted, format_of,
 };
 use posegate_host::log::replay::{Clock, Part};
-use posegate_host::log::{Columns, Trajectory, estimates, tum};
+use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, tum};
 use posegate_host::printable::printable;
 use posegate_host::site::Site;
 use std::io::{BufRead, BufReader, Read};
@@ -246,10 +246,6 @@ fn looks(
             mount: camera.mount,
             mount_tolerance: camera.mount_tolerance,
         };
-        let tags = site
-            .tags
-            .values()
-            .map(|tag| (tag.family.as_str(), &tag.tag, tag.tolerance));
-        TagLocalizer::new(eye, tags, arguments.sigma_px, radius_squared)
+        TagLocalizer::new(eye, KnownTags::of(site), arguments.sigma_px, radius_squared)
     }))
 }

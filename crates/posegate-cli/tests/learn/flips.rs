@@ -143,6 +143,12 @@ fn bounds_for_both_poses_know_no_flips() {
         tried > 15_000 && f64::from(held) >= 0.98 * f64::from(tried),
         "{held} of {tried}"
     );
+    // `predict` says for which pose its bounds hold.
+    write(&folder, "at.csv", "d_m,phi_deg,psi_deg\n3,5,30\n");
+    for (name, warns) in [("both", true), ("one", false)] {
+        let (code, _, err) = run(&folder, &format!("predict {name}.toml --at at.csv --json"));
+        assert_eq!((code, err.contains("better one")), (0, warns), "{err}");
+    }
     // A look promises the one pose that it gives; rows of one pose are no test of such a model.
     let (code, _, err) = run(&folder, "check site.toml");
     assert!(code == 2 && err.contains("better one"), "{code}: {err}");

@@ -79,6 +79,25 @@ impl Inside<'_> {
 pub struct Labels {
     /// Left, top, right, bottom in the picture, pixels, and how bad it is to cover them.
     boxes: Vec<([f64; 4], u32)>,
+    /// Lines from names to what they name, pixels.
+    leaders: Vec<[[f64; 2]; 2]>,
+}
+
+/// Returns the line from a point to the nearest edge of a name's box, if the name is too far away to do without.
+fn leader(at: [f64; 2], [left, top, right, bottom]: [f64; 4]) -> Option<[[f64; 2]; 2]> {
+    let near = [at[0].clamp(left, right), at[1].clamp(top, bottom)];
+    (libm::hypot(near[0] - at[0], near[1] - at[1]) > 16.0).then_some([at, near])
+}
+
+/// Returns `true` if a line crosses a box: every second pixel of the line is compared.
+fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: [f64; 4]) -> bool {
+    let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
+    let count = libm::ceil(0.5 * length).clamp(1.0, 1000.0) as u32;
+    (0..=count).any(|k| {
+        let t = f64::from(k) / f64::from(count);
+        let [x, y] = [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]));
+        left < x && x < right && top < y && y < bottom
+    })
 }
 
 impl Labels {
@@ -129,8 +148,13 @@ impl Labels {
             let overlaps = |a: &[f64; 4]| -> u32 {
                 let meets =
                     |b: &[f64; 4]| !(a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1]);
-                let met = self.boxes.iter().filter(|(b, _)| meets(b));
-                met.map(|(_, bad)| bad).sum()
+                let own = leader([x, y], *a);
+                let names = |bad: u32| bad == Self::NAME;
+                let met = self.boxes.iter().filter(|(b, bad)| {
+                    meets(b) || names(*bad) && own.is_some_and(|line| crosses(line, *b))
+                });
+                let under = self.leaders.iter().filter(|line| crosses(**line, *a));
+                met.map(|(_, bad)| *bad).sum::<u32>() + Self::NAME * under.count() as u32
             };
             let all = offsets.into_iter().map(|[dx, dy]| place(dx, dy));
             // The first of those that cover the least; no name covers another one where there is another place.
@@ -139,9 +163,9 @@ impl Labels {
                 return;
             };
             self.boxes.push(([left, top, right, bottom], Self::NAME));
-            let near = [x.clamp(left, right), y.clamp(top, bottom)];
-            if libm::hypot(near[0] - x, near[1] - y) > 16.0 {
-                picture.line(&[[x, y], near], &Style::outlined(palette::FAINT, 0.8));
+            if let Some(line) = leader([x, y], [left, top, right, bottom]) {
+                picture.line(&line, &Style::outlined(palette::FAINT, 0.8));
+                self.leaders.push(line);
             }
             let ground = Style::filled("none").with_fill_opacity("#ffffff", 0.8);
             let size = [right - left, bottom - top];
@@ -222,6 +246,11 @@ mod tests {
                     "{a:?} {b:?}"
                 );
             }
+        }
+        // No line to a name runs through another one.
+        assert!(!labels.leaders.is_empty());
+        for line in &labels.leaders {
+            assert!(!names.iter().any(|name| crosses(*line, **name)), "{line:?}");
         }
     }
 }

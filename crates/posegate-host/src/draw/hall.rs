@@ -210,7 +210,7 @@ pub(super) fn hall_legend(picture: &mut Picture, [left, top]: [f64; 2], has_rout
                 Sample::Disc(LOOK),
                 "looks: every place where the robot may be",
             ),
-            (Sample::Line(SIGHT), "the tag that is looked at there"),
+            (Sample::Line(SIGHT), "the tag that the robot sees there"),
         ]);
     } else {
         entries.push((Sample::Line(CAMERA), "cameras there, where they look"));

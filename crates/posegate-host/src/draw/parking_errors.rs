@@ -116,7 +116,7 @@ const ALLOWED: [(f64, &str); 4] = [
     (0.6, "#cf4a40"),
 ];
 
-/// Draws S with yaw over x; the colour tells how far y may be off. The point is the upper left corner of the panel.
+/// Draws S with yaw over x; the colour shows how far y may be off. The point is the upper left corner of the panel.
 pub(super) fn yaw_over_x(
     picture: &mut Picture,
     [left, top]: [f64; 2],

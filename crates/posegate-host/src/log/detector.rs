@@ -27,15 +27,16 @@
 //! ```
 
 use super::corners::{Fix, FixError, MountedCamera, TagObservation, locate_all};
-use crate::site::{Site, SiteCamera, SiteTag, lens_of_ros};
+use super::{AlikeTags, KnownTags};
+use crate::site::{Site, SiteCamera, lens_of_ros};
 use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
 use posegate::shape::{Camera, Intrinsics, Lens};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 #[cfg(test)]
 mod tests;
 
-/// The largest difference of two calibrations of one camera anywhere in the image, pixels. The tolerance of the site's camera is added.
+/// The largest difference of two calibrations of one camera anywhere in the image, pixels.
 const AGREES_PX: f64 = 1.0;
 /// Points along a side of the image at which calibrations are compared.
 const GRID: u32 = 9;
@@ -110,15 +111,8 @@ pub enum DetectorError {
     #[error("the site has no tag: add [tag.NAME] to it")]
     NoTag,
     /// Two tags look the same.
-    #[error(
-        "the tags `{first}` and `{second}` have the same family and id, so an image does not tell which one is seen: hang another one, or leave one out of the site"
-    )]
-    Alike {
-        /// The name of one.
-        first: String,
-        /// The name of the other one.
-        second: String,
-    },
+    #[error(transparent)]
+    Alike(#[from] AlikeTags),
     /// The calibration has a tolerance.
     #[error(
         "camera `{0}` has a `tolerance` of its calibration, which poses from corners do not include: calibrate it well enough to leave the tolerance out, or use poses of a filter"
@@ -235,7 +229,7 @@ impl LookError {
 pub struct Detector {
     name: String,
     camera: SiteCamera,
-    tags: BTreeMap<(String, i64), SiteTag>,
+    tags: KnownTags,
     settings: DetectorSettings,
 }
 
@@ -270,15 +264,9 @@ impl Detector {
         if camera.tolerance != Intrinsics::NONE {
             return Err(DetectorError::Calibration(name.clone()));
         }
-        let key = |tag: &SiteTag| (bare(&tag.family), i64::from(tag.tag.id));
-        let mut tags = BTreeMap::new();
-        let mut names = BTreeMap::new();
-        for (name, tag) in &site.tags {
-            if let Some(first) = names.insert(key(tag), name.clone()) {
-                let second = name.clone();
-                return Err(DetectorError::Alike { first, second });
-            }
-            tags.insert(key(tag), tag.clone());
+        let tags = KnownTags::of(site);
+        if let Some(alike) = tags.alike() {
+            return Err(alike.clone().into());
         }
         Ok(Self {
             name: name.clone(),
@@ -377,9 +365,8 @@ impl Detector {
         let mut ids = BTreeSet::new();
         let mut ignored = None;
         for found in found {
-            let key = (bare(&found.family), i64::from(found.id));
             let most = self.settings.max_hamming;
-            let Some(tag) = self.tags.get(&key) else {
+            let Some(tag) = self.tags.get(&found.family, i64::from(found.id)) else {
                 ignored.get_or_insert_with(|| LookError::Unknown {
                     family: found.family.clone(),
                     id: found.id,
@@ -387,7 +374,7 @@ impl Detector {
                 });
                 continue;
             };
-            if !ids.insert(key) {
+            if !ids.insert((&tag.family, tag.tag.id)) {
                 return Err(LookError::Twice(found.id));
             }
             if !(0..=most).contains(&found.hamming) {
@@ -425,21 +412,17 @@ impl Detector {
 
     /// Returns the first tags of the site, in words.
     fn known(&self) -> String {
-        let names = self.tags.values();
-        let mut words: Vec<String> = names
+        let mut words: Vec<String> = self
+            .tags
+            .all()
             .take(5)
             .map(|tag| format!("{} {}", tag.family, tag.tag.id))
             .collect();
-        if self.tags.len() > words.len() {
+        if self.tags.all().count() > words.len() {
             words.push("others".into());
         }
         words.join(", ")
     }
-}
-
-/// Returns a family without the prefix `tag` that some detectors write.
-fn bare(family: &str) -> String {
-    family.strip_prefix("tag").unwrap_or(family).to_string()
 }
 
 /// Returns the rectified image of a camera info.

@@ -23,6 +23,8 @@ pub mod tum;
 
 pub use self::covariance::covariance;
 pub use self::estimates::{Columns, LogError, Row, clock_ms, estimates};
+pub use self::known_tags::{AlikeTags, KnownTags};
+
 pub use self::hypotheses::{MOST_HYPOTHESES, reports};
 
 use self::estimates::clock_ms_of_ns;
@@ -34,6 +36,7 @@ pub use self::verdict::{coordinates, factor, factor_text};
 mod covariance;
 mod estimates;
 mod hypotheses;
+mod known_tags;
 mod mcap;
 mod track;
 mod verdict;

@@ -197,7 +197,7 @@ fn a_tag_with_one_pose_permits() {
         assert_eq!(node.problem(), "");
         let answer = node.look(vec![detection(8, [0.2, 0.0, 0.0])]);
         assert!(!answer.is_open && node.problem().is_empty());
-        // The other place of tag 8 is told apart by the two tags together, too.
+        // The other place of tag 8 is excluded by the two tags together, too.
         node.open();
         let both = vec![detection(7, GOAL), detection(8, GOAL)];
         let answer = node.look(both);

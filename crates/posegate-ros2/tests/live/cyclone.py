@@ -1,38 +1,17 @@
 """The permit with Cyclone DDS: a peer on bare DDS that publishes poses and follows the heartbeat, without rclpy."""
 
-import os
+import time
+from dataclasses import dataclass
 
-# Loopback alone.
-os.environ["CYCLONEDDS_URI"] = (
-    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces>"
-    "<AllowMulticast>true</AllowMulticast></General></Domain></CycloneDDS>"
-)
-
-import time  # noqa: E402
-from dataclasses import dataclass  # noqa: E402
-
-from cyclonedds.core import Policy, Qos  # noqa: E402
-from cyclonedds.domain import DomainParticipant  # noqa: E402
-from cyclonedds.idl import IdlStruct  # noqa: E402
-from cyclonedds.idl.types import array, float64, int32, sequence, uint8, uint32  # noqa: E402
-from cyclonedds.pub import DataWriter  # noqa: E402
-from cyclonedds.sub import DataReader  # noqa: E402
-from cyclonedds.topic import Topic  # noqa: E402
-from cyclonedds.util import duration  # noqa: E402
-from support import end, figure, require, start  # noqa: E402
-from permit_listener import PermitWatch  # noqa: E402
-
-
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    stamp: Time
-    frame_id: str
+import bare_dds  # before anything that joins a domain
+from bare_dds import Header
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, float64, sequence, uint8
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from support import end, figure, require, start
+from permit_listener import PermitWatch
 
 
 @dataclass
@@ -64,14 +43,9 @@ class Array(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
 
 
 def main():
-    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
-    reliable = Policy.Reliability.Reliable(duration(milliseconds=100))
-    # Classic CDR, as ROS writes it.
-    classic = Policy.DataRepresentation(use_cdrv0_representation=True)
-    latched = Qos(reliable, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), classic)
-    writer = DataWriter(participant, Topic(participant, "rt/amcl_pose", PoseStamped), qos=latched)
-    plain = Qos(reliable, Policy.Durability.Volatile, Policy.History.KeepLast(1), classic)
-    reader = DataReader(participant, Topic(participant, "rt/posegate/permission", Array), qos=plain)
+    participant = bare_dds.participant()
+    writer = DataWriter(participant, Topic(participant, "rt/amcl_pose", PoseStamped), qos=bare_dds.qos(latched=True))
+    reader = DataReader(participant, Topic(participant, "rt/posegate/permission", Array), qos=bare_dds.qos())
     watch = PermitWatch("dock")
 
     def drive(seconds, x, until):
@@ -79,11 +53,10 @@ def main():
         while time.monotonic() - begin < seconds:
             if x is not None and time.monotonic() >= due:
                 due = time.monotonic() + 0.05
-                sec, nanosec = divmod(time.time_ns(), 10**9)
                 covariance = [0.0] * 36
                 covariance[0] = covariance[7] = 1e-4
                 covariance[35] = 1e-5
-                writer.write(PoseStamped(Header(Time(sec, nanosec), "map"), [x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], covariance))
+                writer.write(PoseStamped(bare_dds.header("map"), [x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], covariance))
             for message in reader.take(N=10):
                 # Not the news that the publisher has left.
                 if isinstance(message, Array):

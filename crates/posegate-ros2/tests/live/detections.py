@@ -3,47 +3,26 @@
 There is no wheel of apriltag_msgs, so the messages are written down here, field by field. The table is built from tags.toml.
 """
 
-import os
+import math
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
 
-# Loopback alone.
-os.environ["CYCLONEDDS_URI"] = (
-    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces>"
-    "<AllowMulticast>true</AllowMulticast></General></Domain></CycloneDDS>"
-)
-
-import math  # noqa: E402
-import subprocess  # noqa: E402
-import tempfile  # noqa: E402
-import time  # noqa: E402
-from dataclasses import dataclass  # noqa: E402
-from pathlib import Path  # noqa: E402
-
-import support  # noqa: E402
-from cyclonedds.core import Policy, Qos  # noqa: E402
-from cyclonedds.domain import DomainParticipant  # noqa: E402
-from cyclonedds.idl import IdlStruct  # noqa: E402
-from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint32  # noqa: E402
-from cyclonedds.pub import DataWriter  # noqa: E402
-from cyclonedds.topic import Topic  # noqa: E402
-from cyclonedds.util import duration  # noqa: E402
-from support import Peer, end, figure, require, start  # noqa: E402
+import bare_dds  # before anything that joins a domain
+import support
+from bare_dds import Header
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint32
+from cyclonedds.pub import DataWriter
+from cyclonedds.topic import Topic
+from support import Peer, end, figure, require, start
 
 SITE = Path(__file__).resolve().parent / "tags.toml"
 # Size, x, y and heading of the face: as in the site.
 TAGS = {7: (0.04, 1.25, 0.0, 200.0), 8: (0.15, 1.35, 0.2, 225.0)}
 GOAL = (0.0, 0.0, 0.0)
-
-
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    stamp: Time
-    frame_id: str
 
 
 @dataclass
@@ -88,11 +67,6 @@ class CameraInfo(IdlStruct, typename="sensor_msgs::msg::dds_::CameraInfo_"):
     roi: Region
 
 
-def header():
-    """Returns a header of the camera, stamped now."""
-    return Header(Time(*divmod(time.time_ns(), 10**9)), "front")
-
-
 def detection(number, pose):
     """Returns the detection of an upright tag at the camera's height, from a pose of the robot."""
     size, tag_x, tag_y, normal = TAGS[number]
@@ -112,7 +86,7 @@ def camera_info(width=1280):
     k = [1720.0, 0.0, 640.0, 0.0, 1720.0, 480.0, 0.0, 0.0, 1.0]
     r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
     p = [1720.0, 0.0, 640.0, 0.0, 0.0, 1720.0, 480.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-    return CameraInfo(header(), 960, width, "plumb_bob", [0.0] * 5, k, r, p, 0, 0, Region(0, 0, 0, 0, False))
+    return CameraInfo(bare_dds.header("front"), 960, width, "plumb_bob", [0.0] * 5, k, r, p, 0, 0, Region(0, 0, 0, 0, False))
 
 
 class Camera:
@@ -120,13 +94,9 @@ class Camera:
 
     def __init__(self, peer):
         self.peer = peer
-        participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
-        # Classic CDR, as ROS writes it.
-        classic = Policy.DataRepresentation(use_cdrv0_representation=True)
-        reliable = Policy.Reliability.Reliable(duration(milliseconds=100))
-        qos = Qos(reliable, Policy.Durability.Volatile, Policy.History.KeepLast(1), classic)
-        self.detections = DataWriter(participant, Topic(participant, "rt/detections", Detections), qos=qos)
-        best_effort = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1), classic)
+        participant = bare_dds.participant()
+        self.detections = DataWriter(participant, Topic(participant, "rt/detections", Detections), qos=bare_dds.qos())
+        best_effort = bare_dds.qos(reliable=False)
         self.infos = DataWriter(participant, Topic(participant, "rt/camera_info", CameraInfo), qos=best_effort)
         self.due = 0.0
 
@@ -138,7 +108,7 @@ class Camera:
                 self.due = time.monotonic() + 0.1
                 if info is not None:
                     self.infos.write(info())
-                self.detections.write(Detections(header(), [detection(number, GOAL) for number in found]))
+                self.detections.write(Detections(bare_dds.header("front"), [detection(number, GOAL) for number in found]))
             self.peer.spin(0.005)
             if until is not None and until():
                 return True

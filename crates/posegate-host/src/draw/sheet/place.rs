@@ -28,7 +28,7 @@ pub(super) struct OnWall {
 }
 
 impl OnWall {
-    /// Returns where a tag is on the nearest face of a wall that it is flat on; `None` if there is none.
+    /// Returns a tag's place on the nearest wall face that the tag is parallel to and touches; `None` if it is on no wall.
     #[must_use]
     pub fn of(pose: &Pose3Deg, walls: &[Wall]) -> Option<Self> {
         let found = walls.iter().flat_map(|wall| faces(pose, wall));

@@ -1,10 +1,10 @@
 //! Turns tag detections into estimates: the pose and its covariance from the tags' corners.
 
 use super::{Detection, Exact, Sample};
+use crate::log::KnownTags;
 use crate::log::corners::{FixError, MountedCamera, TagObservation, locate};
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
-use posegate::shape::{Tag, Tolerance};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct TagLocalizer {
     eye: MountedCamera,
-    tags: BTreeMap<(String, i64), (Tag, Tolerance)>,
+    tags: KnownTags,
     sigma_px: f64,
     radius_squared: f64,
     counts: BTreeMap<FixError, u64>,
@@ -22,20 +22,13 @@ pub struct TagLocalizer {
 }
 
 impl TagLocalizer {
-    /// Returns a localizer for tags with their family (`tag36h11`, or `36h11`) and tolerance. `sigma_px` is the
-    /// standard deviation of a corner's coordinates, pixels; `radius_squared` is that of the pose-sets.
-    pub fn new<'t>(
-        eye: MountedCamera,
-        tags: impl IntoIterator<Item = (&'t str, &'t Tag, Tolerance)>,
-        sigma_px: f64,
-        radius_squared: f64,
-    ) -> Self {
-        let tags = tags.into_iter();
-        let named = tags
-            .map(|(family, tag, tolerance)| ((bare(family), i64::from(tag.id)), (*tag, tolerance)));
+    /// Returns a localizer for the tags of a site. `sigma_px` is the standard deviation of a corner's coordinates, pixels;
+    /// `radius_squared` is that of the pose-sets. A tag that an image does not identify counts as unknown.
+    #[must_use]
+    pub fn new(eye: MountedCamera, tags: KnownTags, sigma_px: f64, radius_squared: f64) -> Self {
         Self {
             eye,
-            tags: named.collect(),
+            tags,
             sigma_px,
             radius_squared,
             counts: BTreeMap::new(),
@@ -76,10 +69,10 @@ impl TagLocalizer {
         let seen: Vec<TagObservation<'_>> = found
             .iter()
             .filter_map(|found| {
-                let tag = self.tags.get(&(bare(&found.family), i64::from(found.id)));
-                tag.map(|(tag, tolerance)| TagObservation {
-                    tag,
-                    tolerance: *tolerance,
+                let tag = self.tags.get(&found.family, i64::from(found.id));
+                tag.map(|tag| TagObservation {
+                    tag: &tag.tag,
+                    tolerance: tag.tolerance,
                     corners_px: found.corners_px,
                 })
             })
@@ -121,9 +114,4 @@ impl TagLocalizer {
         all.extend(self.counts.iter().map(|(why, count)| (why.name(), *count)));
         all
     }
-}
-
-/// Returns a family without the prefix `tag` that some detectors write.
-fn bare(family: &str) -> String {
-    family.strip_prefix("tag").unwrap_or(family).to_string()
 }
