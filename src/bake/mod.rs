@@ -121,9 +121,7 @@ pub enum BakeError {
     #[error("epsilon = {0} has no radius that the gate takes (0.2 and above, below 1)")]
     Epsilon(f64),
     /// No cell lies in the set.
-    #[error(
-        "no cell of {cells} lies inside the success set: {}", missing(*.nearest)
-    )]
+    #[error("{}", missing(*.cells, *.nearest))]
     Empty {
         /// Number of cells tried.
         cells: u64,
@@ -143,7 +141,7 @@ pub struct Nearest {
     pub slack: f64,
 }
 
-fn missing(nearest: Nearest) -> String {
+fn missing(cells: u64, nearest: Nearest) -> String {
     let Nearest {
         pose: [x, y, yaw],
         constraint,
@@ -152,11 +150,13 @@ fn missing(nearest: Nearest) -> String {
     let place = std::format!("({x:.3} m, {y:.3} m, {:.2} deg)", yaw.to_degrees());
     if slack < 0.0 {
         std::format!(
-            "the nearest sampled pose, {place}, violates `{constraint}` by {:.4} (m or rad)",
+            "no pose of the table's extent lies inside the success set, as far as it was sampled: the nearest one, {place}, violates `{constraint}` by {:.4} (m or rad)",
             -slack
         )
     } else {
-        std::format!("it is smaller than the cells near {place}; use finer steps")
+        std::format!(
+            "no cell of {cells} lies inside the success set: it is smaller than the cells near {place}; use finer steps"
+        )
     }
 }
 

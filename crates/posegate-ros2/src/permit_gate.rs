@@ -434,7 +434,7 @@ impl Order {
 struct Carried {
     tracker: Tracker<INCREMENTS>,
     settings: TrackerSettings,
-    before: Option<(Pose, FrameId, u32)>,
+    before: Option<(Pose, [FrameId; 2], u32)>,
     order: Order,
 }
 
@@ -467,17 +467,19 @@ impl Carried {
 
     fn try_take(&mut self, now: Now, message: &Odometry, origin: Origin) -> Result<(), Reason> {
         let (_, has_changed) = self.order.next(origin);
-        let frame = FrameId::of(&message.header.frame_id);
-        if has_changed || self.before.is_some_and(|(_, before, _)| before != frame) {
+        // Increments are movements of one point of the robot: a pose of another one is no step from the pose before.
+        let frames =
+            [&message.header.frame_id, &message.child_frame_id].map(|name| FrameId::of(name));
+        if has_changed || self.before.is_some_and(|(_, before, _)| before != frames) {
             return Err(Reason::OdometryJump);
         }
         let stamp_ms = now
             .stamp_ms(message.header.stamp)
             .ok_or(Reason::OdometryGap)?;
         let pose = estimate(&message.pose).mean()?;
-        let (from, _, begins_ms) = self.before.unwrap_or((pose, frame, stamp_ms));
+        let (from, _, begins_ms) = self.before.unwrap_or((pose, frames, stamp_ms));
         let increment = increment(from, pose, [begins_ms, stamp_ms]).ok_or(Reason::OdometryJump)?;
-        self.before = Some((pose, frame, stamp_ms));
+        self.before = Some((pose, frames, stamp_ms));
         self.tracker.odometry(increment)
     }
 }

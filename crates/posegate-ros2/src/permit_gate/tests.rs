@@ -214,7 +214,7 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
     assert!((5..30).contains(&steps), "{steps}");
     assert_eq!(answer.reason(), Some(Reason::NotContained));
 
-    // A jump, another publisher, another frame, a gap, a message that cannot be read.
+    // A jump, another publisher, another frame, another point of the robot, a gap, a message that cannot be read.
     let next = number + 1;
     let now = OPENED + 20;
     let elsewhere = Odometry {
@@ -222,6 +222,10 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
             frame_id: "odom2".into(),
             ..odometry_at(now, 0.0).header
         },
+        ..odometry_at(now, 0.0)
+    };
+    let of_another_point = Odometry {
+        child_frame_id: "camera_link".into(),
         ..odometry_at(now, 0.0)
     };
     let other = Origin {
@@ -238,6 +242,7 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
         ),
         (odometry_at(now, 0.0), other, Reason::OdometryJump),
         (elsewhere, origin(next), Reason::OdometryJump),
+        (of_another_point, origin(next), Reason::OdometryJump),
         (
             odometry_at(OPENED, 0.0),
             origin(next),
