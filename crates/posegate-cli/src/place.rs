@@ -4,6 +4,7 @@ use crate::belief::{UncertaintyArgs, Weights};
 use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use crate::sheet;
 use posegate::shape::{Family, Tag, Tolerance};
+use posegate_host::doctor::stated_error;
 use posegate_host::draw::{Column, Mounted, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::place::{
@@ -98,6 +99,11 @@ fn reserve(text: &str) -> Result<Tolerance, String> {
     let (Some(translation), Some(turn_deg)) = (number(translation), number(turn_deg)) else {
         return Err(expected() + ", neither of them below 0");
     };
+    if translation > 1.0 {
+        return Err(format!(
+            "{translation} m is more than 1 m: the first number is in metres, such as 0.01"
+        ));
+    }
     if turn_deg >= 90.0 {
         return Err("no tag is seen that may be turned by 90 degrees or more".into());
     }
@@ -158,35 +164,38 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         objective: arguments.objective,
     };
     if let Some(file) = &arguments.candidates {
-        return compared(arguments, &order, file, files);
+        return compared(arguments, &site, &order, file, files);
     }
     let space = space(arguments, &site, &to_hang)?;
     let bar = progress(arguments.budget, "places");
-    let found = place(
-        &order,
-        &space,
-        &*arguments.method.optimizer(arguments.budget),
-        arguments.budget,
-        arguments.seed,
-        &|count| bar.inc(count),
+    let optimizer = arguments.method.optimizer(arguments.budget);
+    let (budget, seed) = (arguments.budget, arguments.seed);
+    let (before, found) = rayon::join(
+        || order.placed(order.task.tag.pose),
+        || {
+            place(&order, &space, &*optimizer, budget, seed, &|count| {
+                bar.inc(count)
+            })
+        },
     );
     bar.finish_and_clear();
     let found = found.map_err(|error| refused(arguments, &error))?;
-    pictures(arguments, &site, &order, &found, files)?;
+    pictures(arguments, &site, &order, &before, &found, files)?;
     let serves = serves(arguments.objective, &found.best);
     if arguments.json {
         let mut told = found.to_json();
         told["task"] = json!(arguments.task);
-        let before = order.placed(order.task.tag.pose);
+        told["site_digest"] = json!(site.digest_text());
         told["before"] = before.map_or(Value::Null, |before| before.to_json());
         print_json(&told)?;
     } else {
-        if let Ok(before) = order.placed(order.task.tag.pose) {
+        if let Ok(before) = &before {
             print(&"before:")?;
-            tell(&before)?;
+            tell(before)?;
             print(&"best:")?;
         }
         tell(&found.best)?;
+        print(&format_args!("{}", in_the_site_file(&found.best)))?;
         for other in &found.others {
             let pose = other.pose;
             print(&format_args!(
@@ -210,8 +219,43 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     if !serves {
         warn(&why_not(arguments, &found.best));
+    } else if let Some(told) = error_of_reserve(&site, &order, &found.best) {
+        warn(&told);
     }
     Ok(answer(serves))
+}
+
+/// Returns the tag's pose as the site file has it.
+fn in_the_site_file(placed: &Placed) -> String {
+    let pose = placed.pose;
+    // No minus before zero.
+    let [x, y, z, roll, pitch, yaw] = [
+        pose.x,
+        pose.y,
+        pose.z,
+        pose.roll_deg,
+        pose.pitch_deg,
+        pose.yaw_deg,
+    ]
+    .map(|number| (number * 1e4).round() / 1e4 + 0.0);
+    format!(
+        "in the site  pose = {{ x = {x:?}, y = {y:?}, z = {z:?}, roll_deg = {roll:?}, pitch_deg = {pitch:?}, yaw_deg = {yaw:?} }}"
+    )
+}
+
+/// Returns a warning if the error that the task states is smaller than what a tag makes that is off by the reserve: the margin is about
+/// seeing the tag, not about the pose that follows.
+fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) -> Option<String> {
+    let (name, task) = site
+        .tasks
+        .iter()
+        .find(|(_, task)| task.success == order.task.set)?;
+    let set = order.task.changed(best.pose, best.size, Some(best.reserve));
+    let warning = stated_error(&set.shape, task.error_bound?, name)?;
+    Some(format!(
+        "if the tag is off by the reserve and the site file still has the place above, so is every pose that it gives. {}: {}; survey the tag after mounting, and write its `pose` and `tolerance` into the site file",
+        warning.about, warning.message
+    ))
 }
 
 /// Prints how far apart the starts of the search ended.
@@ -233,19 +277,18 @@ fn pictures(
     arguments: &Arguments,
     site: &Site,
     order: &PlacementProblem<'_>,
+    before: &Result<Placed, PlaceError>,
     found: &Placement,
     files: &Files,
 ) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
-        let before = order
-            .placed(order.task.tag.pose)
-            .map_err(|error| refused(arguments, &error))?;
+        let before = before.as_ref().map_err(|error| refused(arguments, error))?;
         let belief = match order.known {
             PosePrior::Exactly => None,
             PosePrior::About(belief) => Some(belief),
         };
         let best = format!("best by {}", arguments.objective.name());
-        let named = [("before".to_owned(), &before), (best, &found.best)];
+        let named = [("before".to_owned(), before), (best, &found.best)];
         let others = found
             .others
             .iter()
@@ -506,6 +549,7 @@ fn refused(arguments: &Arguments, error: &PlaceError) -> Failure {
 /// Compares candidates.
 fn compared(
     arguments: &Arguments,
+    site: &Site,
     order: &PlacementProblem<'_>,
     file: &Input,
     files: &Files,
@@ -531,6 +575,7 @@ fn compared(
     if arguments.json {
         let mut told = named((&list[best], &placed[best]));
         told["evaluations"] = json!(placed.len());
+        told["site_digest"] = json!(site.digest_text());
         let all: Vec<Value> = list.iter().zip(&placed).map(named).collect();
         told["candidates"] = json!(all);
         print_json(&told)?;

@@ -1,10 +1,10 @@
 //! `posegate plan`: finds the chain of looks and drives after which a work task is certain to succeed.
 
 use crate::chain::{failure, sentences};
-use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
+use crate::door::{Failure, Outcome, answer, print, print_json, relied_on, warn};
 use posegate_host::draw::{chain_picture, success_of};
 use posegate_host::files::{Files, Input, Output};
-use posegate_host::plan::{Options, PlanError, Status, plan_near};
+use posegate_host::plan::{Options, PlanError, Status, crossing_notes, plan_near};
 use std::collections::BTreeMap;
 
 /// Finds the cheapest chain of looks and drives after which a work task is certain to succeed
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                 ))?;
                 for other in &planned.contingencies {
                     print(&format_args!(
-                        "if tag {} is lost at step {}: {} steps, cost {:.3}",
+                        "if tag {} is lost at step {}: {} more steps, cost {:.3} from there",
                         other.tags.join(", "),
                         other.step + 1,
                         other.plan.steps.len(),
@@ -123,6 +123,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                 }
             }
             None => print(&planned.why_not())?,
+        }
+    }
+    if let Some(plan) = &planned.plan {
+        for note in crossing_notes(&plan.report(), &site) {
+            warn(&note);
         }
     }
     Ok(answer(planned.plan.is_some()))

@@ -32,6 +32,25 @@ fn changed(from: &str, to: &str) -> String {
     PAPER.replace(from, to)
 }
 
+/// A plan is about what the robot knows. A way through a block is told, so that nobody reads "succeeds" as "drives there".
+#[test]
+fn a_way_through_a_block_is_told() {
+    let line = "plan site.toml --from back-to-dock --to dock";
+    let block = |y: f64| {
+        // It is too low to hide the tag.
+        let [low, high] = [y - 0.1, y + 0.1];
+        format!(
+            "{PAPER}\n[wall.pillar]\ncorners = [[0.6, {low}], [0.8, {low}], [0.8, {high}], [0.6, {high}]]\nz = [0.0, 0.2]\n"
+        )
+    };
+    for (y, crosses) in [(0.1, true), (-0.6, false)] {
+        let (code, out, err, _) = run(&block(y), line);
+        assert_eq!(code, 0, "{out}{err}");
+        let told = err.contains("the straight way of step 2 crosses `pillar`");
+        assert_eq!(told, crosses, "{err}");
+    }
+}
+
 #[test]
 fn chains_are_told_step_by_step() {
     let line = "chain site.toml --name back-to-dock --json";

@@ -149,7 +149,37 @@ fn placements_are_checked_and_shown() {
     let mut moved = told.clone();
     moved["before"]["tag_pose"]["x"] = json!(hangs.x + 0.001);
     assert_eq!(wrong("see-t7", moved), PageError::OtherTag("see-t7".into()));
-    assert_eq!(wrong("no", told), PageError::NoTask("no".into()));
+    assert_eq!(wrong("no", told.clone()), PageError::NoTask("no".into()));
+    // A placement names the site file that it was made from.
+    told["site_digest"] = json!(site.digest_text());
+    let page = made(SAMPLE, |order| {
+        order.placements.push(("see-t7".into(), told.clone()))
+    });
+    assert!(page.unwrap().contains("have the tag at the place"));
+    let later = SAMPLE.replace("psi_max_deg = 50.0", "psi_max_deg = 49.0");
+    let error = made(&later, |order| {
+        order.placements.push(("see-t7".into(), told.clone()))
+    });
+    assert!(
+        matches!(error, Err(PageError::OtherSite(..))),
+        "{:?}",
+        error.err()
+    );
+    // Once the found place is in the site file, the page shows the tag there; a pose is copied with some decimals.
+    let own =
+        "pose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }";
+    assert!(SAMPLE.contains(own));
+    let at = |x: &str| {
+        SAMPLE.replace(own, &format!("pose = {{ x = {x}, y = 0.25, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 170.0 }}"))
+    };
+    let page = made(&at("2.50004"), |order| {
+        order.placements.push(("see-t7".into(), told.clone()))
+    });
+    assert!(page.unwrap().contains("has the tag at the best place"));
+    let page = made(&at("2.51"), |order| {
+        order.placements.push(("see-t7".into(), told.clone()))
+    });
+    assert_eq!(page.err(), Some(PageError::OtherTag("see-t7".into())));
     assert_eq!(
         wrong("see-t7", json!({ "tag_pose": 3 })),
         PageError::NoPlacement("see-t7".into())

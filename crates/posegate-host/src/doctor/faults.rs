@@ -83,6 +83,13 @@ pub fn stated_errors(site: &Site) -> Vec<Warning> {
     tasks.chain(looks).collect()
 }
 
+/// Returns a warning for the stated error of a task if it is smaller than what the tolerances of tag and camera make alone from some of
+/// the views of a shape.
+#[must_use]
+pub fn stated_error(shape: &Shape, bound: ErrorBound, task: &str) -> Option<Warning> {
+    bound_without_survey(shape, bound, ["task", task])
+}
+
 /// Returns a warning for a stated error that is smaller than what the tolerances of tag and camera make alone.
 fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: [&str; 2]) -> Option<Warning> {
     let views = stated_views(shape);

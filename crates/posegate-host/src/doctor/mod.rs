@@ -16,7 +16,7 @@
 
 pub use self::cost::decision_costs;
 pub use self::deepest::{Deepest, deepest};
-pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_errors};
+pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_error, stated_errors};
 
 mod collisions;
 mod cost;

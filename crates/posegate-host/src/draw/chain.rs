@@ -52,7 +52,7 @@ pub fn chain_picture<'s>(
             HALL,
         );
         let legend = [24.0, panel.bottom() + 44.0];
-        Some(legend[1] + hall_legend(picture, legend, true) + 34.0)
+        Some(legend[1] + hall_legend(picture, site, &[report], legend) + 34.0)
     };
     let first = with_hall(&mut Picture::new(760.0, 760.0, &title)).unwrap_or(TOP);
     let bottom = first + rows as f64 * DOWN;

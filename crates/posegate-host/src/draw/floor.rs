@@ -16,6 +16,9 @@ impl Inside<'_> {
         } else {
             self.hatched(&wall.corners, &palette::WALL);
         }
+        for part in kept_out(wall) {
+            self.line(&part, &palette::KEPT_OUT);
+        }
     }
 
     /// Draws a tag's edge from above, with the direction of its face.
@@ -72,6 +75,29 @@ impl Inside<'_> {
             picture.text([x, y], text, &font.anchored(Anchor::Start));
         });
     }
+}
+
+/// Returns the parts of a wall's outline where no tag may be mounted at some height: lines in the world, metres.
+fn kept_out(wall: &Wall) -> Vec<[[f64; 2]; 2]> {
+    let count = wall.corners.len();
+    let edges = if count == 2 { 1 } else { count };
+    let mut parts = Vec::new();
+    let mut walked = 0.0;
+    for (index, from) in wall.corners.iter().enumerate().take(edges) {
+        let to = wall.corners[(index + 1) % count];
+        let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
+        let at = |s: f64| {
+            let t = ((s - walked) / length).clamp(0.0, 1.0);
+            [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]))
+        };
+        for [[begin, end], _] in &wall.keep_outs {
+            if *begin < walked + length && walked < *end {
+                parts.push([at(*begin), at(*end)]);
+            }
+        }
+        walked += length;
+    }
+    parts
 }
 
 /// Names on a floor plan that do not overlap.
@@ -203,6 +229,24 @@ mod tests {
     use super::*;
     use crate::draw::panel::Panel;
     use crate::draw::svg::Picture;
+
+    #[test]
+    fn keep_outs_are_measured_along_the_outline() {
+        let wall = Wall {
+            name: "block".into(),
+            corners: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]],
+            z: [0.0, 2.0],
+            keep_outs: vec![[[3.5, 4.25], [0.0, 1.0]]],
+        };
+        let expected = [[[3.5, 0.0], [4.0, 0.0]], [[4.0, 0.0], [4.0, 0.25]]];
+        assert_eq!(kept_out(&wall), expected);
+        let line = Wall {
+            corners: vec![[0.0, 3.0], [18.0, 3.0]],
+            keep_outs: vec![[[7.5, 10.5], [0.0, 2.5]]],
+            ..wall
+        };
+        assert_eq!(kept_out(&line), [[[7.5, 3.0], [10.5, 3.0]]]);
+    }
 
     /// A row of docks below a wall of tags, with drawn parts everywhere about them: names cover those rather than each other.
     #[test]

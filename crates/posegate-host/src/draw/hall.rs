@@ -8,7 +8,7 @@ use super::panel::{Panel, tick_at_scale};
 use super::svg::{Picture, Style, literal};
 use super::task_plan::about;
 use crate::plan::{ChainReport, StepKind, StepReport};
-use crate::site::Site;
+use crate::site::{Site, Task};
 use posegate::shape::SuccessSet;
 
 const CAMERA: Style = Style::outlined("#8a6d00", 1.8).dashed("5 2");
@@ -176,12 +176,8 @@ pub(super) fn hall(
             }
         }
         for wall in &site.walls {
-            // A wall's name is at its end, a block's at its middle.
-            let at = match wall.corners.as_slice() {
-                [from, _] => Some(*from),
-                corners => inside.middle(corners),
-            };
-            if let Some(at) = at {
+            // At a corner of the hall, a name would be beside two walls.
+            if let Some(at) = inside.middle(&wall.corners) {
                 labels.place(inside, at, &literal(&wall.name));
             }
         }
@@ -189,33 +185,71 @@ pub(super) fn hall(
     panel
 }
 
-/// Draws the legend of a hall in two columns; the point is the upper left corner. Returns its height, pixels.
-pub(super) fn hall_legend(picture: &mut Picture, [left, top]: [f64; 2], has_routes: bool) -> f64 {
-    let mut entries = vec![
+/// Draws the legend of a hall in two columns, for what is drawn; the point is the upper left corner. Returns its height, pixels.
+pub(super) fn hall_legend(
+    picture: &mut Picture,
+    site: &Site,
+    routes: &[&ChainReport],
+    [left, top]: [f64; 2],
+) -> f64 {
+    let kinds = || routes.iter().flat_map(|report| &report.steps);
+    let has = |kind| kinds().any(|step| step.kind == kind);
+    let of_wall = |is_block: bool| {
+        let walls = site.walls.iter();
+        walls.filter(move |wall| (wall.corners.len() > 2) == is_block)
+    };
+    let outlines = |task: &Task| !Ingredients::of(&task.success.shape).outlines.is_empty();
+    let wall = palette::WALL.with_outline("#444444", 3.5);
+    let all = [
         (
+            !site.tags.is_empty(),
             Sample::Line(palette::TAG),
             "tags; arrows: where their faces look",
         ),
-        (Sample::Line(GOAL), "goals of the tasks, and their headings"),
-        (Sample::Hatched(palette::WALL), "blocks"),
         (
-            Sample::Line(palette::WALL.with_outline("#444444", 3.5)),
-            "walls",
+            true,
+            Sample::Line(GOAL),
+            "goals of the tasks, and their headings",
+        ),
+        (
+            of_wall(true).count() > 0,
+            Sample::Hatched(palette::WALL),
+            "blocks",
+        ),
+        (of_wall(false).count() > 0, Sample::Line(wall), "walls"),
+        (
+            site.walls.iter().any(|wall| !wall.keep_outs.is_empty()),
+            Sample::Line(palette::KEPT_OUT),
+            "no tag may hang there, at some heights",
+        ),
+        (
+            has(StepKind::Navigation),
+            Sample::Line(ROUTE),
+            "straight ways from the start to the goals",
+        ),
+        (
+            has(StepKind::Localization),
+            Sample::Disc(LOOK),
+            "looks: every place where the robot may be",
+        ),
+        (
+            has(StepKind::Localization),
+            Sample::Line(SIGHT),
+            "the tag that the robot sees there",
+        ),
+        (
+            routes.is_empty() && !site.cameras.is_empty(),
+            Sample::Line(CAMERA),
+            "cameras there, where they look",
+        ),
+        (
+            site.tasks.values().any(outlines),
+            Sample::Patch(palette::BODY),
+            "robots at their goals",
         ),
     ];
-    if has_routes {
-        entries.extend([
-            (Sample::Line(ROUTE), "routes from the start to the goals"),
-            (
-                Sample::Disc(LOOK),
-                "looks: every place where the robot may be",
-            ),
-            (Sample::Line(SIGHT), "the tag that the robot sees there"),
-        ]);
-    } else {
-        entries.push((Sample::Line(CAMERA), "cameras there, where they look"));
-    }
-    entries.push((Sample::Patch(palette::BODY), "robots at their goals"));
+    let drawn = all.into_iter().filter(|(is_drawn, ..)| *is_drawn);
+    let entries: Vec<(Sample, &str)> = drawn.map(|(_, sample, words)| (sample, words)).collect();
     let rows = entries.len().div_ceil(2);
     for (column, entries) in entries.chunks(rows).enumerate() {
         legend(picture, [left + 320.0 * column as f64, top], entries);

@@ -33,6 +33,8 @@ pub const BODY: Style = Style::outlined("#444444", 1.6).with_fill_opacity("#9999
 pub const EXTENT: Style = Style::outlined("#777777", 1.0).dashed("2 3");
 /// Walls, blocks and obstacles, which are also hatched.
 pub const WALL: Style = Style::outlined("#444444", 1.2);
+/// A part of a wall where no tag may be mounted: wider than the wall, and dotted.
+pub const KEPT_OUT: Style = Style::outlined("#d55e00", 7.0).dashed("2 2");
 /// The view of a camera.
 pub const VIEW: Style = Style::outlined("#8a6d00", 1.4)
     .with_fill_opacity("#f0e442", 0.22)

@@ -272,7 +272,7 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], column: &Column) {
     let off = placed.tolerance();
     if !off.is_none() {
         lines.push(format!(
-            "may be off by {:.1} cm and {:.1}°",
+            "seen by all of the pose-set if off by {:.1} cm and {:.1}°",
             100.0 * off.translation,
             off.turn_deg
         ));

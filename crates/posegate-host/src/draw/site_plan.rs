@@ -19,10 +19,10 @@ pub fn site_plan(site: &Site, routes: &[&ChainReport]) -> String {
     let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
     let bottom = hall(&mut trial, site, routes, "", [LEFT, 50.0], LARGEST).bottom();
     let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
-    let legend = hall_legend(&mut trial, [24.0, bottom], !routes.is_empty());
+    let legend = hall_legend(&mut trial, site, routes, [24.0, bottom]);
     let mut picture = Picture::new(WIDTH, bottom + 46.0 + legend + 12.0, title);
     picture.text([24.0, 30.0], title, &Font::new(19.0, palette::INK).bold());
     hall(&mut picture, site, routes, "", [LEFT, 50.0], LARGEST);
-    hall_legend(&mut picture, [24.0, bottom + 46.0], !routes.is_empty());
+    hall_legend(&mut picture, site, routes, [24.0, bottom + 46.0]);
     picture.finish()
 }

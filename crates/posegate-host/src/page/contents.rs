@@ -39,11 +39,16 @@ pub enum PageError {
     /// A placement of a task that does not exist.
     #[error("the site has no task `{0}`")]
     NoTask(String),
-    /// A placement that begins at a pose where none of the task's tags is.
+    /// A placement with none of the task's tags where it begins, and none where it ends.
     #[error(
-        "the placement of `{0}` begins at a pose where none of the task's tags is: it belongs to another site, or to another version of this one"
+        "none of the tags of `{0}` is where its placement begins, or at the place that it found: it belongs to another site, or to another version of this one"
     )]
     OtherTag(String),
+    /// A placement of another site file.
+    #[error(
+        "the placement of `{0}` was made for another site file, or for another version of this one: its digest is {1}, and this file's is {2}; run `posegate place` again"
+    )]
+    OtherSite(String, String, String),
     /// The input is not a placement.
     #[error("the placement of `{0}` is not the output of `posegate place --json`")]
     NoPlacement(String),

@@ -10,7 +10,7 @@ use crate::draw::{SeenFrom, Subject, borders_picture, task_plan};
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind};
 use crate::site::{Site, TaskKind};
-use posegate::shape::Pose3Deg;
+use posegate::shape::{Pose3Deg, Tag};
 use posegate::table::Table;
 
 const PAGE: &str = include_str!("template/page.html");
@@ -47,11 +47,6 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
             format!("<section id=\"{id}\">\n<h2>{title}</h2>\n{text}</section>\n")
         })
         .collect();
-    let digest: String = site
-        .digest
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
     let tasks: Vec<(&str, Value)> = contents
         .tasks
         .iter()
@@ -70,7 +65,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
     let parts = [
         ("title", escaped(&order.title)),
         ("version", env!("CARGO_PKG_VERSION").to_string()),
-        ("digest", digest),
+        ("digest", site.digest_text()),
         ("nav", nav.join("")),
         ("summary", summary(site, contents)),
         ("options", options.join("")),
@@ -445,9 +440,19 @@ fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
         let Some(of) = order.site.tasks.get(task) else {
             return Err(PageError::NoTask(task.clone()));
         };
-        let hangs = |before| of.success.tags().iter().any(|tag| tag.pose == before);
-        if !pose_of(&told["before"]).is_none_or(hangs) {
+        let hangs = |pose| of.success.tags().iter().any(|tag| tag.pose == pose);
+        let is_before = pose_of(&told["before"]).is_none_or(hangs);
+        // The user has written the found place into the site file: its digest is another one.
+        let is_adopted = !is_before && is_adopted(&of.success.tags(), told);
+        if !is_before && !is_adopted {
             return Err(PageError::OtherTag(task.clone()));
+        }
+        let digest = order.site.digest_text();
+        if let Some(other) = told["site_digest"].as_str()
+            && is_before
+            && other != digest
+        {
+            return Err(PageError::OtherSite(task.clone(), other.into(), digest));
         }
         let mut rows = Vec::new();
         let named = [("before", &told["before"]), ("best", told)];
@@ -461,12 +466,17 @@ fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
             }
             rows.push(place_row(name, place).ok_or_else(|| PageError::NoPlacement(task.clone()))?);
         }
-        text += &format!(
-            "<h3>the tag of {}</h3>\n<div class=\"pair\">\n",
-            escaped(task)
-        );
+        text += &format!("<h3>the tag of {}</h3>\n", escaped(task));
+        text += if is_adopted {
+            "<p>The site file has the tag at the best place. The numbers are those of the file before the tag was moved.</p>\n"
+        } else {
+            "<p>The site file, the plans and the mounting sheet have the tag at the place \u{201c}before\u{201d}. To hang it at the best place, write that pose into the site file.</p>\n"
+        };
+        text += "<div class=\"pair\">\n";
+        // Where the tag of the site file is now.
+        let now = if is_adopted { told } else { &told["before"] };
         for (name, what) in named {
-            if let Some(picture) = hung(order.site, task, &told["before"], what) {
+            if let Some(picture) = hung(order.site, task, now, what) {
                 text += &figure(&picture, &format!("{task}, the tag {name}"));
             }
         }
@@ -488,17 +498,42 @@ fn pose_of(place: &Value) -> Option<Pose3Deg> {
     })
 }
 
-/// Draws the floor of a task with its tag at a place. If there are several tags, the moved tag is the one at the pose
-/// `before`.
-fn hung(site: &Site, task: &str, before: &Value, place: &Value) -> Option<String> {
+/// Returns `true` if one of the tags is at the place that was found, or within the reserve for which that place was proven.
+fn is_adopted(tags: &[Tag], told: &Value) -> bool {
+    let Some(found) = pose_of(told) else {
+        return false;
+    };
+    let reserve = |key: &str| told["reserve"][key].as_f64().unwrap_or(0.0);
+    // A pose is copied with four decimals.
+    let (metres, degrees) = (
+        reserve("translation").max(1e-4),
+        reserve("yaw_deg").max(1e-2),
+    );
+    tags.iter().map(|tag| tag.pose).any(|own| {
+        let off = [own.x - found.x, own.y - found.y, own.z - found.z];
+        let turn = (own.yaw_deg - found.yaw_deg + 180.0).rem_euclid(360.0) - 180.0;
+        let lean = (own.roll_deg - found.roll_deg).abs() + (own.pitch_deg - found.pitch_deg).abs();
+        off.iter().map(|v| v * v).sum::<f64>().sqrt() <= metres
+            && turn.abs() <= degrees
+            && lean <= 1e-2
+    })
+}
+
+/// Draws the floor of a task with its tag at a place. If there are several tags, the moved tag is the one nearest to the pose
+/// `now`.
+fn hung(site: &Site, task: &str, now: &Value, place: &Value) -> Option<String> {
     let pose = pose_of(place)?;
     let size = place["size"].as_f64();
     let mut site = site.clone();
     let own = site.tasks.get_mut(task)?;
     let tags = own.success.tags();
-    let tag = match (tags.as_slice(), pose_of(before)) {
+    let tag = match (tags.as_slice(), pose_of(now)) {
         ([only], _) => *only,
-        (tags, Some(before)) => *tags.iter().find(|tag| tag.pose == before)?,
+        (tags, Some(now)) => {
+            let off = |tag: &Tag| libm::hypot(tag.pose.x - now.x, tag.pose.y - now.y);
+            let nearest = tags.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            *nearest?
+        }
         _ => return None,
     };
     own.success = own.success.with_views_of(&tag, |view| {

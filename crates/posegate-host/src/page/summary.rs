@@ -5,7 +5,7 @@ use super::figures::escaped;
 use crate::doctor::examine;
 use crate::draw::success_of;
 use crate::log::factor;
-use crate::plan::{ChainReport, StepKind};
+use crate::plan::{ChainReport, StepKind, crossing_notes};
 use crate::site::{Site, TaskKind};
 use posegate::contain::Margin;
 use std::collections::BTreeSet;
@@ -164,9 +164,14 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
     let unused = site.tags.len() - tags.len();
     if unused > 0 && count > 0 {
         notes.push(format!(
-            "{unused} of the site's {} tags are not needed by these plans",
+            "these plans look at {} of the site's {} tags; the other {unused} may be spares for tags that are lost: leave them unless `posegate plan --survive-lost-tags 1` and your other tasks do without them",
+            tags.len(),
             site.tags.len()
         ));
+    }
+    for (name, report) in reports() {
+        let crossed = crossing_notes(report, site).into_iter();
+        notes.extend(crossed.map(|note| format!("WARNING: the plan to {name}: {note}")));
     }
     for plan in plans {
         if let Err(why) = &plan.found {

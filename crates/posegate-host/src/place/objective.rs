@@ -472,11 +472,10 @@ pub(super) fn installation(task: &Task, pose: Pose3Deg, belief: &Gaussian) -> f6
         return 0.0;
     }
     let largest = bisected(0.0, MOST_LEFT, holds);
-    [1.0, 0.999, 0.99, 0.98]
-        .into_iter()
-        .map(|share| share * largest)
-        .find(|left| scale::is_contained(&reserved(*left), belief))
-        .unwrap_or(0.0)
+    let share = scale::last_proven([0.98, 0.99, 0.999, 1.0], |share| {
+        scale::is_contained(&reserved(share * largest), belief, share)
+    });
+    share.map_or(0.0, |share| share * largest)
 }
 
 /// Returns the goal in the world: m, m, rad.

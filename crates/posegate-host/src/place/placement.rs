@@ -414,11 +414,15 @@ impl PlacementProblem<'_> {
             value: found.unknown_mass.value / mass,
             error: found.unknown_mass.error / mass,
         };
-        placed.margin = scale::proven(&task.reserved(placed.pose, placed.size, 0.0), belief);
+        let (margin, left) = rayon::join(
+            || scale::proven(&task.reserved(placed.pose, placed.size, 0.0), belief),
+            || objective::installation(task, placed.pose, belief),
+        );
+        placed.margin = margin;
         placed.contained =
-            placed.margin.is_none_or(|margin| margin >= 1.0) && !(placed.p_unknown.value > 0.0);
+            margin.is_none_or(|margin| margin >= 1.0) && !(placed.p_unknown.value > 0.0);
         if placed.contained {
-            placed.left = objective::installation(task, placed.pose, belief);
+            placed.left = left;
         }
         Ok(())
     }

@@ -181,6 +181,15 @@ const PATIENCE: ProofBudget = ProofBudget {
     smallest: 1e-6,
 };
 
+/// From this share of the largest size on, a proof gains less than 1 % and takes ten times as many blocks for a tenth of the rest.
+const CLOSE: f64 = 0.995;
+
+/// The budget of a proof for the last percent.
+const CLOSE_PATIENCE: ProofBudget = ProofBudget {
+    blocks: 20_000,
+    smallest: 1e-6,
+};
+
 /// The budget of the proof that decides whether a place is contained.
 const OWN_PATIENCE: ProofBudget = ProofBudget {
     blocks: 400_000,
@@ -188,7 +197,7 @@ const OWN_PATIENCE: ProofBudget = ProofBudget {
 };
 
 /// Shares of the largest scale for which a proof is tried.
-const SHARES: [f64; 5] = [1.0 - 1e-4, 1.0 - 1e-3, 0.99, 0.95, 0.8];
+const SHARES: [f64; 5] = [0.8, 0.95, 0.99, 1.0 - 1e-3, 1.0 - 1e-4];
 
 /// A smaller scale is not worth a proof.
 const LEAST: f64 = 1e-3;
@@ -207,35 +216,50 @@ pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
         return Some(0.0);
     }
     let prover = Prover::new(set);
-    let holds = |scale: f64| {
-        let patience = if scale == 1.0 { OWN_PATIENCE } else { PATIENCE };
+    let holds = |scale: f64, patience: ProofBudget| {
         body(set, belief, scale).is_some_and(|body| body.is_within(&prover, patience))
     };
     if largest == f64::INFINITY {
         // No direction tried leaves the set. Small gaps may lie between them.
-        let margin = LARGE.into_iter().find(|scale| holds(*scale));
+        let margin = LARGE.into_iter().find(|scale| holds(*scale, PATIENCE));
         return match margin {
             Some(scale) if scale == LARGE[0] => None,
             found => Some(found.unwrap_or(0.0)),
         };
     }
-    let shares = SHARES.into_iter().map(|share| share * largest);
+    let margin = last_proven(SHARES, |share| {
+        let patience = patience(&prover, share, PATIENCE);
+        holds(share * largest, patience)
+    });
+    let margin = margin.map_or(0.0, |share| share * largest);
     // Containment at scale 1 is worth a proof of its own.
-    let own = (largest > 1.0).then_some(1.0);
-    let mut scales: Vec<f64> = shares.chain(own).collect();
-    scales.sort_by(|a, b| b.total_cmp(a));
-    Some(
-        scales
-            .into_iter()
-            .find(|scale| holds(*scale))
-            .unwrap_or(0.0),
-    )
+    let is_own = margin < 1.0 && largest > 1.0 && holds(1.0, OWN_PATIENCE);
+    Some(if is_own { 1.0 } else { margin })
 }
 
-/// Returns `true` if the set is proven to contain the pose-set.
-pub(super) fn is_contained(set: &SuccessSet, belief: &Gaussian) -> bool {
+/// Returns the budget of a proof of a share of the largest size: blocks take longer than the slices of a convex set.
+fn patience(prover: &Prover, share: f64, usual: ProofBudget) -> ProofBudget {
+    if share < CLOSE || prover.is_convex() {
+        usual
+    } else {
+        CLOSE_PATIENCE
+    }
+}
+
+/// Returns the last of some shares that is proven; each is that of a larger set than the one before. A failed proof takes all of its
+/// budget, and the proof of a smaller set is shorter: the search begins with the smallest one and ends with the first that fails.
+pub(super) fn last_proven(
+    shares: impl IntoIterator<Item = f64>,
+    mut holds: impl FnMut(f64) -> bool,
+) -> Option<f64> {
+    shares.into_iter().take_while(|share| holds(*share)).last()
+}
+
+/// Returns `true` if the set is proven to contain the pose-set, with the budget for a share of the largest tolerance.
+pub(super) fn is_contained(set: &SuccessSet, belief: &Gaussian, share: f64) -> bool {
     let prover = Prover::new(set);
-    body(set, belief, 1.0).is_some_and(|body| body.is_within(&prover, OWN_PATIENCE))
+    let patience = patience(&prover, share, OWN_PATIENCE);
+    body(set, belief, 1.0).is_some_and(|body| body.is_within(&prover, patience))
 }
 
 /// By how much the pose-set is enlarged for the proof, metres and radians. This is more than the rounding of a box's

@@ -25,6 +25,7 @@
 pub use self::belief::BeliefStateF64;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
 pub use self::costs::costs;
+pub use self::crossings::{crossing_notes, crossings};
 pub(crate) use self::endpoint::TaskPlanner;
 pub use self::error::PlanError;
 pub use self::library::{Library, Look, Viewpoint};
@@ -45,6 +46,7 @@ mod bound;
 mod certificate;
 mod chain;
 mod costs;
+mod crossings;
 mod endpoint;
 mod error;
 mod fewer;

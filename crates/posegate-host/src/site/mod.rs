@@ -109,6 +109,15 @@ pub struct Site {
 }
 
 impl Site {
+    /// Returns the digest as hexadecimal digits.
+    #[must_use]
+    pub fn digest_text(&self) -> String {
+        self.digest
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
+    }
+
     /// The confidence if a site file gives none.
     pub const DEFAULT_EPSILON: f64 = 0.99;
 

@@ -134,7 +134,7 @@ fn lines(mounted: &Mounted, on: Option<&OnWall>) -> Vec<(&'static str, String)> 
         lines.push((
             "beyond it",
             format!(
-                "{:.0} mm and {:.1}° more before the margin is lost",
+                "seen if {:.0} mm and {:.1}° more off, but poses are then as wrong",
                 libm::floor(left * 10.0),
                 libm::floor(left * 10.0) / 10.0
             ),
