@@ -148,7 +148,11 @@ fn missing(cells: u64, nearest: Nearest) -> String {
         slack,
     } = nearest;
     let place = std::format!("({x:.3} m, {y:.3} m, {:.2} deg)", yaw.to_degrees());
-    if slack < 0.0 {
+    if slack == f64::NEG_INFINITY {
+        std::format!(
+            "no pose of the table's extent lies inside the success set, as far as it was sampled: `{constraint}` is violated everywhere, also at {place}"
+        )
+    } else if slack < 0.0 {
         std::format!(
             "no pose of the table's extent lies inside the success set, as far as it was sampled: the nearest one, {place}, violates `{constraint}` by {:.4} (m or rad)",
             -slack

@@ -82,9 +82,20 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             };
             print(&format_args!("  {name}: {shape}{table}"))?;
         }
-        for warning in &warnings {
+        // The candidates of one row have one line and, often, one warning.
+        let alike = |a: &Warning, b: &Warning| {
+            (a.code, &a.message, a.line(&text)) == (b.code, &b.message, b.line(&text))
+        };
+        for group in warnings.chunk_by(alike) {
+            let [warning, others @ ..] = group else {
+                continue;
+            };
+            let more = match others.len() {
+                0 => String::new(),
+                count => format!(" and {count} more of this line"),
+            };
             print(&format_args!(
-                "WARNING {}:{}: {} ({}): {}\n  {}",
+                "WARNING {}:{}: {}{more} ({}): {}\n  {}",
                 arguments.site.display(),
                 warning.line(&text),
                 warning.about,

@@ -986,6 +986,11 @@ fn check_ends_with_the_warnings_of_doctor() {
     let (words, _) = folder.expect(0, "check site.toml");
     let last = words.lines().rev().nth(1).unwrap();
     assert!(last.starts_with("WARNING site.toml:"), "{words}");
+    // What holds for all candidates of a row is said once.
+    let unknown = words.lines().filter(|line| line.contains("family_unknown"));
+    let unknown: Vec<&str> = unknown.collect();
+    assert_eq!(unknown.len(), 1, "{words}");
+    assert!(unknown[0].contains(" more of this line"), "{words}");
 }
 
 /// A site that names its controller is warned of each table that may take too long, and only of those.

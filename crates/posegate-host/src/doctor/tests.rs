@@ -313,8 +313,9 @@ fn candidates_are_examined_as_tags() {
         panic!("{:?}", findings.warnings);
     };
     assert!(
-        found.message.contains("did you mean `tag36h10`?")
-            || found.message.contains("did you mean `tag36h11`?")
+        found
+            .message
+            .contains("did you mean `tag36h10` or `tag36h11`?")
     );
     let line = text
         .lines()

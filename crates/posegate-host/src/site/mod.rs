@@ -32,12 +32,13 @@ pub use self::chain::{
 pub use self::contents::SiteIndex;
 pub use self::controller::{Controller, Core};
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
+pub use self::families::FAMILIES;
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub(crate) use self::learnt::stated_views;
 pub use self::lines::line_of;
 pub use self::planner::{GeneratedLook, Planner};
 pub use self::sample::SAMPLE;
-pub use self::suggest::similar;
+pub use self::suggest::{question, similar};
 
 mod calibration;
 mod camera;
@@ -49,6 +50,7 @@ mod controller;
 pub mod language {}
 
 mod error;
+mod families;
 mod import;
 mod json;
 mod keys;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::SiteError;
+use super::families::{FAMILIES, family_bits};
 use super::learnt;
 use super::places::SiteModel;
 use super::reader::{Node, Table};
@@ -351,9 +352,10 @@ fn sharpness(
                 "the number of bits of the family `{}` is not known",
                 tag.family
             ))
-            .help(
-                "add `bits`: those along the black border's outer edge, including the border's own",
-            )
+            .help(format!(
+                "{}if the name is right, add `bits`: those along the black border's outer edge, including the border's own",
+                suggest::question(&tag.family, FAMILIES.into_iter()).map_or_else(String::new, |words| words + " Or, ")
+            ))
         })?,
     };
     Ok(Some(Sharpness {
@@ -361,18 +363,6 @@ fn sharpness(
         px_per_bit: node.number()? / (1.0 - camera.tolerance.focal),
         bits,
     }))
-}
-
-/// Returns the number of bits along the outer edge of a family's border (`width_at_border` of its
-/// definition).
-fn family_bits(family: &str) -> Option<u32> {
-    Some(match family {
-        "tag36h11" | "tag36h10" => 8,
-        "tag25h9" => 7,
-        "tag16h5" | "tagCustom48h12" | "tagStandard52h13" => 6,
-        "tagStandard41h12" | "tagCircle21h7" | "tagCircle49h12" => 5,
-        _ => return None,
-    })
 }
 
 /// Limits a view so that the tag's blur stays within `px_max` while the robot turns. The image of a fixed

@@ -23,6 +23,14 @@ pub fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&
         .map(|(_, candidate)| candidate)
 }
 
+/// Returns all known names that are as similar as the most similar one, as a question in words; `None` if all are too different.
+pub fn question<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Option<String> {
+    let nearest = distance(name, similar(name, known.clone())?);
+    let all = known.filter(|candidate| distance(name, candidate) == nearest);
+    let quoted: Vec<String> = all.map(|candidate| format!("`{candidate}`")).collect();
+    Some(format!("did you mean {}?", quoted.join(" or ")))
+}
+
 /// Returns the names in backticks, separated by commas. Names after the first `MOST` are only
 /// counted.
 pub(super) fn list<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
