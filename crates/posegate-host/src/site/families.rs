@@ -1,6 +1,6 @@
 //! The families of tags that are known by name.
 
-/// The names of the families that [`Family::named`] knows.
+/// The names of the families that [`Family::named`](posegate::shape::Family::named) knows.
 pub const FAMILIES: [&str; 9] = [
     "tag16h5",
     "tag25h9",
