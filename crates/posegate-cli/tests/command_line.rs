@@ -1059,3 +1059,26 @@ fn an_empty_table_names_the_cause() {
     assert!(words.contains("away from every camera"), "{err}");
     assert!(!words.contains("make the steps finer"), "{err}");
 }
+
+/// A place is of use once it is in the site file. A reserve is in metres, and it is also an error of every pose that the tag gives.
+#[test]
+fn a_place_is_told_as_the_site_file_has_it() {
+    let folder = Folder::new();
+    let place = "place site.toml --task see-t7 --sigma-x 0.05 --sigma-y 0.05 --sigma-yaw-deg 1 --free x=3.9:4 --budget 10";
+    let (out, err) = folder.expect(0, &format!("{place} --reserve 0.001,0.1"));
+    let pose = out
+        .lines()
+        .find(|line| line.starts_with("in the site  pose = { x = "));
+    assert!(
+        pose.is_some_and(|line| line.ends_with("yaw_deg = 180.0 }")),
+        "{out}"
+    );
+    assert!(!err.contains("off by the reserve"), "{err}");
+    let (_, err) = folder.expect(0, &format!("{place} --reserve 0.02,1"));
+    assert!(
+        err.contains("off by the reserve") && err.contains("task see-t7"),
+        "{err}"
+    );
+    let (_, err) = folder.expect(2, &format!("{place} --reserve 20,1"));
+    assert!(err.contains("20 m is more than 1 m"), "{err}");
+}
