@@ -11,7 +11,7 @@ use posegate_host::place::{
     Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
     PlacementProblem, PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
 };
-use posegate_host::site::Site;
+use posegate_host::site::{Site, pose_line};
 use serde_json::{Value, json};
 
 /// Finds the place of a task's tag with the least expected cost of seeing it, or by another objective
@@ -195,7 +195,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             print(&"best:")?;
         }
         tell(&found.best)?;
-        print(&format_args!("{}", in_the_site_file(&found.best)))?;
+        print(&format_args!(
+            "in the site  {}",
+            pose_line(&found.best.pose)
+        ))?;
         for other in &found.others {
             let pose = other.pose;
             print(&format_args!(
@@ -223,24 +226,6 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         warn(&told);
     }
     Ok(answer(serves))
-}
-
-/// Returns the tag's pose as the site file has it.
-fn in_the_site_file(placed: &Placed) -> String {
-    let pose = placed.pose;
-    // No minus before zero.
-    let [x, y, z, roll, pitch, yaw] = [
-        pose.x,
-        pose.y,
-        pose.z,
-        pose.roll_deg,
-        pose.pitch_deg,
-        pose.yaw_deg,
-    ]
-    .map(|number| (number * 1e4).round() / 1e4 + 0.0);
-    format!(
-        "in the site  pose = {{ x = {x:?}, y = {y:?}, z = {z:?}, roll_deg = {roll:?}, pitch_deg = {pitch:?}, yaw_deg = {yaw:?} }}"
-    )
 }
 
 /// Returns a warning if the error that the task states is smaller than what a tag makes that is off by the reserve: the margin is about

@@ -32,9 +32,9 @@ fn changed(from: &str, to: &str) -> String {
     PAPER.replace(from, to)
 }
 
-/// A plan is about what the robot knows. A way through a block is told, so that nobody reads "succeeds" as "drives there".
+/// A plan is about what the robot knows. A way through a block is reported, so that nobody reads "succeeds" as "drives there".
 #[test]
-fn a_way_through_a_block_is_told() {
+fn a_way_through_a_block_is_reported() {
     let line = "plan site.toml --from back-to-dock --to dock";
     let block = |y: f64| {
         // It is too low to hide the tag.

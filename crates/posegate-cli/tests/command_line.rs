@@ -1062,7 +1062,7 @@ fn an_empty_table_names_the_cause() {
 
 /// A place is of use once it is in the site file. A reserve is in metres, and it is also an error of every pose that the tag gives.
 #[test]
-fn a_place_is_told_as_the_site_file_has_it() {
+fn a_place_is_printed_as_the_site_file_has_it() {
     let folder = Folder::new();
     let place = "place site.toml --task see-t7 --sigma-x 0.05 --sigma-y 0.05 --sigma-yaw-deg 1 --free x=3.9:4 --budget 10";
     let (out, err) = folder.expect(0, &format!("{place} --reserve 0.001,0.1"));

@@ -2,7 +2,7 @@
 
 use super::{ChosenTag, Cover};
 use crate::printable::toml_string;
-use crate::site::Site;
+use crate::site::{Site, pose_line};
 
 /// Returns the text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]`
 /// and `[candidates.NAME]` tables. Everything else stays as written. Returns `None` if the file writes candidates in another form (one inline
@@ -43,20 +43,14 @@ pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
     }
     for chosen in tags {
         let (tag, tolerance) = (&chosen.tag.tag, chosen.tag.tolerance);
-        let pose = tag.pose;
         out += &format!(
             "\n[tag.{}]\nid = {}\nfamily = {}\nsize = {:?}\n\
-             pose = {{ x = {:?}, y = {:?}, z = {:?}, roll_deg = {:?}, pitch_deg = {:?}, yaw_deg = {:?} }}\n",
+             {}\n",
             key(&chosen.name),
             tag.id,
             toml_string(&chosen.tag.family),
             tag.size,
-            pose.x,
-            pose.y,
-            pose.z,
-            pose.roll_deg,
-            pose.pitch_deg,
-            pose.yaw_deg,
+            pose_line(&tag.pose),
         );
         if tolerance.translation > 0.0 || tolerance.turn_deg > 0.0 {
             out += &format!(

@@ -4,8 +4,7 @@ use super::{ChainReport, StepKind};
 use crate::site::Site;
 
 /// Returns the number (from 0) of each drive whose straight way crosses a wall or block of the site, with the wall's name.
-#[must_use]
-pub fn crossings<'s>(report: &ChainReport, site: &'s Site) -> Vec<(usize, &'s str)> {
+fn crossings<'s>(report: &ChainReport, site: &'s Site) -> Vec<(usize, &'s str)> {
     let mut found = Vec::new();
     for (number, step) in report.steps.iter().enumerate() {
         if step.kind != StepKind::Navigation {
@@ -25,7 +24,8 @@ pub fn crossings<'s>(report: &ChainReport, site: &'s Site) -> Vec<(usize, &'s st
     found
 }
 
-/// Returns a sentence for each crossing.
+/// Returns a sentence for each drive whose straight way crosses a wall or block of the site, with the number of the step, from 1, and the
+/// name of the wall.
 #[must_use]
 pub fn crossing_notes(report: &ChainReport, site: &Site) -> Vec<String> {
     let found = crossings(report, site);

@@ -25,7 +25,7 @@
 pub use self::belief::BeliefStateF64;
 pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
 pub use self::costs::costs;
-pub use self::crossings::{crossing_notes, crossings};
+pub use self::crossings::crossing_notes;
 pub(crate) use self::endpoint::TaskPlanner;
 pub use self::error::PlanError;
 pub use self::library::{Library, Look, Viewpoint};

@@ -36,6 +36,7 @@ pub use self::families::FAMILIES;
 pub use self::import::{Convention, Format, Import, ImportError, Imported};
 pub(crate) use self::learnt::stated_views;
 pub use self::lines::line_of;
+pub use self::places::pose_line;
 pub use self::planner::{GeneratedLook, Planner};
 pub use self::sample::SAMPLE;
 pub use self::suggest::{question, similar};

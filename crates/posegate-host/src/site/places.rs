@@ -6,7 +6,7 @@ use super::named::NamedFile;
 use super::reader::Node;
 use crate::input::{self, Limit};
 use crate::learn;
-use posegate::shape::{ErrorModel, Footprint, Intrinsics, Tolerance, Wall};
+use posegate::shape::{ErrorModel, Footprint, Intrinsics, Pose3Deg, Tolerance, Wall};
 use std::path::Path;
 
 pub(super) fn wall(name: &str, node: &Node<'_>) -> Result<Wall, SiteError> {
@@ -221,4 +221,20 @@ fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> 
             .help("create the model again with `posegate learn bounds`")
     })?;
     Ok((model, read))
+}
+
+/// Returns the line of a site file that states a tag's pose, exact to the last bit.
+#[must_use]
+pub fn pose_line(pose: &Pose3Deg) -> String {
+    let Pose3Deg {
+        x,
+        y,
+        z,
+        roll_deg,
+        pitch_deg,
+        yaw_deg,
+    } = pose;
+    format!(
+        "pose = {{ x = {x:?}, y = {y:?}, z = {z:?}, roll_deg = {roll_deg:?}, pitch_deg = {pitch_deg:?}, yaw_deg = {yaw_deg:?} }}"
+    )
 }
