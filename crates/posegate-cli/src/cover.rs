@@ -9,7 +9,7 @@ use posegate_host::cover::{
     ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch,
     cover_watched, polished, written,
 };
-use posegate_host::draw::Mounted;
+use posegate_host::draw::{Mounted, MountingSheet};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::PlanError;
 use posegate_host::site::Site;
@@ -133,7 +133,13 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         files.write(path, text.as_bytes())?;
     }
     if let (Some(path), true) = (&arguments.sheet, found.serves_all()) {
-        sheet::write(files, path, "Mounting sheet", &mounted(&found), &site)?;
+        let content = MountingSheet {
+            title: "Mounting sheet",
+            origin: &site.origin(&name),
+            tags: &mounted(&found),
+            walls: &site.walls,
+        };
+        sheet::write(files, path, &content)?;
     }
     if arguments.json {
         print_json(&found.to_json())?;

@@ -5,7 +5,7 @@ use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, t
 use crate::sheet;
 use posegate::shape::{Family, Tag, Tolerance};
 use posegate_host::doctor::stated_error;
-use posegate_host::draw::{Column, Mounted, placement_picture};
+use posegate_host::draw::{Column, Mounted, MountingSheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::place::{
     Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
@@ -144,7 +144,13 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         tag,
         wall: arguments.wall.clone(),
     };
-    let known = if arguments.exact || arguments.belief.is_exact() {
+    let exact = arguments.exact || arguments.belief.is_exact();
+    if exact && arguments.reserve.is_some() {
+        warn(
+            &"--reserve has no effect if the pose is known exactly: the cost is that of the planned place",
+        );
+    }
+    let known = if exact {
         PosePrior::Exactly
     } else {
         let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
@@ -174,7 +180,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         || order.placed(order.task.tag.pose),
         || {
             place(&order, &space, &*optimizer, budget, seed, &|count| {
-                bar.inc(count)
+                bar.inc(count);
+                // The search is over; the margin is proven next.
+                if bar.position() >= budget {
+                    bar.set_message("proofs");
+                }
             })
         },
     );
@@ -307,7 +317,13 @@ fn pictures(
             left: best.mean.filter(|_| best.contained).map(|_| best.left),
         };
         let title = format!("Mounting sheet for task {}", arguments.task);
-        sheet::write(files, path, &title, &[mounted], site)?;
+        let content = MountingSheet {
+            title: &title,
+            origin: &site.origin(&arguments.site.display().to_string()),
+            tags: &[mounted],
+            walls: &site.walls,
+        };
+        sheet::write(files, path, &content)?;
     }
     Ok(())
 }

@@ -27,7 +27,7 @@ pub use self::parking::fig1_parking;
 pub use self::placement::{Column, placement_picture};
 pub use self::plan::fig3_plan;
 pub use self::replay::replay_picture;
-pub use self::sheet::{Mounted, mounting_sheet, mounting_sheet_html};
+pub use self::sheet::{Mounted, MountingSheet, mounting_sheet, mounting_sheet_html};
 pub use self::site_pictures::site_pictures;
 pub(crate) use self::site_plan::site_plan;
 pub use self::subject::{DrawError, Subject};

@@ -7,7 +7,7 @@ use super::figures::base64;
 use super::start::first_sigmas;
 use crate::draw::panel::Window;
 use crate::draw::site_plan;
-use crate::draw::{DrawError, Mounted, Subject, chain_picture, mounting_sheet, success_of};
+use crate::draw::{DrawError, Subject, chain_picture, success_of};
 use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
 use crate::plan::{ChainReport, Options, Plans, evaluate};
 use crate::site::{Site, Task};
@@ -94,8 +94,6 @@ pub struct Contents {
     pub chains: Vec<ShownChain>,
     /// The plans of the work tasks that have a start.
     pub plans: Vec<ShownChain>,
-    /// The mounting sheet; `None` without tags.
-    pub sheet: Option<String>,
 }
 
 /// Smallest and largest number of headings of a task. Within these, headings are two degrees apart; on a full turn they
@@ -139,7 +137,6 @@ impl Contents {
             left_out: Vec::new(),
             chains,
             plans,
-            sheet: sheet(site),
         };
         for (name, shown) in tasks {
             match shown {
@@ -261,21 +258,6 @@ fn with_picture(site: &Site, name: &str, report: ChainReport) -> (ChainReport, S
     let success = |name: &str| success_of(site, name);
     let picture = chain_picture(name, &report, &success, Some(site));
     (report, picture)
-}
-
-fn sheet(site: &Site) -> Option<String> {
-    let tags: Vec<Mounted> = site
-        .tags
-        .iter()
-        .map(|(name, tag)| Mounted {
-            name: name.clone(),
-            family: tag.family.clone(),
-            tag: tag.tag,
-            reserve: (!tag.tolerance.is_none()).then_some(tag.tolerance),
-            left: None,
-        })
-        .collect();
-    (!tags.is_empty()).then(|| mounting_sheet("Mounting sheet", &tags, &site.walls))
 }
 
 impl Shown {

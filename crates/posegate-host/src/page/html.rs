@@ -4,12 +4,14 @@ use serde_json::{Value, json};
 
 use super::alike::{alike, area};
 use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
-use super::figures::{base64, escaped, figure, folded, numbers, table};
+use super::figures::{base64, escaped, figure, fixed, folded, numbers, table};
 use super::summary::{summary, text as margin_text, worst};
-use crate::draw::{SeenFrom, Subject, borders_picture, task_plan};
+use crate::draw::{
+    Mounted, MountingSheet, SeenFrom, Subject, borders_picture, mounting_sheet, task_plan,
+};
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind};
-use crate::site::{Site, TaskKind};
+use crate::site::{Site, SiteTag, TaskKind};
 use posegate::shape::{Pose3Deg, Tag};
 use posegate::table::Table;
 
@@ -36,7 +38,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         ("tasks", "Tasks", tasks(site, contents)),
         ("placements", "Where tags hang best", placements),
         ("pictures", "Pictures", pictures.join("")),
-        ("tags", "Mounting sheet", tags(site, contents)),
+        ("tags", "Mounting sheet", tags(site, &order.title)),
     ];
     let shown = || sections.iter().filter(|(_, _, text)| !text.is_empty());
     let nav: Vec<String> = shown()
@@ -105,9 +107,9 @@ fn plan(site: &Site, contents: &Contents) -> String {
             let goal = task.success.goal;
             vec![
                 name.clone(),
-                format!("{:.3}", goal.x),
-                format!("{:.3}", goal.y),
-                format!("{:.2}", goal.yaw_deg),
+                fixed(goal.x, 3),
+                fixed(goal.y, 3),
+                fixed(goal.yaw_deg, 2),
             ]
         })
         .collect();
@@ -314,9 +316,9 @@ fn seen_from(seen: &SeenFrom) -> Vec<String> {
             || "the goal".into(),
             |name| format!("the worst pose of the set for {name}"),
         ),
-        format!("{x:.4}"),
-        format!("{y:.4}"),
-        format!("{:.3}", yaw.to_degrees()),
+        fixed(x, 4),
+        fixed(y, 4),
+        fixed(yaw.to_degrees(), 3),
         corners.join(" "),
     ]
 }
@@ -370,13 +372,20 @@ fn way(report: &ChainReport) -> String {
         match step.kind {
             StepKind::Localization => format!("look {task}"),
             StepKind::Work => format!("work {task}"),
-            StepKind::Navigation => format!(
-                "drive {:.2} m",
-                libm::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1])
-            ),
+            StepKind::Navigation => drive(ends),
         }
     });
     steps.collect::<Vec<_>>().join(", ")
+}
+
+/// Returns a drive from one pose to another in words: its straight length, or the turn of a robot that stays where it is.
+fn drive([[x, y, yaw], to]: [[f64; 3]; 2]) -> String {
+    let length = libm::hypot(to[0] - x, to[1] - y);
+    if length >= 0.005 {
+        return format!("drive {length:.2} m");
+    }
+    let turn = libm::remainder(to[2] - yaw, core::f64::consts::TAU);
+    format!("turn by {}°", fixed(turn.to_degrees(), 0))
 }
 
 const STEP_HEAD: [&str; 6] = [
@@ -555,10 +564,10 @@ fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
     };
     Some(vec![
         name.into(),
-        format!("{:.4}", pose("x")?),
-        format!("{:.4}", pose("y")?),
-        format!("{:.4}", pose("z")?),
-        format!("{:.2}", pose("yaw_deg")?),
+        fixed(pose("x")?, 4),
+        fixed(pose("y")?, 4),
+        fixed(pose("z")?, 4),
+        fixed(pose("yaw_deg")?, 2),
         number("mean", |mean| format!("{mean:.6}")),
         number("p_miss", |share| above(share, 6)),
         // Rounded down, so that it is never too large.
@@ -566,10 +575,28 @@ fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
     ])
 }
 
-fn tags(site: &Site, contents: &Contents) -> String {
-    let Some(sheet) = &contents.sheet else {
-        return String::new();
+/// Draws the mounting sheet of all tags of a site.
+fn sheet(site: &Site, title: &str) -> String {
+    let mounted = |(name, tag): (&String, &SiteTag)| Mounted {
+        name: name.clone(),
+        family: tag.family.clone(),
+        tag: tag.tag,
+        reserve: (!tag.tolerance.is_none()).then_some(tag.tolerance),
+        left: None,
     };
+    mounting_sheet(&MountingSheet {
+        title: "Mounting sheet",
+        origin: &site.origin(title),
+        tags: &site.tags.iter().map(mounted).collect::<Vec<_>>(),
+        walls: &site.walls,
+    })
+}
+
+/// Returns the table of the tags and their mounting sheet.
+fn tags(site: &Site, title: &str) -> String {
+    if site.tags.is_empty() {
+        return String::new();
+    }
     let rows: Vec<Vec<String>> = site
         .tags
         .iter()
@@ -581,8 +608,8 @@ fn tags(site: &Site, contents: &Contents) -> String {
                 format!("{} {}", tag.family, tag.tag.id),
                 format!("{:.3}", tag.tag.size),
             ];
-            row.extend([pose.x, pose.y, pose.z].map(|v| format!("{v:.4}")));
-            row.extend(degrees.map(|v| format!("{v:.2}")));
+            row.extend([pose.x, pose.y, pose.z].map(|v| fixed(v, 4)));
+            row.extend(degrees.map(|v| fixed(v, 2)));
             row.push(if tag.tolerance.is_none() {
                 "unknown".to_owned()
             } else {
@@ -612,7 +639,7 @@ fn tags(site: &Site, contents: &Contents) -> String {
     text += &folded(
         "the mounting sheet",
         &figure(
-            sheet,
+            &sheet(site, title),
             "The mounting sheet: each tag with its place and size",
         ),
     );

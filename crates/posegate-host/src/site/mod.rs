@@ -121,6 +121,15 @@ impl Site {
             .collect()
     }
 
+    /// Returns the words that a document made from this site carries: the name of its file without folders, and the first 16 digits
+    /// of the digest.
+    #[must_use]
+    pub fn origin(&self, name: &str) -> String {
+        let file = Path::new(name).file_name();
+        let name = file.map_or(name.into(), |file| file.to_string_lossy());
+        format!("site {name}, digest {:.16}", self.digest_text())
+    }
+
     /// The confidence if a site file gives none.
     pub const DEFAULT_EPSILON: f64 = 0.99;
 

@@ -189,27 +189,26 @@ fn image(picture: &mut Picture, [left, top]: [f64; 2], mounted: &Mounted) {
     picture.text([middle, top + IMAGE + 18.0], &under, &font);
 }
 
-/// Returns what is measured after mounting: the quantity and its planned value.
-fn planned(mounted: &Mounted, on: Option<&OnWall>) -> Vec<(&'static str, String)> {
+/// A quantity that is measured after mounting: its name, its planned value and its unit.
+type Quantity = (&'static str, String, &'static str);
+
+/// Returns what is measured after mounting.
+fn planned(mounted: &Mounted, on: Option<&OnWall>) -> Vec<Quantity> {
     let pose = mounted.tag.pose;
-    let mut rows = Vec::new();
-    match on {
-        Some(on) => rows.push(("from corner A", format!("{} m", metres(on.along)))),
-        None => {
-            rows.push(("x", format!("{} m", metres(pose.x))));
-            rows.push(("y", format!("{} m", metres(pose.y))));
-        }
-    }
-    rows.push(("height", format!("{} m", metres(pose.z))));
+    let mut rows = match on {
+        Some(on) => vec![("from corner A", metres(on.along), " m")],
+        None => vec![("x", metres(pose.x), " m"), ("y", metres(pose.y), " m")],
+    };
+    rows.push(("height", metres(pose.z), " m"));
     rows.push(match on {
-        Some(on) => ("turn from flat", format!("{}°", degrees(on.turn_deg))),
-        None => ("yaw", format!("{}°", degrees(pose.yaw_deg))),
+        Some(on) => ("turn from flat", degrees(on.turn_deg), "°"),
+        None => ("yaw", degrees(pose.yaw_deg), "°"),
     });
     rows
 }
 
 /// Draws the table for measured values.
-fn measured(picture: &mut Picture, top: f64, rows: &[(&'static str, String)]) {
+fn measured(picture: &mut Picture, top: f64, rows: &[Quantity]) {
     let columns = [SIDES[0], 170.0, 280.0, 430.0];
     let head = Font::new(11.0, palette::FAINT);
     for (x, title) in
@@ -220,11 +219,14 @@ fn measured(picture: &mut Picture, top: f64, rows: &[(&'static str, String)]) {
         picture.text([x, top], title, &head);
     }
     let font = Font::new(13.0, palette::INK);
-    for (row, (what, value)) in rows.iter().enumerate() {
+    let faint = Font::new(12.0, palette::FAINT).anchored(Anchor::End);
+    for (row, (what, value, unit)) in rows.iter().enumerate() {
         let y = top + 8.0 + 25.0 * row as f64;
         picture.text([columns[0], y + 15.0], what, &font);
-        picture.text([columns[1], y + 15.0], value, &font);
+        picture.text([columns[1], y + 15.0], &format!("{value}{unit}"), &font);
         picture.rectangle([columns[2], y, 130.0, 20.0], &BOX);
+        // In the box, so that nobody writes centimetres.
+        picture.text([columns[2] + 124.0, y + 15.0], unit.trim_start(), &faint);
         picture.rectangle([columns[3], y + 3.0, 14.0, 14.0], &BOX);
     }
 }

@@ -27,6 +27,19 @@ pub struct Mounted {
     pub left: Option<f64>,
 }
 
+/// What a mounting sheet shows.
+#[derive(Clone, Copy, Debug)]
+pub struct MountingSheet<'a> {
+    /// Heading of each page.
+    pub title: &'a str,
+    /// Which data the places come from, below the heading: the name of the site file and its digest.
+    pub origin: &'a str,
+    /// The tags, in the order of their blocks.
+    pub tags: &'a [Mounted],
+    /// The walls of the site.
+    pub walls: &'a [Wall],
+}
+
 /// Width and height of an A4 page, pixels of 1/96 inch.
 const PAGE: [f64; 2] = [794.0, 1123.0];
 /// The printable part: printers leave 1 cm at each side.
@@ -45,8 +58,8 @@ const NOTES: [&str; 2] = [
 /// Draws the sheet: the A4 pages one below the other, 794 pixels (210 mm) wide. Pages have the same content as those of
 /// [`mounting_sheet_html`], which prints each on its own sheet of paper.
 #[must_use]
-pub fn mounting_sheet(title: &str, tags: &[Mounted], walls: &[Wall]) -> String {
-    let mut pages = pages(title, tags, walls);
+pub fn mounting_sheet(sheet: &MountingSheet<'_>) -> String {
+    let mut pages = pages(sheet);
     if pages.len() == 1 {
         return pages.remove(0);
     }
@@ -62,22 +75,28 @@ pub fn mounting_sheet(title: &str, tags: &[Mounted], walls: &[Wall]) -> String {
     let [width, height] = [PAGE[0], height].map(number);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n<title>{}</title>\n<rect width=\"{width}\" height=\"{height}\" fill=\"#dddddd\"/>\n{body}</svg>\n",
-        escaped(title)
+        escaped(sheet.title)
     )
 }
 
 /// Returns the sheet as an HTML file that prints on A4, one page of it on each sheet of paper.
 #[must_use]
-pub fn mounting_sheet_html(title: &str, tags: &[Mounted], walls: &[Wall]) -> String {
-    let title_text = escaped(title);
-    let pages = pages(title, tags, walls).concat();
+pub fn mounting_sheet_html(sheet: &MountingSheet<'_>) -> String {
+    let title_text = escaped(sheet.title);
+    let pages = pages(sheet).concat();
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title_text}</title>\n<style>\n@page {{ size: A4 portrait; margin: 0; }}\nbody {{ margin: 0; }}\nsvg {{ display: block; width: 210mm; height: 296.9mm; margin: 0 auto; break-after: page; }}\nsvg:last-child {{ break-after: auto; }}\n</style>\n</head>\n<body>\n{pages}</body>\n</html>\n"
     )
 }
 
 /// Draws each page as a picture of its own.
-fn pages(title: &str, tags: &[Mounted], walls: &[Wall]) -> Vec<String> {
+fn pages(sheet: &MountingSheet<'_>) -> Vec<String> {
+    let &MountingSheet {
+        title,
+        origin,
+        tags,
+        walls,
+    } = sheet;
     let of = tags.len().div_ceil(BLOCKS_A_PAGE).max(1);
     let blocks: Vec<&[Mounted]> = if tags.is_empty() {
         vec![&[]]
@@ -88,10 +107,13 @@ fn pages(title: &str, tags: &[Mounted], walls: &[Wall]) -> Vec<String> {
         let mut picture = Picture::new(PAGE[0], PAGE[1], &literal(title));
         let font = Font::new(19.0, palette::INK).bold();
         let heading = fitted(&literal(title), 19.0, true, 560.0);
-        picture.text([SIDES[0], 52.0], &heading, &font);
+        picture.text([SIDES[0], 46.0], &heading, &font);
+        let origin = fitted(&literal(origin), 11.0, false, SIDES[1] - SIDES[0]);
+        let small = Font::new(11.0, palette::FAINT);
+        picture.text([SIDES[0], 64.0], &origin, &small);
         let count = format!("page {} of {of}", index + 1);
         let right = Font::new(12.0, palette::FAINT).anchored(Anchor::End);
-        picture.text([SIDES[1], 52.0], &count, &right);
+        picture.text([SIDES[1], 46.0], &count, &right);
         for (row, mounted) in tags.iter().enumerate() {
             let top = TOP + BLOCK * row as f64;
             let rule = [[SIDES[0], top - 14.0], [SIDES[1], top - 14.0]];

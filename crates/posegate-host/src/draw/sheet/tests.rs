@@ -33,6 +33,15 @@ fn wall(name: &str, corners: &[[f64; 2]], top: f64) -> Wall {
     }
 }
 
+fn of<'a>(tags: &'a [Mounted], walls: &'a [Wall]) -> MountingSheet<'a> {
+    MountingSheet {
+        title: "Mounting sheet",
+        origin: "site file hall.toml, digest 0123",
+        tags,
+        walls,
+    }
+}
+
 /// A text's box: left, top, right, bottom.
 type TextBox = ([f64; 4], String);
 
@@ -115,11 +124,12 @@ fn texts_never_overlap() {
         tilted.left = Some(12.345);
         tags.push(tilted);
     }
-    let pages = pages(
-        "Mounting sheet of a hall with a long name, for everybody",
-        &tags,
-        &walls,
-    );
+    let pages = pages(&MountingSheet {
+        title: "Mounting sheet of a hall with a long name, for everybody",
+        origin: &"a long name of a site file ".repeat(9),
+        tags: &tags,
+        walls: &walls,
+    });
     assert_eq!(pages.len(), 8);
     pages.iter().for_each(|page| check(page));
 }
@@ -132,7 +142,7 @@ fn a_block_says_what_is_measured_on_the_wall() {
         translation: 0.01,
         turn_deg: 0.5,
     });
-    let sheet = mounting_sheet("Mounting sheet", &[tag.clone()], &walls);
+    let sheet = mounting_sheet(&of(&[tag.clone()], &walls));
     for text in [
         "north, this face is 14.000 m long",
         "6.500 m from corner A, the left end",
@@ -142,6 +152,9 @@ fn a_block_says_what_is_measured_on_the_wall() {
         "it may be off by 10 mm and 0.5°",
         "page 1 of 1",
         "within the reserve",
+        "site file hall.toml, digest 0123",
+        ">m</text>",
+        ">°</text>",
     ] {
         assert!(sheet.contains(text), "{text}: {sheet}");
     }
@@ -154,7 +167,7 @@ fn a_block_says_what_is_measured_on_the_wall() {
         let squares = sheet.lines().filter(|line| line.contains("#ffffff"));
         squares.map(str::to_owned).collect::<Vec<_>>()
     };
-    let changed = mounting_sheet("Mounting sheet", &[other], &walls);
+    let changed = mounting_sheet(&of(&[other], &walls));
     assert_ne!(images(&sheet), images(&changed));
 }
 
@@ -163,7 +176,7 @@ fn pages_are_a4_and_each_has_two_blocks() {
     let tags: Vec<Mounted> = (0..5)
         .map(|id| mounted(&format!("t{id}"), "tag36h11", id, [1.0, 2.0, 0.5, 0.0]))
         .collect();
-    let sheet = mounting_sheet("Mounting sheet", &tags, &[]);
+    let sheet = mounting_sheet(&of(&tags, &[]));
     assert_eq!(
         sheet
             .matches("width=\"794\" height=\"1123\" viewBox")
@@ -171,6 +184,6 @@ fn pages_are_a4_and_each_has_two_blocks() {
         3
     );
     assert!(sheet.contains("page 3 of 3") && sheet.contains("y=\"1147\""));
-    let html = mounting_sheet_html("Mounting sheet", &tags, &[]);
+    let html = mounting_sheet_html(&of(&tags, &[]));
     assert!(html.contains("size: A4") && html.matches("<svg ").count() == 3);
 }
