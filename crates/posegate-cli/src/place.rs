@@ -399,7 +399,11 @@ fn tell(placed: &Placed) -> Result<(), Failure> {
     let pose = placed.pose;
     print(&format_args!(
         "tag at x {:.4} m, y {:.4} m, z {:.4} m, yaw {:.3} deg, size {:.3} m",
-        pose.x, pose.y, pose.z, pose.yaw_deg, placed.size
+        printed(pose.x),
+        printed(pose.y),
+        printed(pose.z),
+        printed(pose.yaw_deg),
+        placed.size
     ))?;
     if let Some(mean) = placed.mean {
         print(&format_args!(
@@ -432,6 +436,11 @@ fn tell(placed: &Placed) -> Result<(), Failure> {
 /// Returns a number without the rounding errors of its last digits.
 fn rounded(number: f64) -> f64 {
     (number * 1e6).round() / 1e6
+}
+
+/// Returns a coordinate to four decimals, without a minus before zero.
+fn printed(coordinate: f64) -> f64 {
+    (coordinate * 1e4).round() / 1e4 + 0.0
 }
 
 /// Returns the tag that moves.

@@ -134,11 +134,12 @@ fn lines(mounted: &Mounted, on: Option<&OnWall>) -> Vec<(&'static str, String)> 
         lines.push((
             "beyond it",
             format!(
-                "seen if {:.0} mm and {:.1}° more off, but poses are then as wrong",
+                "still seen if it is {:.0} mm and {:.1}° more off,",
                 libm::floor(left * 10.0),
                 libm::floor(left * 10.0) / 10.0
             ),
         ));
+        lines.push(("", "but every pose that it gives is then as far off".into()));
     }
     lines
 }

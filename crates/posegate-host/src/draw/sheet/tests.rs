@@ -142,7 +142,9 @@ fn a_block_says_what_is_measured_on_the_wall() {
         translation: 0.01,
         turn_deg: 0.5,
     });
+    tag.left = Some(45.0);
     let sheet = mounting_sheet(&of(&[tag.clone()], &walls));
+    assert!(!sheet.contains('\u{2026}'), "a text is cut: {sheet}");
     for text in [
         "north, this face is 14.000 m long",
         "6.500 m from corner A, the left end",
