@@ -298,7 +298,7 @@ const JOBS: &[Job] = &[
     job(
         "dist",
         "[FOLDER [BUILDS]]",
-        "the files of a release: built twice alike, installed into empty roots, and run there",
+        "the files of a release: built twice with equal bytes, installed into empty roots, and run there",
         jobs::dist::dist,
     ),
     job(

@@ -190,9 +190,9 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         model.write().map_err(refused)?.as_bytes(),
     )?;
     if arguments.json {
-        print_json(&told(&model))?;
+        print_json(&model_json(&model))?;
     } else if !arguments.output.is_standard() {
-        tell(&model)?;
+        print_model(&model)?;
     }
     Ok(answer(true))
 }
@@ -208,7 +208,7 @@ fn cut(runs: &Runs, file: &str) {
     }
 }
 
-fn told(model: &ErrorModel) -> Value {
+fn model_json(model: &ErrorModel) -> Value {
     let (views, detections, flip_share) = model.counts();
     let regions = model.regions().map(|region| {
         let [d, phi, psi] = region.ends;
@@ -229,7 +229,7 @@ fn told(model: &ErrorModel) -> Value {
     })
 }
 
-fn tell(model: &ErrorModel) -> Result<(), Failure> {
+fn print_model(model: &ErrorModel) -> Result<(), Failure> {
     let (views, detections, flip_share) = model.counts();
     let [d, phi, psi] = model.reach();
     print(&format_args!(
@@ -249,7 +249,7 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
     if let Some(runs) = model.runs() {
         let (rows, independent) = model.independent();
         print(&format_args!(
-            "{rows} rows of {runs} runs tell as much as {independent} independent ones"
+            "{rows} rows of {runs} runs count as {independent} independent rows"
         ))?;
     }
     print(&format_args!(
@@ -435,11 +435,11 @@ fn look(arguments: &Outcomes, files: &Files) -> Outcome {
         ))?;
         match found.contradicted_at {
             Some(at) => print(&format_args!(
-                "the claim of {} is contradicted after {at} dockings (a bet against it stood at {:.3e})",
+                "the claim of {} is contradicted after {at} dockings (e-value {:.3e})",
                 arguments.epsilon, found.largest_e_value
             ))?,
             None => print(&format_args!(
-                "the claim of {} is not contradicted (the bet against it stands at {:.3})",
+                "the claim of {} is not contradicted (e-value {:.3})",
                 arguments.epsilon, found.e_value
             ))?,
         }

@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let site = site(files, &arguments.site)?;
     let success = &task(&site, &arguments.task)?.success;
     let tag = chosen_tag(arguments, &site, &success.tags())?;
-    let to_hang = Task {
+    let moved_task = Task {
         reserve: arguments
             .reserve
             .unwrap_or_else(|| Task::usual_reserve(success, &tag)),
@@ -153,9 +153,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let cost = arguments.weights.cost();
     cost.check()
         .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;
-    let learnt = learnt(arguments, &site, cost.c_high, &to_hang)?;
+    let learnt = learnt(arguments, &site, cost.c_high, &moved_task)?;
     let order = PlacementProblem {
-        task: &to_hang,
+        task: &moved_task,
         known,
         cost: match &learnt {
             Some(learnt) => learnt,
@@ -166,7 +166,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if let Some(file) = &arguments.candidates {
         return compared(arguments, &site, &order, file, files);
     }
-    let space = space(arguments, &site, &to_hang)?;
+    let space = space(arguments, &site, &moved_task)?;
     let bar = progress(arguments.budget, "places");
     let optimizer = arguments.method.optimizer(arguments.budget);
     let (budget, seed) = (arguments.budget, arguments.seed);
@@ -183,18 +183,18 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     pictures(arguments, &site, &order, &before, &found, files)?;
     let serves = serves(arguments.objective, &found.best);
     if arguments.json {
-        let mut told = found.to_json();
-        told["task"] = json!(arguments.task);
-        told["site_digest"] = json!(site.digest_text());
-        told["before"] = before.map_or(Value::Null, |before| before.to_json());
-        print_json(&told)?;
+        let mut line = found.to_json();
+        line["task"] = json!(arguments.task);
+        line["site_digest"] = json!(site.digest_text());
+        line["before"] = before.map_or(Value::Null, |before| before.to_json());
+        print_json(&line)?;
     } else {
         if let Ok(before) = &before {
             print(&"before:")?;
-            tell(before)?;
+            print_placed(before)?;
             print(&"best:")?;
         }
-        tell(&found.best)?;
+        print_placed(&found.best)?;
         print(&format_args!(
             "in the site  {}",
             pose_line(&found.best.pose)
@@ -222,14 +222,14 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     if !serves {
         warn(&why_not(arguments, &found.best));
-    } else if let Some(told) = error_of_reserve(&site, &order, &found.best) {
-        warn(&told);
+    } else if let Some(warning) = error_of_reserve(&site, &order, &found.best) {
+        warn(&warning);
     }
     Ok(answer(serves))
 }
 
-/// Returns a warning if the error that the task states is smaller than what a tag makes that is off by the reserve: the margin is about
-/// seeing the tag, not about the pose that follows.
+/// Returns a warning if a tag that is off by the reserve makes a larger error than the task states. The margin is about seeing the
+/// tag, not about the pose that follows.
 fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) -> Option<String> {
     let (name, task) = site
         .tasks
@@ -243,7 +243,7 @@ fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) ->
     ))
 }
 
-/// Prints how far apart the starts of the search ended.
+/// Prints how far apart the restarts of the search ended.
 fn restarts(found: &Placement) -> Result<(), Failure> {
     let means: Vec<f64> = found.restarts.iter().filter_map(|one| one.mean).collect();
     let Some(best) = found.best.mean.map(|mean| mean.value) else {
@@ -379,7 +379,7 @@ fn why_not(arguments: &Arguments, placed: &Placed) -> String {
     }
 }
 
-fn tell(placed: &Placed) -> Result<(), Failure> {
+fn print_placed(placed: &Placed) -> Result<(), Failure> {
     let pose = placed.pose;
     print(&format_args!(
         "tag at x {:.4} m, y {:.4} m, z {:.4} m, yaw {:.3} deg, size {:.3} m",
@@ -456,8 +456,8 @@ fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, F
     }
 }
 
-/// Returns the space that is searched: a room or a wall.
-fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Failure> {
+/// Returns the search space: free ranges or a wall.
+fn space(arguments: &Arguments, site: &Site, moved_task: &Task) -> Result<Space, Failure> {
     let free = arguments.free.as_deref().map(ranges).transpose();
     let free = free.map_err(|error| {
         Failure::usage(
@@ -474,11 +474,11 @@ fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Fa
     let Some(name) = &arguments.wall else {
         let ranges = free.ok_or_else(|| {
             Failure::usage(
-                "it is not said what may be chosen".into(),
+                "the search space is missing".into(),
                 "give --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360 (any of these), --wall NAME or --candidates FILE",
             )
         })?;
-        return Space::free(to_hang.tag.pose, ranges).map_err(refused);
+        return Space::free(moved_task.tag.pose, ranges).map_err(refused);
     };
     let wall = site
         .walls
@@ -502,10 +502,10 @@ fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Fa
             "leave out --free, or give --free z=LOW:HIGH alone",
         ));
     }
-    let goal = to_hang.set.goal;
-    let size = to_hang.tag.size;
+    let goal = moved_task.set.goal;
+    let size = moved_task.tag.size;
     let mut known = site.tags.values();
-    let known = known.find(|known| known.tag == to_hang.tag);
+    let known = known.find(|known| known.tag == moved_task.tag);
     let whole = known.map_or(Family::WIDEST, |known| Family::whole_of(&known.family));
     Space::wall(wall, [size, size * whole], [goal.x, goal.y], z).map_err(refused)
 }
@@ -543,7 +543,7 @@ fn compared(
     let list = candidates(&bytes, &name).map_err(|error| {
         Failure::usage(
             error,
-            "the file has a header x,y,z,yaw_deg (and name, if wished) and one line per place",
+            "the file has a header x,y,z,yaw_deg (and optionally name) and one line per place",
         )
     })?;
     let poses: Vec<_> = list.iter().map(|one| one.pose).collect();
@@ -553,24 +553,24 @@ fn compared(
     let (best, placed) = looked.map_err(|error| refused(arguments, &error))?;
     let serves = serves(arguments.objective, &placed[best]);
     let named = |(one, placed): (&Candidate, &Placed)| {
-        let mut told = placed.to_json();
-        told["name"] = json!(one.name);
-        told
+        let mut line = placed.to_json();
+        line["name"] = json!(one.name);
+        line
     };
     if arguments.json {
-        let mut told = named((&list[best], &placed[best]));
-        told["evaluations"] = json!(placed.len());
-        told["site_digest"] = json!(site.digest_text());
+        let mut line = named((&list[best], &placed[best]));
+        line["evaluations"] = json!(placed.len());
+        line["site_digest"] = json!(site.digest_text());
         let all: Vec<Value> = list.iter().zip(&placed).map(named).collect();
-        told["candidates"] = json!(all);
-        print_json(&told)?;
+        line["candidates"] = json!(all);
+        print_json(&line)?;
     } else {
         print(&format_args!(
             "the best of {} is {}",
             list.len(),
             list[best].name
         ))?;
-        tell(&placed[best])?;
+        print_placed(&placed[best])?;
         for (one, placed) in list.iter().zip(&placed) {
             let mean = placed.mean.map_or(placed.cost_at_goal, |mean| mean.value);
             print(&format_args!(

@@ -286,7 +286,7 @@ fn bad_input_is_told_clearly() {
         (
             PAPER.to_owned(),
             "plan site.toml --from back-to-dock --to dock --most-risk 2",
-            "no probability",
+            "not a probability",
         ),
     ] {
         let (code, out, err, _) = run(&site, line);

@@ -616,7 +616,7 @@ fn bad_input_is_told_clearly() {
     let boxed = "\n[task.dock]\nkind = \"work\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\nsuccess = { shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }\n";
     let site = SITE.to_owned() + WALL + boxed;
     for (line, what) in [
-        (place("0.1", ""), "it is not said what may be chosen"),
+        (place("0.1", ""), "the search space is missing"),
         (
             place("0.1", "--free w=1:2"),
             "`w` is nothing that can be free",

@@ -358,7 +358,7 @@ fn usage_that_means_nothing_is_refused() {
             "the last of 2 is 1/2",
         ),
         ("--threads 0 -o out", "--threads 0 does no work"),
-        ("--most-risk nan -o out", "no probability"),
+        ("--most-risk nan -o out", "not a probability"),
         (
             "-o site.toml",
             "site.toml: is a file, and a folder is needed",

@@ -13,7 +13,7 @@ pub fn on_all_cores<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     if *OWNER.get_or_init(process::id) == process::id() {
         return work();
     }
-    // A pool of its own; without one, the work would hang.
+    // A separate pool; without one, the work would wait forever.
     match ThreadPoolBuilder::new().build() {
         Ok(pool) => pool.install(work),
         Err(error) => panic!("no threads: {error}"),

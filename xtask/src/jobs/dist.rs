@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// What the archives of a release are named by.
 const SUMS: &str = "SHA256SUMS";
-/// How often everything is built, if the arguments do not say.
+/// The default number of builds.
 const BUILDS: u64 = 2;
 /// The commands of the README that only this job runs: they need the files of a release.
 const INSTALLERS: [&str; 4] = [
@@ -134,7 +134,7 @@ fn compare(first: &Path, second: &Path, report: &mut Report) -> Result {
         }
     }
     report.at_least(
-        "dist: files that two builds in two folders made alike",
+        "dist: files that are equal in two builds in two folders",
         equal,
         "files",
         expected.len(),

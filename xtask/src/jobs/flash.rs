@@ -83,7 +83,7 @@ fn of_gates(report: &mut Report, ceilings: &[(&str, &str, u64, u64)]) -> Result 
     std::fs::write(&layout, LAYOUT)?;
     for &(target, level, alone, all) in ceilings {
         need::targets(&[target])?;
-        // One core tells what each part takes; the ends are enough for the others.
+        // One core shows what each part takes; for the others the smallest and the largest gate are enough.
         let shows_each = target.starts_with("thumbv7em") && level == "s";
         for (name, features) in PARTS {
             let is_end = features.is_empty() || features == ALL_PARTS;

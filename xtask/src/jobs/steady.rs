@@ -26,7 +26,7 @@ pub fn steady(given: &Arguments) -> Result {
     let programs = build(&entries)?;
     repeat(&entries, &programs, runs, "on an idle machine")?;
     let _busy = Busy::start(2);
-    repeat(&entries, &programs, runs, "beside two busy processes")
+    repeat(&entries, &programs, runs, "with two busy processes")
 }
 
 /// A line of the list.

@@ -85,7 +85,7 @@ pub struct Arguments {
     /// Deviations of the odometry: m per root of a metre, rad per root of a radian, rad per root of a metre
     #[arg(long, default_value = "0.02,0.05,0.02", value_name = "M,RAD,RAD")]
     pub odom_noise: String,
-    /// The share of each movement that the odometry may be wrong by, in the worst direction
+    /// Largest error of the odometry in any direction, as a share of each movement
     #[arg(long, default_value_t = 0.02, allow_negative_numbers = true)]
     pub odom_slip: f64,
     /// Longest time between two poses of the odometry, milliseconds
@@ -282,10 +282,10 @@ impl Arguments {
         Ok(())
     }
 
-    /// Returns the gate's clock; `told` is the clock that the recording's format defines.
-    pub fn clock(&self, told: Option<Clock>) -> Option<Clock> {
+    /// Returns the gate's clock; `defined` is the clock that the recording's format defines.
+    pub fn clock(&self, defined: Option<Clock>) -> Option<Clock> {
         match self.clock {
-            ClockName::Auto => told,
+            ClockName::Auto => defined,
             ClockName::Logged => Some(Clock::Logged),
             ClockName::Stamps => Some(Clock::Stamps),
         }

@@ -87,7 +87,7 @@ impl Inflated {
     }
 
     /// Returns the factors for the summary.
-    pub fn told(&self) -> Value {
+    pub fn to_json(&self) -> Value {
         json!({"largest": f64::from(self.factors.inflation.q16()) / 65536.0, "by_age": by_age_json(&self.factors)})
     }
 }

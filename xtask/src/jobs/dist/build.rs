@@ -56,7 +56,7 @@ impl Sources {
     /// Returns a command of cargo or of maturin whose output does not depend on the folders. Its words follow.
     fn reproducible(&self, program: &Path) -> Result<Cmd> {
         let home = cargo_home()?;
-        // The last one that matches counts.
+        // The last match counts.
         let mut flags = vec![
             format!("--remap-path-prefix={}=cargo", home.display()),
             format!("--remap-path-prefix={}=target", self.target.display()),
@@ -122,7 +122,7 @@ fn contains(bytes: &[u8], word: &[u8]) -> bool {
     bytes.windows(word.len()).any(|part| part == word)
 }
 
-/// Returns the crate that a line of cargo's messages says is compiled.
+/// Returns the crate that a line of cargo's messages reports as compiled.
 fn compiled(line: &str) -> Result<Option<Crate>> {
     let message: Value = serde_json::from_str(line)?;
     if message["reason"] != "compiler-artifact" {

@@ -1,5 +1,5 @@
 //! The bill of materials (CycloneDX 1.5): every package of Rust in each file of a release, with its licence, checksum and what it
-//! needs. `cargo metadata` describes the packages; `cargo tree` says which of them a file has, since the former also lists optional
+//! needs. `cargo metadata` describes the packages; `cargo tree` lists which of them a file has, since the former also lists optional
 //! packages that are not used.
 
 use super::archives::CORES;

@@ -57,16 +57,16 @@ pub fn robots(folder: &Path) -> Result {
             .arg(&held)
             .words(&format!("{BAY} --inflation {factor}"))
             .outcome()?;
-        let told: Value = serde_json::from_str(&replay.text)?;
-        let coverage = told["truth"]["coverage"].as_f64().unwrap_or(0.0);
+        let summary: Value = serde_json::from_str(&replay.text)?;
+        let coverage = summary["truth"]["coverage"].as_f64().unwrap_or(0.0);
         found.push((coverage, robot.clone(), factor, replay.text));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (coverage, robot, factor, replay) in &found {
         let name = format!("mrclam, bay, robot {robot}, inflation {factor} learnt of the others");
         table(&name, replay)?;
-        let told: Value = serde_json::from_str(replay)?;
-        let gate = &told["rules"]["gate"];
+        let summary: Value = serde_json::from_str(replay)?;
+        let gate = &summary["rules"]["gate"];
         report.require(
             gate["false_permits"].as_u64() == Some(0),
             format!("no false permit of the gate on robot {robot}"),
