@@ -47,7 +47,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn the_case_study_comes_out_as_in_the_paper() {
+fn case_study_reproduces_the_paper() {
     let folder = tempfile::tempdir().unwrap();
     let output = posegate(&["demo", "-o", "once/more"], folder.path());
     let out = folder.path().join("once/more");
@@ -213,7 +213,7 @@ fn check_picture(text: &str, name: &str) {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_is_refused() {
+fn folder_that_cannot_be_created_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("file"), "").unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_posegate"))

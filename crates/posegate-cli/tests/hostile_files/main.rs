@@ -208,7 +208,7 @@ fn kept(name: &str, file: &str, bytes: &[u8]) -> String {
     path.display().to_string()
 }
 
-/// Does `count` trials on two threads, each with a folder of its own.
+/// Runs `count` trials on two threads, each in a separate folder.
 fn shared(count: usize, made: &Folder, trial: impl Fn(&Folder, usize) + Sync) {
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
@@ -280,7 +280,7 @@ fn tried(
 
 /// A share of what `./ci.sh hostile` tries.
 #[test]
-fn a_share_of_hostile_files_is_answered() {
+fn some_hostile_files_end_with_a_valid_exit_code() {
     let failures = tried(100, 540, 1, None);
     assert!(
         failures.is_empty(),
@@ -290,10 +290,10 @@ fn a_share_of_hostile_files_is_answered() {
     );
 }
 
-/// The job `hostile`.
+/// The test of the job `hostile`.
 #[test]
 #[ignore = "./ci.sh hostile"]
-fn hostile_files_are_answered() {
+fn hostile_files_end_with_a_valid_exit_code() {
     let number = |name: &str, otherwise: usize| {
         std::env::var(name).map_or(otherwise, |text| text.parse().expect("a whole number"))
     };

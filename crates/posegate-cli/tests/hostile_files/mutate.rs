@@ -41,7 +41,7 @@ const NESTS: [(&str, &str); 8] = [
     ("&a [", "]"),
 ];
 
-/// Whether a format is text.
+/// The kind of a format: text or binary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Text,
