@@ -158,7 +158,7 @@ fn faults(text: &str, folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn pages_say_what_their_programs_do() {
+fn pages_name_only_what_their_programs_contain() {
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();
         let faults = faults(&text, page.parent().unwrap());
@@ -173,7 +173,7 @@ fn pages_say_what_their_programs_do() {
 
 /// The check finds a missing function, a missing part and a missing file, and reports no fault in a correct page.
 #[test]
-fn a_page_that_says_otherwise_is_found() {
+fn fault_of_a_page_is_found() {
     let folder = root().join("docs");
     let right = "[a gate](../examples/c/docking_gate.c) calls `posegate_gate_step(..) == X` once. It has no link, and `posegate_none`.";
     assert_eq!(faults(right, &folder), Vec::<String>::new());
