@@ -695,7 +695,10 @@ fn exact_pose_costs_as_much_as_its_goal() {
             ("outside_mass", 0.0),
             ("p_miss", 0.0),
         ] {
-            assert!((report[name].as_f64().unwrap() - value).abs() < 1e-9, "{out}");
+            assert!(
+                (report[name].as_f64().unwrap() - value).abs() < 1e-9,
+                "{out}"
+            );
             assert_eq!(report[format!("{name}_error")], 0.0, "{out}");
         }
         assert_eq!(report.as_object().unwrap().len(), 10, "{out}");

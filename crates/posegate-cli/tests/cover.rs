@@ -475,11 +475,20 @@ fn bad_input_is_reported_with_the_reason() {
     );
     let own = candidates.replacen("[candidate.c0]\n", "[candidate.d0]\nid = 0\n", 1);
     let error_text = refused(&format!("{tag}\n\n{own}"));
-    assert!(error_text.contains("has the number 0 of tag `c0`"), "{error_text}");
+    assert!(
+        error_text.contains("has the number 0 of tag `c0`"),
+        "{error_text}"
+    );
     let error_text = refused(&with("cost = ", "cost = -"));
-    assert!(error_text.contains("`candidate.c0.cost` is -"), "{error_text}");
+    assert!(
+        error_text.contains("`candidate.c0.cost` is -"),
+        "{error_text}"
+    );
     let error_text = refused(&with("from = \"from-", "from = \"form-"));
-    assert!(error_text.contains("there is no chain `form-"), "{error_text}");
+    assert!(
+        error_text.contains("there is no chain `form-"),
+        "{error_text}"
+    );
 }
 
 #[test]
@@ -525,7 +534,10 @@ fn chosen_tag_needs_wall_space_and_a_free_id() {
         });
         cover(&parsed(&text), &CoverOptions::default(), &|_, _| ())
     };
-    assert!(matches!(with_keep_out(18.4), Err(CoverError::KeepOut { .. })));
+    assert!(matches!(
+        with_keep_out(18.4),
+        Err(CoverError::KeepOut { .. })
+    ));
     assert!(with_keep_out(1e-3).is_ok());
 
     // A family of thirty tags, all of which are mounted.

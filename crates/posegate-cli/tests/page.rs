@@ -143,13 +143,18 @@ fn placements_are_checked_and_shown() {
     // A probability is rounded up, a margin down.
     assert!(page.contains("<td>0.000001</td><td>1.249999</td>"));
     let wrong = |task: &str, placement: Value| {
-        let page = made(SAMPLE, |order| order.placements.push((task.into(), placement)));
+        let page = made(SAMPLE, |order| {
+            order.placements.push((task.into(), placement))
+        });
         page.expect_err("a fault")
     };
     let mut moved = placement.clone();
     moved["before"]["tag_pose"]["x"] = json!(mounted.x + 0.001);
     assert_eq!(wrong("see-t7", moved), PageError::OtherTag("see-t7".into()));
-    assert_eq!(wrong("no", placement.clone()), PageError::NoTask("no".into()));
+    assert_eq!(
+        wrong("no", placement.clone()),
+        PageError::NoTask("no".into())
+    );
     // A placement names the site file that it was made from.
     placement["site_digest"] = json!(site.digest_text());
     let page = made(SAMPLE, |order| {

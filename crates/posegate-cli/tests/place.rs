@@ -93,7 +93,10 @@ fn place_needs_a_tenth_of_the_evaluations_of_scipy() {
     for (sigma, looks, best) in [("0.1", 633, 109.696_268), ("0.3", 456, 636.134_418)] {
         let line = place(sigma, &format!("{FREE} --budget {looks}"));
         let placed = json(SITE, &line, 0);
-        assert!(number(&placed, "evaluations") <= f64::from(looks), "{placed}");
+        assert!(
+            number(&placed, "evaluations") <= f64::from(looks),
+            "{placed}"
+        );
         assert!(number(&placed, "mean") <= 1.001 * best, "{placed}");
     }
 }
@@ -125,7 +128,10 @@ fn larger_uncertainty_places_the_tag_farther_away() {
         let placed = json(SITE, &line, 0);
         assert!(number(&placed, "distance") > before + 0.3, "{placed}");
         before = number(&placed, "distance");
-        assert!((number(&placed, "mean") / mean - 1.0).abs() < 1e-3, "{placed}");
+        assert!(
+            (number(&placed, "mean") / mean - 1.0).abs() < 1e-3,
+            "{placed}"
+        );
         assert!(
             (number(&placed, "margin") / scale - 1.0).abs() < 2e-3,
             "{placed}"
@@ -331,7 +337,10 @@ fn tag_is_placed_on_the_wall_and_outside_the_door() {
         ),
         0,
     );
-    assert!(number(&freely, "mean") < number(&placed, "mean"), "{freely}");
+    assert!(
+        number(&freely, "mean") < number(&placed, "mean"),
+        "{freely}"
+    );
     // A wall that consists of a door.
     let doors = site.replace("[2.4, 3.6], z = [0.0, 2.1]", "[0.0, 6.0], z = [0.0, 2.5]");
     let refused = run(&doors, &place("0.1", "--wall north"));
@@ -470,7 +479,10 @@ fn default_reserve_is_the_tolerance_of_the_tag() {
     let known = json(SITE, &place("0.1", "--free x=3.9:4.1 --budget 30"), 0);
     assert_eq!(number(&known["reserve"], "translation"), 0.01);
     assert_eq!(number(&known["reserve"], "yaw_deg"), 0.5);
-    assert!(number(&known, "margin") > number(&placed, "margin"), "{placed}");
+    assert!(
+        number(&known, "margin") > number(&placed, "margin"),
+        "{placed}"
+    );
 }
 
 #[test]
@@ -584,7 +596,10 @@ fn formula_with_the_weights_of_the_paper_gives_its_cost() {
         None,
     );
     assert!(
-        output.code == 2 && output.err.contains("has a bound below 0 at a psi of 50 deg"),
+        output.code == 2
+            && output
+                .err
+                .contains("has a bound below 0 at a psi of 50 deg"),
         "{}",
         output.err
     );

@@ -151,7 +151,9 @@ fn slivers_are_built_or_refused_with_a_message() {
         regions.push(format!(
             "{square}, [[0.5, -0.5], [{thin}, -0.5], [{thin}, 0.5], [0.5, 0.5]]"
         ));
-        regions.push(format!("{square}, [[0.5, -0.5], [{thin}, 0.0], [0.5, 0.5]]"));
+        regions.push(format!(
+            "{square}, [[0.5, -0.5], [{thin}, 0.0], [0.5, 0.5]]"
+        ));
     }
     regions.push("[[-0.5, -0.5], [0.0, -0.5000000000001], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], [[0.5, -0.5], [1.0, -0.5], [1.0, 0.5], [0.5, 0.5]]".into());
     let mut sets: Vec<String> = regions

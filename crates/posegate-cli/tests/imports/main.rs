@@ -207,7 +207,11 @@ fn field_tags_follow_the_pose_of_the_field() {
             let in_field = add(turned(TURN, times(0.5 * size, [out, right, up])), OFFSET);
             pose.map_or(in_field, |pose| placed(pose, in_field))
         });
-        assert_near(tag_points(&imported.tags["t7"]), wanted, &format!("{pose:?}"));
+        assert_near(
+            tag_points(&imported.tags["t7"]),
+            wanted,
+            &format!("{pose:?}"),
+        );
     }
 }
 

@@ -143,7 +143,10 @@ fn stale_records_are_left_out_if_the_site_is_given() {
         "remove stale shard files from `parts`",
         "into a fresh folder",
     ] {
-        assert!(squeezed.contains(&expected.replace(' ', "")), "{expected}: {err}");
+        assert!(
+            squeezed.contains(&expected.replace(' ', "")),
+            "{expected}: {err}"
+        );
     }
     folder.expect(0, "site merge out --site other.toml");
     assert!(folder.results("out") == folder.results("second"));

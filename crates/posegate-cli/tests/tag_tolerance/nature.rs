@@ -232,7 +232,10 @@ impl World {
         let chord = across.map(|c| c / lever);
         // A direction between the wanted one and that of the chord, weighted by the rotation.
         let rotation_m = self.tag_off[1].to_radians() * lever;
-        let to = [cos + 10.0 * rotation_m * chord[0], sin + 10.0 * rotation_m * chord[1]];
+        let to = [
+            cos + 10.0 * rotation_m * chord[0],
+            sin + 10.0 * rotation_m * chord[1],
+        ];
         let length = to[0].hypot(to[1]).max(1e-9);
         let to = to.map(|c| c / length);
         // In the robot's frame.
@@ -287,8 +290,8 @@ impl World {
             off.mount.map(|c| c * self.mount_off[0]),
         );
         let at = view(&robot.then(&mount), &tag);
-        let (metres, radians) =
-            detector(at).ok_or_else(|| format!("the error model has no bound for the view {at:?}"))?;
+        let (metres, radians) = detector(at)
+            .ok_or_else(|| format!("the error model has no bound for the view {at:?}"))?;
         // The detector's pose if tag and camera were known exactly. Its error on the floor is at its bounds, and it leans,
         // which the bounds do not limit. The bounds were measured with a camera that is not rotated; a rotated camera
         // turns the error in height.
