@@ -1,4 +1,4 @@
-//! `cargo xtask steady` repeats tests that start an emulator, wait, or read a clock, idle and under load: every such test
+//! `cargo xtask steady` repeats tests that start an emulator, wait, or read a clock, idle and under load. Every such test
 //! target is in the list of that job, `xtask/steady.txt`.
 
 use std::collections::BTreeSet;
@@ -79,7 +79,7 @@ fn waits(text: &str) -> bool {
         .any(|line| WORDS.iter().any(|word| line.contains(word)))
 }
 
-/// Returns every test target of the workspace, as `PACKAGE:TARGET`, and whether it waits.
+/// Returns every test target of the workspace, as `PACKAGE:TARGET`, with `true` if it waits.
 fn targets() -> Vec<(String, bool)> {
     let mut folders = vec![("posegate".to_owned(), root().join("tests"))];
     for path in entries(&root().join("crates")) {

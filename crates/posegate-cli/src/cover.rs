@@ -42,8 +42,8 @@ pub struct Arguments {
     /// Stop when the proven bound is below the cost by at most this share of the cost
     #[arg(long, default_value_t = 0.05)]
     gap: f64,
-    /// Stop after this many seconds and report the best choice so far with its proven bound and gap, but no sooner than the
-    /// greedy choice is complete (by default there is no limit)
+    /// Stop after this many seconds, but not before the greedy choice is complete. Report the best choice so far with its
+    /// proven bound and gap [default: no limit]
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
     /// Look at tags only from places within this distance of the straight line from start to goal, in metres

@@ -76,8 +76,8 @@ pub struct Inflation {
     /// The model to write; `-` for standard output
     #[arg(short, long)]
     output: Output,
-    /// The probability, over the data, with which a condition's factor is large enough; with several robots or runs, the
-    /// probability with which it is large enough for a new one
+    /// The probability, over the data, with which a condition's factor is large enough. With several robots or runs:
+    /// large enough for a new one
     #[arg(long, default_value_t = InflationSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
     /// Learn factors for the robots (or runs) in the data alone, not for a new one
@@ -94,8 +94,8 @@ pub struct Inflation {
 /// Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
 ///
 /// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha, whatever the results of
-/// earlier dockings. `lower` and `upper` limit the probability of success with confidence 1 - alpha at all of these looks together
-/// (a confidence sequence), if every docking succeeds with the same probability, independently of the others.
+/// earlier dockings. `lower` and `upper` limit the probability of success with confidence 1 - alpha in all of these tests together
+/// (a confidence sequence). This assumes that all dockings succeed with the same probability, independently of each other.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s if the rows are not in the order of time."

@@ -41,8 +41,8 @@ pub struct Arguments {
     epsilon: Option<f64>,
     #[command(flatten)]
     weights: Weights,
-    /// Take the cost of a view from this [error_model] of the site, learnt or a formula, instead of c1, c2 and c3: 100 times the
-    /// bound in metres plus the bound in degrees, including the tolerances of tag and camera
+    /// Take the cost of a view from this [error_model] of the site instead of c1, c2 and c3. The cost is 100 times the bound in
+    /// metres plus the bound in degrees, including the tolerances of tag and camera
     #[arg(long)]
     error_model: Option<String>,
     /// Ranges of the tag's pose: x, y, z (m) and yaw_deg, such as x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall only z
@@ -51,8 +51,8 @@ pub struct Arguments {
     /// Mount the tag flat on this wall of the site, on the goal's side
     #[arg(long)]
     wall: Option<String>,
-    /// How far off the installer may mount the tag, metres and degrees: the margin holds for every such error
-    /// [default: the tag's tolerance in the site, else 0.01,0.5]
+    /// Largest mounting error, metres and degrees: the margin holds for every such error [default: the tag's
+    /// tolerance in the site, else 0.01,0.5]
     #[arg(long, value_parser = reserve, value_name = "M,DEG", allow_hyphen_values = true)]
     reserve: Option<Tolerance>,
     /// Compare these places: a CSV of x, y, z, yaw_deg and optionally name, roll_deg, pitch_deg; `-` for standard input

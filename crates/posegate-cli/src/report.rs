@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         let svg = svg.filter(|svg| svg.contains("<svg"));
         let svg = svg.ok_or_else(|| {
             Failure::usage(
-                format!("{name} is no SVG picture"),
+                format!("{name} is not an SVG picture"),
                 "give what a command's `-o FILE.svg` writes",
             )
         })?;

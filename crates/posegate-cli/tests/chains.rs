@@ -300,7 +300,7 @@ fn bad_input_is_reported_with_the_reason() {
             "{line}: {expected}\n{out}\n{err}"
         );
     }
-    // A site without anything to look at.
+    // A site without localization tasks and tags.
     let start = PAPER.find("[tag.t7]").unwrap();
     let end = PAPER.find("[task.dock]").unwrap();
     let steps = PAPER.find("steps = [").unwrap();

@@ -58,7 +58,8 @@ fn mounted(text: &str, has: impl Fn(usize) -> bool) -> String {
     sections.join("\n\n")
 }
 
-/// Returns which tasks have a plan on a site, in the order of their names, and which have one that survives the loss of a tag.
+/// Returns which tasks have a plan on a site, and which have one that survives the loss of a tag. Tasks are in the order of
+/// their names.
 fn plans(text: &str) -> [Vec<bool>; 2] {
     let site = parsed(text);
     let mut prepared = match Prepared::of(&site, None) {
@@ -157,7 +158,7 @@ fn exact_cover_costs_no_more_than_any_serving_subset() {
     let skipped = if counts::is_deep() { 0 } else { 2 };
     for (seed, (text, candidates)) in sites().into_iter().enumerate().skip(skipped) {
         let site = parsed(&text);
-        // The numbers of the text's candidates are those of their names' order: there are fewer than ten.
+        // Candidates are numbered in the order of their names: there are fewer than ten.
         let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
         let [plain, surviving]: [Vec<Vec<bool>>; 2] = {
             let all = all_subsets(&text, candidates);
@@ -609,7 +610,7 @@ fn unserved_task_is_reported_with_the_reason() {
     let turned = turned.replace("yaw_deg = +90.5 }", "yaw_deg = 90.0 }");
     let message = reason(&turned);
     assert!(message.contains("walls hide them"), "{message}");
-    // A dock that is narrower than what an observation leaves.
+    // A dock that is narrower than the error after an observation.
     let from = text.find("x = [-0.").expect("a box");
     let to = from + text[from..].find(", yaw_deg").expect("a box");
     let narrow = text.replacen(&text[from..to], "x = [-0.01, 0.01], y = [-0.01, 0.01]", 1);

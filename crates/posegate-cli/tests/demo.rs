@@ -14,8 +14,9 @@ const PICTURES: [&str; 5] = [
     "fig4-placement.svg",
 ];
 
-/// Task, translation or sigma (m), yaw or its sigma (degrees), whether the set is inside, true scale s*
-/// (from the reference cases; docking's by hand: the smaller of 6 cm over the radius and 4 over 2 degrees).
+/// Task, translation or sigma (m), yaw or its sigma (degrees), `true` if the set is inside, true scale s*.
+/// The scales are from the reference cases. That of docking is computed manually: the smaller of 6 cm over
+/// the radius and 4 over 2 degrees.
 const BOUNDED: [(&str, f64, f64, bool, f64); 7] = [
     ("park", 0.1, 2.0, true, 2.02623),
     ("park", 1.0, 2.0, false, 0.24370),
@@ -134,7 +135,7 @@ fn check_numbers(numbers: &Value, out: &Path) {
 /// Fig. 4 places that are never worse than the start.
 fn check_figures(out: &Path, numbers: &Value) {
     let text = |name: &str| String::from_utf8(read(out, name)).unwrap();
-    // A car of 4.5 m by 1.5 m in a space of 5 m by 3 m has 25 cm before and behind it, and 75 cm at each side.
+    // A car of 4.5 m by 1.5 m in a space of 5 m by 3 m has slacks of 25 cm along and 75 cm across.
     let parking = text("fig1-parking.svg");
     for shown in [
         "(a) error along x",

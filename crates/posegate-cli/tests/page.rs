@@ -313,7 +313,7 @@ fn report_writes_a_page_or_nothing() {
         )
     };
     for (more, what) in [
-        (["--picture", "no.svg"], "is no SVG picture"),
+        (["--picture", "no.svg"], "is not an SVG picture"),
         (["--placement", "see-t7=no.json"], "posegate place --json"),
         (["--placement", "no.json"], "expected TASK=FILE"),
         (["--picture", "none.svg"], "none.svg"),
@@ -330,8 +330,8 @@ fn report_writes_a_page_or_nothing() {
 
 const HALL: &str = include_str!("../../../examples/sites/hall.toml");
 
-/// Returns the hall with its first docks, with tags of 30 cm on its north wall, at these places along it in metres, and without
-/// candidates.
+/// Returns the hall with its first docks and without candidates. Tags of 30 cm are on its north wall, at these places along it
+/// in metres.
 fn hall(docks: u32, along: &[f64]) -> String {
     let rest = format!("[task.dock-{}]", docks + 1);
     let (site, _) = HALL

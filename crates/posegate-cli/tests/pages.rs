@@ -96,7 +96,7 @@ fn functions(sentence: &str) -> Vec<String> {
         let call = span.split('(').next().unwrap_or("");
         if let Some((path, name)) = call.rsplit_once("::") {
             found.push(name.to_string());
-            // Its type; modules need not be named where it is used.
+            // Its type: modules need not be named at its use.
             let of = path.rsplit("::").next().unwrap_or("");
             if of.starts_with(|c: char| c.is_ascii_uppercase()) {
                 found.push(of.to_string());
@@ -140,9 +140,7 @@ fn faults(text: &str, folder: &Path) -> Vec<String> {
             .collect();
         for name in functions(&sentence) {
             if !texts.iter().any(|text| has_word(text, &name)) {
-                faults.push(format!(
-                    "`{name}` does not stand in what this links: {sentence}"
-                ));
+                faults.push(format!("`{name}` is not in the linked files: {sentence}"));
             }
         }
         for part in PARTS

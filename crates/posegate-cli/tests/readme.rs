@@ -1,5 +1,5 @@
-//! The README and the pages of `docs` are correct: the README's lines of Rust are those of an example that runs, the
-//! lines of site files are valid, and the named files and jobs exist.
+//! The README and the pages of `docs` are correct. The README's Rust code is in an example that runs, the lines of
+//! site files are valid, and the named files and jobs exist.
 
 use std::path::PathBuf;
 

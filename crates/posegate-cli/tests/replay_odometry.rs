@@ -81,7 +81,7 @@ fn odometry_file_keeps_the_interlock_open_between_fixes() {
     let with = summary(&replay(&fixes(), csv(&driven()).as_bytes(), MOVING));
     let interlock = &with["interlock"];
     assert_eq!(interlock["openings"], 1, "{interlock}");
-    // The dock is 16 cm long: 3.2 s, less the sets, the slip and what the robot may drive until a permission ends.
+    // The dock is 16 cm long: 3.2 s, less the sets, the slip and the allowed drive until a permission ends.
     assert!(number(&interlock["open_s"]) > 1.5, "{interlock}");
     assert!(number(&interlock["open_s"]) < 3.1, "{interlock}");
     let of_tum = summary(&replay(&fixes(), tum(&driven()).as_bytes(), MOVING));

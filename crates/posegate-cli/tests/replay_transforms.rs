@@ -22,8 +22,8 @@ fn in_odometry(x: f64) -> [f64; 3] {
     [c * dx + s * dy, c * dy - s * dx, -turn]
 }
 
-/// A drive with AMCL's poses twice a second in `frame`, and transforms at 50 Hz as Nav2 writes them: the correction a second ahead, in
-/// messages that also have a wheel.
+/// Returns a drive with AMCL's poses twice a second in `frame`, and transforms at 50 Hz as Nav2 writes them. The correction is a
+/// second ahead, and messages also contain a wheel.
 fn drive(frame: &'static str, base: &str) -> Vec<u8> {
     let mut bag = Bag::new(None, true);
     for k in 0..400u32 {
@@ -95,7 +95,7 @@ fn transforms_replace_a_missing_odometry_topic() {
         assert!((most - 0.05).abs() < 1e-6, "{driven}");
         let interlock = &summary["interlock"];
         assert_eq!(interlock["openings"], 1, "{interlock}");
-        // The dock is 16 cm long: 3.2 s, less the sets and what the robot may drive.
+        // The dock is 16 cm long: 3.2 s, less the sets and the allowed drive.
         let open = interlock["open_s"].as_f64().expect("seconds");
         assert!((1.5..3.1).contains(&open), "{interlock}");
     }

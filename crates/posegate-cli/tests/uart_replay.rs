@@ -1,6 +1,5 @@
-//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line: its verdicts are, bit for
-//! bit, those that `posegate gate` prints and that the host computes. Its interlock is high after a permit
-//! and at no other time.
+//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line. Its verdicts equal those of
+//! `posegate gate` and of the host, bit for bit. Its interlock is high only after a permit.
 //!
 //! With `POSEGATE_FIRMWARE=c` the same tests run with `examples/c/estimate_bench.c`.
 //! `POSEGATE_BLESS=1 cargo test -p posegate-cli --test uart_replay` rewrites the estimates.

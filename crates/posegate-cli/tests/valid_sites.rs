@@ -1,5 +1,5 @@
-//! A valid site never ends in an internal error (exit code 3): its table is built and proven, or refused with a
-//! message that states the reason.
+//! A valid site never ends in an internal error (exit code 3). Its table is built and proven, or refused with
+//! the reason.
 
 use posegate_testkit::counts;
 use std::path::Path;
@@ -68,8 +68,8 @@ fn built(text: &str) -> [i32; 4] {
     })
 }
 
-/// Boxes whose arc falls short of the whole circle by less than a unit of the table's headings, by some, and by a
-/// hundredth of a degree; in tables of the same arc, and of the whole circle.
+/// Boxes whose arc is below a full turn by less than a unit of the table's headings, by some units, or by a
+/// hundredth of a degree. The tables have the same arc, or a full turn.
 #[test]
 fn arc_of_nearly_a_full_turn_is_built() {
     let arc = |[lo, hi]: [f64; 2]| {
@@ -95,7 +95,7 @@ fn arc_of_nearly_a_full_turn_is_built() {
     assert_eq!(tried, if counts::is_deep() { 100 } else { 20 });
 }
 
-/// A table of an arc is never a table of the whole circle.
+/// A table of an arc is never a table of a full turn.
 #[test]
 fn arc_below_a_full_turn_is_not_a_full_turn() {
     let folder = tempfile::tempdir().unwrap();
@@ -121,8 +121,8 @@ fn arc_below_a_full_turn_is_not_a_full_turn() {
     assert!(!pieces.is_empty() && pieces.iter().all(|piece| !piece.is_whole_circle()));
 }
 
-/// Regions that share an edge or a corner, overlap or leave a crack by micrometres and less, slivers among them, corners
-/// that lie nearly on an edge, thin robots and thin obstacles.
+/// Regions that share an edge or a corner, or that overlap or leave a crack by micrometres or less. Also slivers,
+/// corners nearly on an edge, thin robots and thin obstacles.
 #[test]
 fn slivers_are_built_or_refused_with_a_message() {
     let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";

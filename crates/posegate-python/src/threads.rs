@@ -1,5 +1,5 @@
-//! Work on all cores, also in a process that was forked: threads do not survive a fork, so the first pool of one would wait for
-//! them forever.
+//! Work on all cores, also in a forked process. Threads do not survive a fork, so the parent's pool would wait for them
+//! forever.
 
 use rayon::ThreadPoolBuilder;
 use std::process;

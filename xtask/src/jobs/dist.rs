@@ -167,7 +167,7 @@ fn version() -> Result<String> {
     Ok(version)
 }
 
-/// Empties a folder that an earlier run of this job has filled, or makes it.
+/// Empties a folder of an earlier run of this job, or makes the folder.
 fn clear(folder: &Path) -> Result {
     if folder.exists() {
         let is_ours = folder.join(SUMS).is_file() || fs::read_dir(folder)?.next().is_none();

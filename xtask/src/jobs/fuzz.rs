@@ -17,8 +17,8 @@ const FLOORS: [(&str, u64); 4] = [
     ("report", 700),
 ];
 
-/// Runs every fuzz target (or those named) for a number of seconds each, from seeds of real tables and recorded estimates, and from earlier
-/// finds in tests/fuzz/corpus. Prints a line for each target. Fails on a finding, and if a target reached too few edges.
+/// Runs every fuzz target (or those named) for a number of seconds each. Seeds are real tables, recorded estimates, and earlier finds in
+/// tests/fuzz/corpus. Prints a line for each target. Fails on a finding, and if a target reached too few edges.
 pub fn fuzz(given: &Arguments) -> Result {
     let seconds = given.required(0, "seconds for each target")?;
     given.number(0, 0)?;

@@ -55,7 +55,7 @@ const NEEDED: [&str; 5] = [
     "crates/posegate-host/src/page/core.wasm",
 ];
 /// What packages have of the files at the top of the repository: a package, and files, or folders that end in `/`. They are copied
-/// when the packages are made: links would break where a repository is unpacked without them.
+/// when the packages are made: links would break if a repository is unpacked without them.
 const SHARED: [(&str, &[&str]); 3] = [
     ("posegate-host", &LICENCES),
     ("posegate-cli", &LICENCES),

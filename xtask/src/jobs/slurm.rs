@@ -14,10 +14,9 @@ use std::time::{Duration, Instant, SystemTime};
 /// Longest wait for anything.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Checks for the same bytes as from one process. Then again with one node killed in the middle, its task queued again, and a merge that
-/// waits for all tasks: the same bytes, and no finished piece made twice.
-/// The argument is the number of endpoints of the synthetic plant (120); with few of them
-/// most of the time is spent on starting processes.
+/// Checks for the same bytes as from one process. Repeats it with one node killed in the middle, its task queued again, and a merge that
+/// waits for all tasks. The bytes must be the same, and no finished piece is made twice. The argument is the number of endpoints of the
+/// synthetic plant (120); with few of them most of the time is spent on starting processes.
 pub fn slurm(given: &Arguments) -> Result {
     let endpoints = given.number(0, 120)?;
     let missing: Vec<&str> = ["slurmctld", "slurmd", "sbatch", "munged"]

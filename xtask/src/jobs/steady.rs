@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A line for each: a package, a test target of it and, if not all of it waits, a part of the names of the tests that do.
-/// `xtask/tests/steady.rs` compares the list with the sources.
+/// One line per test target: its package, its name and, if not all of its tests wait, a part of the names of those that
+/// do. `xtask/tests/steady.rs` compares the list with the sources.
 const LIST: &str = include_str!("../../steady.txt");
 
-/// Runs each of them RUNS times (20) on an idle machine, which the caller must provide, and RUNS times with two busy processors. No
+/// Runs each target RUNS times (20) on an idle machine, which the caller must provide, and RUNS times with two busy processors. No
 /// run may fail. Ends at the first failure, with its log.
 pub fn steady(given: &Arguments) -> Result {
     let runs = given.number(0, 20)?;
@@ -171,7 +171,7 @@ fn repeat(
     Ok(())
 }
 
-/// Threads that do nothing but take processor time, until this is dropped. They end with this process, however it ends.
+/// Threads that only take processor time, until this is dropped. They end with this process, however it ends.
 struct Busy(Arc<AtomicBool>);
 
 impl Busy {

@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 
 /// Tests whether a learnt error model still holds on new detections
 ///
-/// Exit code 1 if the model is contradicted. The test may be run after every detection: it contradicts a model that holds
-/// with a probability of at most 1 - confidence, however often it is run. It reports which region is contradicted, after how
-/// many rows, since which row, and what the change looks like: `scale` (noise, blur, light), `offset` (a tag or camera that
-/// is displaced) or `calibration` (image centre, focal length, a camera or tag that is turned). Rows of one `run` are one
-/// observation. Without the column `run`, rows are independent of each other, in the order of `t_s` or of the file.
+/// Exit code 1 if the model is contradicted. The test may be run after every detection. The probability that it ever
+/// contradicts a valid model is at most 1 - confidence. It reports the contradicted region, after how many rows, and since
+/// which row. It also reports the kind of the change: `scale` (noise, blur, light), `offset` (a displaced tag or camera) or
+/// `calibration` (image centre, focal length, a turned camera or tag). Rows of one `run` are one observation. Without the
+/// column `run`, rows are independent of each other, in the order of `t_s` or of the file.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn check tags.toml today.csv --json\n\nColumns: those of `learn bounds`."

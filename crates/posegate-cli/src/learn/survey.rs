@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 
 /// Finds docks and tags that are not where the site file places them, from logs of dockings
 ///
-/// Each row is a look at a tag: the robot's pose at contact with the dock, as it follows from the surveyed place of the tag (looks on
-/// the way, carried along the odometry). Exit code 1 if something must be surveyed again. If everything is in its place, that happens
-/// with a probability of at most 1 - confidence. It assumes that dockings (`run`) are independent of each other and that neither the
-/// camera nor the contact has a bias: a camera that is turned makes every dock seem off.
+/// Each row is a look at a tag: the robot's pose at contact with the dock, computed from the surveyed place of the tag. (Earlier
+/// looks are carried along the odometry.) Exit code 1 if something must be surveyed again. If everything is in its place, that
+/// happens with a probability of at most 1 - confidence. It assumes that dockings (`run`) are independent of each other, and
+/// that neither the camera nor the contact has a bias. A turned camera makes every dock seem off.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn survey site.toml dockings.csv --json\n\nColumns: run (the docking at its dock), dock (the name of its task), tag, x_m, y_m, yaw_rad (world frame)."

@@ -59,8 +59,8 @@ fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
     all
 }
 
-/// Each length of a bag is made too large in turn, including those of records within chunks. The whole chunk is left out and
-/// reported; the other chunks are read.
+/// Each length of a bag is made too large in turn, including those of records within chunks. The damaged chunk is skipped
+/// and reported. The other chunks are read.
 #[test]
 fn chunk_with_a_length_beyond_its_end_is_skipped() {
     let whole = bag(None, 30);

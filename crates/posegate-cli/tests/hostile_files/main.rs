@@ -1,5 +1,5 @@
-//! For any content of a file the program ends with 0, 1 or 2 (3 is an internal error), without a panic, within 512 MiB and
-//! 20 s of processor time.
+//! For any content of a file the program ends with 0, 1 or 2, without a panic, within 512 MiB and 20 s of processor time.
+//! (3 is an internal error.)
 //!
 //! Files are bags with one flipped bit, and mutants of good files of every format. Each gets its own process. A share of
 //! them is tried here; `./ci.sh hostile [FLIPS] [MUTANTS] [SEED]` tries thousands. Files that fail are kept in `target/tmp/hostile`.
@@ -278,7 +278,7 @@ fn tried(
     failures
 }
 
-/// A share of what `./ci.sh hostile` tries.
+/// A share of the cases of `./ci.sh hostile`.
 #[test]
 fn some_hostile_files_end_with_a_valid_exit_code() {
     let failures = tried(100, 540, 1, None);

@@ -29,7 +29,7 @@ const NUMBERS: [&str; 24] = [
     "1000000",
     "65536",
 ];
-/// Openings of nested structures, with what closes them.
+/// The openings of nested structures with their ends.
 const NESTS: [(&str, &str); 8] = [
     ("[", "]"),
     ("{a=", "}"),

@@ -157,8 +157,8 @@ fn bundle_has_the_same_world_points_in_every_convention() {
     }
 }
 
-/// The same tag in every convention, with simple numbers: 20 cm to a viewer's right, 10 cm
-/// up, 5 cm out of the bundle's face, turned by 90 degrees about the vertical, counter-clockwise from above.
+/// The same tag in every convention, with simple numbers: 20 cm to a viewer's right, 10 cm up, 5 cm out of
+/// the bundle's face. It is turned by 90 degrees about the vertical, counter-clockwise from above.
 #[test]
 fn tag_has_the_same_pose_in_every_convention() {
     let c = std::f64::consts::FRAC_1_SQRT_2;

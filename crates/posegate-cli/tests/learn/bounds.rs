@@ -209,7 +209,7 @@ fn gap_of_the_data_is_refused() {
         }
         assert!(accepted.value() > 0.9, "{axis} {low}: {accepted:?}");
     }
-    // A hole that is no gap along any axis.
+    // A hole that is not a gap along any axis.
     let hole = |[d, _, psi]: [f64; 3], by: f64| {
         d > 2.0 + by && d < 3.5 - by && psi > 20.0 + 10.0 * by && psi < 40.0 - 10.0 * by
     };
@@ -308,7 +308,7 @@ fn refused_regions_are_reported_with_the_reason() {
     assert!(error.to_string().contains("cells: "), "{error}");
 }
 
-/// Flips stay in the data: where they are frequent, the bound is as large as their error.
+/// Flips stay in the data: if they are frequent, the bound is as large as their error.
 #[test]
 fn bounds_include_frequent_flips() {
     let distribution = Distribution {

@@ -12,8 +12,8 @@ fn places() -> &'static [Detection] {
     PLACES.get_or_init(|| SQUARES.approaches(400, 0.0, 0.0, 1001).rows)
 }
 
-/// Returns the share of regions for which a bound holds for less than `q` of its detections, over both bounds of models
-/// of 60 approaches, and the number of such shares.
+/// Returns the share of bounds that hold for less than `q` of their detections, and the number of bounds. Counts both
+/// bounds of each region of models of 60 approaches.
 fn low(models: impl Iterator<Item = ErrorModel>, scale: f64, q: f64) -> (f64, u32) {
     let (mut low, mut count) = (0, 0);
     for model in models {

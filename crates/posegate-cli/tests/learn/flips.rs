@@ -59,7 +59,7 @@ fn bounds_are_tight_where_tags_flip() {
             nth(&all, 0.5),
             nth(&all, 0.95)
         );
-        // Where flips are frequent, a bound is not much larger than a flip.
+        // If flips are frequent, a bound is not much larger than a flip.
         let flipped = ratios(&model, quantile, |at| (FLIPPING.flips)(at) > 0.025);
         assert!(
             flipped.len() > 1000 && nth(&flipped, 0.5) < 1.4 && nth(&flipped, 0.95) < 2.2,
@@ -124,7 +124,7 @@ fn bounds_for_both_poses_ignore_flips() {
         ErrorModel::parse(&text, name).unwrap()
     };
     let (of_both, of_one) = (model("both"), model("one"));
-    // Where a tenth of the tags flip.
+    // A view at which a tenth of the tags flip.
     let flipping = [6.0, 5.0, 20.0];
     let ratio = of_one.bounds_deg(flipping).unwrap().0 / of_both.bounds_deg(flipping).unwrap().0;
     assert!(ratio > 5.0, "{ratio}");

@@ -7,8 +7,8 @@ use posegate_host::learn::{
     InflationModel, InflationSettings, LearnError, Scored, ScoredEstimates, learn_inflation,
 };
 
-/// Returns estimates of a filter with correlated errors, whose covariance is too small by a factor that depends on
-/// the time since the last fix: 2 below half a second, 6 from there on.
+/// Returns estimates of a filter with correlated errors and too small covariances. The factor depends on the time
+/// since the last fix: 2 below half a second, 6 from there on.
 pub fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
     let mut random = Random(seed);
     let mut rows = Vec::new();

@@ -211,8 +211,8 @@ fn recorded_inflation_holds_on_held_out_estimates() {
     assert_eq!(missed, 0, "shares below the binomial 99 % interval");
 }
 
-/// Every split of the recorded robots into those that are learnt from and a new one, at the default confidence. The worst is printed first.
-/// Four robots are enough for 0.8, so it is claimed that four of five new robots are covered as stated; fewer are refused.
+/// Every split of the recorded robots into those to learn from and a new one, at the default confidence. The worst is printed first. Four
+/// robots are enough for 0.8, so it is claimed that four of five new robots are covered as stated; fewer are refused.
 #[test]
 #[ignore = "run by ci.sh recorded DIR"]
 fn recorded_robots_are_covered_by_factors_of_the_others() {

@@ -1,9 +1,9 @@
 //! The error bound of a look holds for all true places of tag and camera within their tolerances.
 //!
-//! `nature.rs` displaces both to the ends of the tolerances, gives the detector the largest errors of its error model, and
+//! `nature.rs` displaces both to the ends of the tolerances, with the largest errors of the detector's error model. It
 //! computes the robot's pose from the places in the site file. It shares no code with the crate. At no pose of a success
-//! set S_l(r), and in no look of a chain or a plan, may the error exceed the bound. The bound is not much larger than
-//! the largest error that is found.
+//! set S_l(r), and in no look of a chain or a plan, may the error exceed the bound. The bound is not much larger than the
+//! largest error that is found.
 
 mod nature;
 
@@ -522,7 +522,7 @@ fn larger_tolerance_makes_a_small_error_impossible() {
     }
 }
 
-/// The planner makes looks only of tags whose survey is good enough.
+/// The planner generates looks only of tags with a small enough tolerance.
 #[test]
 fn planner_looks_only_at_tags_with_a_good_survey() {
     let folder = folder();

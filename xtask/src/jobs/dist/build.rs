@@ -15,8 +15,8 @@ pub const WHEEL: &str = "x86_64-unknown-linux-gnu";
 /// The oldest systems on which the wheel must run: glibc 2.17.
 const WHEEL_TAG: &str = "manylinux2014";
 
-/// Where every build finds the sources. Cargo puts the path of a package outside of its workspace into the names of symbols, and the
-/// node and the wheel are such workspaces: so each build sees the sources at this path, by a mount of its own.
+/// Where every build finds the sources. Cargo puts the path of a package outside of its workspace into the names of symbols. The
+/// node and the wheel are such workspaces. So each build sees the sources at this path, by a separate mount.
 const PLACE: &str = "/tmp/posegate-dist";
 /// Runs a command where the folder that is the first argument is mounted at [`PLACE`]. No administrator is needed.
 const MOUNTED: &str =

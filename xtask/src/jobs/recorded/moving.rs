@@ -82,7 +82,7 @@ impl Interlock {
 }
 
 /// Prints for how long the interlock is open on the recorded hall and in the robots' arena. Fails if it is ever open with the true pose
-/// outside, if the odometry is of no use, or if the interlock is open for longer than one with exact sets.
+/// outside, if the odometry has no effect, or if it is open longer than with exact sets.
 pub fn moving(folder: &Path) -> Result {
     let mut report = Report::default();
     hall(folder, &mut report)?;

@@ -8,11 +8,12 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The share of the pose-sets that shall contain the truth: that of the site file.
+/// The required share of pose-sets that contain the truth, as in the site file.
 const EPSILON: f64 = 0.99;
-/// The default of `learn inflation --confidence`: the share of new robots for which the factor shall be large enough.
+/// The default of `learn inflation --confidence`: the required share of new robots for which the factor is large
+/// enough.
 const CONFIDENCE: f64 = 0.8;
-/// The robots from which a factor for a new one follows with this confidence.
+/// The number of robots from which a factor for a new one follows with this confidence.
 const ENOUGH: usize = 4;
 /// What the replays of the robots have in common.
 const BAY: &str = "--task bay --max-age-ms 3000 --permit-hold-ms 3000 --json";
@@ -91,7 +92,7 @@ pub fn robots(folder: &Path) -> Result {
     report.finish()
 }
 
-/// Returns every set of robots that can be left out so that several are left to learn from, the small sets first. (One robot's factors
+/// Returns every set of robots that can be left out if several must remain to learn from, the small sets first. (One robot's factors
 /// are for itself.)
 fn subsets(robots: &[String]) -> Vec<Vec<String>> {
     let mut subsets: Vec<Vec<String>> = (1..(1usize << robots.len()) - 1)
