@@ -118,7 +118,7 @@ fn listed(list: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_test_that_waits_is_run_under_load() {
+fn every_waiting_test_is_in_the_list() {
     let listed = listed(include_str!("../steady.txt"));
     let targets = targets();
     assert!(targets.len() > 30 && listed.len() >= 5);
@@ -134,7 +134,7 @@ fn every_test_that_waits_is_run_under_load() {
 }
 
 #[test]
-fn waiting_is_seen_in_code_alone() {
+fn waiting_in_comments_is_ignored() {
     assert!(waits("    std::thread::sleep(time);"));
     assert!(waits("let start = Instant::now();"));
     assert!(!waits("    // It may sleep(as it likes)."));

@@ -118,7 +118,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
         Command::Bounds(arguments) => bounds(arguments, files),
         Command::Inflation(arguments) => inflation(arguments, files),
-        Command::Outcomes(arguments) => look(arguments, files),
+        Command::Outcomes(arguments) => test_claim(arguments, files),
         Command::Check(arguments) => check::run(arguments, files),
         Command::Survey(arguments) => survey::run(arguments, files),
     }
@@ -179,7 +179,7 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         seed: arguments.seed,
         taken_with: arguments.taken_with.described(files)?,
     };
-    cut(&detections.runs, &name);
+    warn_of_cut_runs(&detections.runs, &name);
     let bar = indicatif::ProgressBar::new_spinner().with_message("fitting");
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let model = learn_bounds(&detections, &settings).map_err(refused);
@@ -197,8 +197,8 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
-/// Warns of rows at video rate without names of runs.
-fn cut(runs: &Runs, file: &str) {
+/// Warns of rows at video rate without names of runs, which are cut into runs.
+fn warn_of_cut_runs(runs: &Runs, file: &str) {
     if let RunSource::Gaps { step_s, gap_s } = runs.source {
         warn(&format_args!(
             "{file}: no column `run`, and rows follow each other within {step_s:.3} s: such rows depend on each other. They are cut into {} runs \
@@ -360,14 +360,14 @@ fn source(model: &InflationModel) -> Result<(), Failure> {
         "on the controller: inflation {own:.6}{}",
         ages.concat()
     ))?;
-    match begins_late(model) {
+    match young_age_warning(model) {
         Some(late) => print(&late),
         None => Ok(()),
     }
 }
 
-/// Returns why a model by age has no smaller factors for young estimates, if so.
-pub fn begins_late(model: &InflationModel) -> Option<String> {
+/// Returns a warning if a model by age has no smaller factors for young estimates.
+pub fn young_age_warning(model: &InflationModel) -> Option<String> {
     let late = model.begins_late()?;
     Some(format!(
         "the data begin {late} s after a fix: only data from at most 0.064 s on give smaller factors by age"
@@ -412,7 +412,7 @@ fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
     })
 }
 
-fn look(arguments: &Outcomes, files: &Files) -> Outcome {
+fn test_claim(arguments: &Outcomes, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.outcomes)?;
     let fleet = outcomes(&bytes, &name).map_err(refused)?;
     let found = test_outcomes(&fleet, arguments.epsilon, arguments.alpha).map_err(refused)?;

@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 /// --candidates is tried. Exit code 1 if no place sees the tag, or if no place satisfies the objective.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --wall north --objective contained-cost --reserve 0.01,0.5\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error beyond the reserve, the same number of centimetres and of degrees). The expected cost is that of the planned place; margins hold for every place within --reserve."
+    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --wall north --objective contained-cost --reserve 0.01,0.5\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] if the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error beyond the reserve, the same number of centimetres and of degrees). The expected cost is that of the planned place; margins hold for every place within --reserve."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
@@ -221,7 +221,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         ))?;
     }
     if !serves {
-        warn(&why_not(arguments, &found.best));
+        warn(&unmet_objective(arguments, &found.best));
     } else if let Some(warning) = error_of_reserve(&site, &order, &found.best) {
         warn(&warning);
     }
@@ -238,7 +238,7 @@ fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) ->
     let set = order.task.changed(best.pose, best.size, Some(best.reserve));
     let warning = stated_error(&set.shape, task.error_bound?, name)?;
     Some(format!(
-        "if the tag is off by the reserve and the site file still has the place above, so is every pose that it gives. {}: {}; survey the tag after mounting, and write its `pose` and `tolerance` into the site file",
+        "if the tag is off by the reserve and the site file keeps the pose above, every pose from it is off, too. {}: {}; survey the tag after mounting, and write its `pose` and `tolerance` into the site file",
         warning.about, warning.message
     ))
 }
@@ -252,7 +252,7 @@ fn restarts(found: &Placement) -> Result<(), Failure> {
     let same = means.iter().filter(|mean| **mean <= 1.01 * best).count();
     let worst = means.iter().copied().fold(best, f64::max);
     print(&format_args!(
-        "{} different ends of the search's starts: mean costs from {best:.6} to {worst:.6}, {same} of them within 1 % of the best",
+        "{} different results of the restarts: mean costs from {best:.6} to {worst:.6}, {same} of them within 1 % of the best",
         means.len()
     ))
 }
@@ -360,7 +360,7 @@ fn serves(objective: Objective, placed: &Placed) -> bool {
     }
 }
 
-fn why_not(arguments: &Arguments, placed: &Placed) -> String {
+fn unmet_objective(arguments: &Arguments, placed: &Placed) -> String {
     let pose = placed.pose;
     let at = format!(
         "the nearest is x {:.3}, y {:.3}, z {:.3}, yaw {:.1} deg",
@@ -368,13 +368,13 @@ fn why_not(arguments: &Arguments, placed: &Placed) -> String {
     );
     if placed.p_miss >= 1.0 {
         format!(
-            "from no place looked at is the tag seen from task `{}`'s pose-set; {at}",
+            "at no evaluated place is the tag seen from task `{}`'s pose-set; {at}",
             arguments.task
         )
     } else {
         let margin = placed.margin.unwrap_or(0.0);
         format!(
-            "at no place looked at does the success set hold the pose-set; {at}, with a margin of {margin:.4} for a tag within the --reserve"
+            "no evaluated place has the pose-set inside the success set; {at}, with a margin of {margin:.4} for a tag within the --reserve"
         )
     }
 }
@@ -580,7 +580,7 @@ fn compared(
         }
     }
     if !serves {
-        warn(&why_not(arguments, &placed[best]));
+        warn(&unmet_objective(arguments, &placed[best]));
     }
     Ok(answer(serves))
 }

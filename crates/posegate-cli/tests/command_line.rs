@@ -195,9 +195,9 @@ fn epsilon_option_changes_the_verdict() {
 fn changed(from: &str, to: &str) -> String {
     let mut done = false;
     let lines = SAMPLE.lines().map(|line| {
-        let is_it = !done && line.split('#').next().unwrap_or("").contains(from);
-        done |= is_it;
-        if is_it {
+        let is_changed = !done && line.split('#').next().unwrap_or("").contains(from);
+        done |= is_changed;
+        if is_changed {
             line.replacen(from, to, 1)
         } else {
             line.to_string()

@@ -124,7 +124,7 @@ fn check_numbers(numbers: &Value, out: &Path) {
         assert_eq!(answer["reason"].is_null(), *inside, "{answer}");
         assert_eq!(answer["worst_pose"].is_null(), *inside, "{answer}");
         assert_eq!(margin >= 1.0, *inside, "{answer}");
-        // Sound: never above the true scale. Tight: not far below.
+        // Sound: at most the true scale. Tight: not far below it.
         assert!(margin <= *scale && margin >= 0.9 * scale, "{answer}");
     }
     assert_eq!(numbers["chain"]["holds"], true);
@@ -171,7 +171,7 @@ fn check_figures(out: &Path, numbers: &Value) {
     assert_eq!(places.len(), 4);
     let mean = |index: usize| places[index]["mean"].as_f64().unwrap();
     let margin = |index: usize| places[index]["margin"].as_f64().unwrap();
-    // The start is on the border of sight; the search makes it better, and better still if some poses may miss the tag.
+    // The start is on the border of sight. The search improves it, and more so if some poses may miss the tag.
     assert!(margin(0) < 0.3 && margin(0) > 0.0);
     assert!(mean(2) <= mean(3) && mean(3) < 0.01 * mean(0));
     assert!(margin(3) >= 1.0 && places[3]["contained"] == true);

@@ -123,7 +123,7 @@ fn no_output_file_replaces_an_input() {
     assert!(pairs > 60, "{pairs}");
 }
 
-/// An input that is given through a link is protected as the file that the link leads to.
+/// An input through a link is protected like the target of the link.
 #[test]
 fn input_through_a_link_is_not_replaced() {
     let folder = Folder::new();
@@ -320,7 +320,7 @@ fn redirected_input_is_not_replaced() {
     assert!(!String::from_utf8_lossy(&done.stderr).contains("same file"));
 }
 
-/// `seal` works in place without -o; -o with the same file is a mistake and is refused.
+/// `seal` works in place without -o. An -o with the same file is refused.
 #[test]
 fn seal_replaces_its_input_only_without_output_option() {
     let folder = Folder::new();

@@ -71,9 +71,9 @@ fn page_shows_every_task_and_fetches_nothing() {
 
 #[test]
 fn names_are_escaped_in_the_page() {
-    let nasty = "</script><b id='x'>{{core}}&\\\"";
-    let text = SAMPLE.replace("[task.dock]", &format!("[task.\"{nasty}\"]"));
-    let text = text.replace("task = \"dock\"", &format!("task = \"{nasty}\""));
+    let hostile = "</script><b id='x'>{{core}}&\\\"";
+    let text = SAMPLE.replace("[task.dock]", &format!("[task.\"{hostile}\"]"));
+    let text = text.replace("task = \"dock\"", &format!("task = \"{hostile}\""));
     let page = made(&text, |order| order.title = "a</title><i>{{data}}".into()).expect("a page");
     assert!(!page.contains("<b id") && !page.contains("<i>"));
     assert_eq!(page.matches("class Core").count(), 1);

@@ -359,7 +359,7 @@ fn tag_is_placed_on_the_wall_and_outside_the_door() {
     let none = run(&far, &place("0.1", "--wall north --budget 300"));
     assert_eq!(none.code, 1, "{}", none.err);
     assert!(
-        none.err.contains("from no place looked at is the tag seen"),
+        none.err.contains("at no evaluated place is the tag seen"),
         "{}",
         none.err
     );

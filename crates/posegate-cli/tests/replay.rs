@@ -315,7 +315,7 @@ fn faulty_messages_are_counted_and_denied() {
     for (row, (_, fault)) in rows.iter().zip(&poses) {
         match *fault {
             None => assert_eq!(row["verdict"], "permit", "{row}"),
-            // The single estimates are good; the gate denies them because of earlier ones.
+            // Each estimate alone is good. The gate denies them because of earlier ones.
             Some("repeated stamp" | "backwards") => {
                 assert_eq!(row["verdict"], "permit");
                 assert_eq!(row["gate_reason"], "time_backwards", "{row}");

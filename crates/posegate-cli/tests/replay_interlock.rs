@@ -116,7 +116,7 @@ fn moving_robot_is_denied_where_a_still_robot_is_permitted() {
     let moving = replay(&near, &format!("{long} --max-speed 0.3 --max-yaw-rate 10"));
     assert_eq!(openings(&moving), 0);
     assert_eq!(moving["reasons"]["not_contained"], 100);
-    let amid = every(0.02, 100, 0.0);
-    let moving = replay(&amid, "--max-speed 0.2 --max-yaw-rate 5");
+    let centred = every(0.02, 100, 0.0);
+    let moving = replay(&centred, "--max-speed 0.2 --max-yaw-rate 5");
     assert!(openings(&moving) > 0);
 }

@@ -202,7 +202,7 @@ fn goal_outside_of_all_regions_is_valid() {
     );
     let table = table([-2.1, 2.1], [-1.1, 1.1], [-10.0, 10.0], [0.1, 5.0]);
     assert_eq!(built(&site(&set, 30.0, &table)), [0; 4]);
-    // The answer about a pose names no obstacle, either.
+    // The answer about a pose names no obstacle either.
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("site.toml"), site(&set, 0.0, &table)).unwrap();
     std::fs::write(

@@ -190,14 +190,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_commands_that_install_are_left_to_this_job() {
+    fn only_installing_commands_are_left_to_this_job() {
         assert!(installs("sudo dpkg -i posegate_0.1.0-1_amd64.deb"));
         assert!(installs("pip install posegate-0.1.0-*.whl"));
         assert!(!installs("posegate demo -o x") && !installs("pip install maturin"));
     }
 
     #[test]
-    fn a_release_whose_bytes_differ_is_refused() {
+    fn release_with_differing_bytes_is_refused() {
         let folders = [Scratch::new().unwrap(), Scratch::new().unwrap()];
         for (folder, text) in folders.iter().zip(["one", "two"]) {
             files::write(folder.join("same"), "x").unwrap();
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_with_other_files_is_not_emptied() {
+    fn folder_with_other_files_is_not_emptied() {
         let folder = Scratch::new().unwrap();
         files::write(folder.join("mine"), "x").unwrap();
         assert!(clear(folder.path()).is_err());

@@ -107,7 +107,7 @@ mod tests {
     use super::number_after;
 
     #[test]
-    fn last_number_counts() {
+    fn last_number_is_returned() {
         let log = "#2 INITED cov: 31 ft: 32\n#9 NEW    cov: 903 ft: 4 corp: 2\nstat::number_of_executed_units: 12345\n";
         assert_eq!(number_after(log, " cov: "), 903);
         assert_eq!(number_after(log, "stat::number_of_executed_units:"), 12_345);

@@ -93,14 +93,14 @@ impl Run {
         cmd(words).env("SLURM_CONF", self.path("slurm.conf"))
     }
 
-    fn wait(&self, what: &str, mut is_so: impl FnMut() -> Result<bool>) -> Result {
+    fn wait(&self, what: &str, mut is_done: impl FnMut() -> Result<bool>) -> Result {
         let start = Instant::now();
-        while !is_so()? {
+        while !is_done()? {
             if start.elapsed() > PATIENCE {
                 // Only for the log, because the wait has failed already.
                 let _ = self.slurm("squeue").code();
                 let _ = self.slurm("sinfo -N -l").code();
-                return Err(format!("slurm: waited in vain for {what}").into());
+                return Err(format!("slurm: timeout while waiting for {what}").into());
             }
             std::thread::sleep(Duration::from_millis(500));
         }
@@ -295,7 +295,10 @@ impl Run {
         let kept = kept(&files::read(&log)?)
             .ok_or("slurm: the log of the killed shard has no \"kept\"")?;
         report.note("slurm: of them of the killed shard", kept, "pieces");
-        report.require(kept > 0, "slurm: the killed shard had finished nothing, and so had nothing to lose: give it more endpoints");
+        report.require(
+            kept > 0,
+            "slurm: the killed shard had finished no piece: give more endpoints",
+        );
         Ok(())
     }
 }

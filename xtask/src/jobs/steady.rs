@@ -93,10 +93,10 @@ fn build<'a>(entries: &[Entry<'a>]) -> Result<BTreeMap<(&'a str, &'a str), Progr
             let folder = Path::new(manifest).parent().unwrap_or(Path::new("."));
             // A package has the name of its folder; only tests of other crates than the root's are listed.
             let package = files::name(folder);
-            let is_it =
+            let is_entry =
                 |entry: &&&Entry| target["name"] == entry.target && package == entry.package;
             if target["kind"][0] == "test"
-                && let Some(entry) = built.iter().find(is_it)
+                && let Some(entry) = built.iter().find(is_entry)
             {
                 let program: Program = (executable.into(), folder.into());
                 programs.insert((entry.package, entry.target), program);

@@ -1,6 +1,6 @@
 //! `posegate learn check`: tests whether a learnt model still holds on new data.
 
-use super::{cut, refused};
+use super::{refused, warn_of_cut_runs};
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{
@@ -48,7 +48,7 @@ pub fn run(arguments: &Check, files: &Files) -> Outcome {
     };
     let (bytes, name) = files.read(&arguments.detections)?;
     let detections = Detections::read(&bytes, &name).map_err(refused)?;
-    cut(&detections.runs, &name);
+    warn_of_cut_runs(&detections.runs, &name);
     let settings = CheckSettings {
         confidence: arguments.confidence,
     };

@@ -3,7 +3,7 @@
 use super::arguments::{Arguments, Kind};
 use super::parameter;
 use crate::door::{Failure, warn};
-use crate::learn::{begins_late, refused};
+use crate::learn::{refused, young_age_warning};
 use posegate::confidence::radius_squared;
 use posegate::gate::InvalidParameter;
 use posegate::set::{Aging, Inflation, RadiusSquared};
@@ -68,7 +68,7 @@ impl Inflated {
                 "learn it from more rows, or with a smaller --epsilon or --confidence",
             )
         })?;
-        if let Some(late) = begins_late(&model) {
+        if let Some(late) = young_age_warning(&model) {
             warn(&format_args!("{name}: {late}"));
         }
         let column = (factors.aging != Aging::NONE).then(|| model.condition().to_owned());

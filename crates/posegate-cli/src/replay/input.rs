@@ -173,7 +173,7 @@ fn truth(
         if arguments.topic.contains(&topic) {
             return Err(Failure::usage(
                 format!("--truth {topic} is a topic of estimates too"),
-                "an estimate is always right about itself: name another topic",
+                "estimates cannot be their own truth: name another topic",
             ));
         }
         let track = Trajectory::new(MOST_TRUE, arguments.truth_gap);

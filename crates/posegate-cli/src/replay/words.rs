@@ -78,7 +78,7 @@ pub fn check_requested(
                 "{name} has no topic{missing}; its other topics:{}",
                 topics(diagnostics)
             ),
-            "leave it out, or name one that is there",
+            "leave it out, or name an existing topic",
         ));
     }
     let [(_, verdicts), ..] = replay.tallies();

@@ -25,7 +25,7 @@ fn answered(folder: &Folder, arguments: &str) -> Run {
         run.end,
         run.mib,
         run.seconds,
-        run.said
+        run.stderr
     );
     run
 }
@@ -37,7 +37,7 @@ fn replayed(bytes: &[u8]) -> Result<serde_json::Value, String> {
     let rest = "--task dock --topic /amcl_pose --cross-terms yaw-unknown";
     let run = answered(&folder, &format!("replay dock.toml a.mcap {rest} --json"));
     if run.end == End::Exit(2) {
-        return Err(words(&run.said));
+        return Err(words(&run.stderr));
     }
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_posegate"))
         .args(format!("replay dock.toml a.mcap {rest} --json").split(' '))
@@ -255,7 +255,7 @@ fn endless_input_is_refused() {
         "plan docks.toml --to dock-1 --costs /dev/zero",
     ] {
         let run = answered(&folder, arguments);
-        assert_eq!(run.end, End::Exit(2), "{arguments}: {}", run.said);
+        assert_eq!(run.end, End::Exit(2), "{arguments}: {}", run.stderr);
         tried += 1;
     }
     assert_eq!(tried, 18);
@@ -276,11 +276,11 @@ fn endless_input_is_refused() {
                 .replace("mutant.toml", name);
             std::fs::write(folder.path("endless.toml"), text).unwrap();
             let run = answered(&folder, "check endless.toml");
-            assert_eq!(run.end, End::Exit(2), "{site} {end}: {}", run.said);
+            assert_eq!(run.end, End::Exit(2), "{site} {end}: {}", run.stderr);
             assert!(
-                words(&run.said).contains("regular file"),
+                words(&run.stderr).contains("regular file"),
                 "{site} {end}: {}",
-                run.said
+                run.stderr
             );
         }
     }
@@ -331,7 +331,7 @@ fn map_is_read_in_linear_time() {
         assert!(
             matches!(run.end, End::Exit(0 | 2)),
             "{arguments}: {}",
-            run.said
+            run.stderr
         );
     }
 }
@@ -375,14 +375,14 @@ fn polygon_with_too_many_corners_is_refused() {
     ] {
         std::fs::write(folder.path("polygons.toml"), site(&success)).unwrap();
         let run = answered(&folder, "check polygons.toml");
-        assert_eq!(run.end, End::Exit(code), "{}", run.said);
+        assert_eq!(run.end, End::Exit(code), "{}", run.stderr);
         if code == 2 {
-            assert!(words(&run.said).contains(" corners"), "{}", run.said);
+            assert!(words(&run.stderr).contains(" corners"), "{}", run.stderr);
         }
     }
     let run = answered(
         &folder,
         "table build polygons.toml --task dock -o out.posegate",
     );
-    assert_ne!(run.end, End::Exit(3), "{}", run.said);
+    assert_ne!(run.end, End::Exit(3), "{}", run.stderr);
 }

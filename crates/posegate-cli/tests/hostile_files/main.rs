@@ -15,7 +15,7 @@ mod mutate;
 
 use chance::Chance;
 use child::{End, MOST_MIB, MOST_SECONDS, Run, run};
-use formats::{BESIDE, Format, SITES};
+use formats::{COMPANIONS, Format, SITES};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -45,9 +45,9 @@ impl Tally {
         self.mib = self.mib.max(run.mib);
         self.seconds = self.seconds.max(run.seconds);
         if !run.is_good() {
-            let said: String = run.said.chars().take(300).collect();
+            let stderr: String = run.stderr.chars().take(300).collect();
             let line = format!(
-                "{:?}, {} MiB, {:.1} s: {}: {said}",
+                "{:?}, {} MiB, {:.1} s: {}: {stderr}",
                 run.end,
                 run.mib,
                 run.seconds,
@@ -101,9 +101,9 @@ struct Folder(tempfile::TempDir);
 impl Folder {
     fn new(from: Option<&Path>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let beside = BESIDE.iter().copied();
+        let companions = COMPANIONS.iter().copied();
         let sites = SITES.iter().map(|(name, text)| (*name, text.as_bytes()));
-        for (name, bytes) in beside.chain(sites) {
+        for (name, bytes) in companions.chain(sites) {
             std::fs::write(folder.path().join(name), bytes).expect("a file");
         }
         std::fs::write(folder.path().join("trajectory.txt"), formats::tum()).expect("a file");
@@ -187,7 +187,7 @@ fn trial(
         .collect();
     let run = run(own.0.path(), &arguments);
     tally.lock().expect("a tally").note(&run, || {
-        let kept = kept(
+        let kept = keep(
             &format!("{}-{index}", format.name.replace(' ', "-")),
             &file,
             &mutant,
@@ -197,7 +197,7 @@ fn trial(
 }
 
 /// Keeps a file that failed. Returns its path.
-fn kept(name: &str, file: &str, bytes: &[u8]) -> String {
+fn keep(name: &str, file: &str, bytes: &[u8]) -> String {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hostile");
     std::fs::create_dir_all(&folder).expect("a folder");
     let end = Path::new(file)
@@ -242,7 +242,7 @@ fn flips(bag: &[u8], count: usize, seed: u64, made: &Folder) -> Tally {
         tally.lock().expect("a tally").note(&run, || {
             format!(
                 "bit {bit}, {}",
-                kept(&format!("bit-{bit}"), "f.mcap", &flipped)
+                keep(&format!("bit-{bit}"), "f.mcap", &flipped)
             )
         });
     });

@@ -1,9 +1,9 @@
 //! The error bound of a look holds for all true places of tag and camera within their tolerances.
 //!
 //! `nature.rs` displaces both to the ends of the tolerances, with the largest errors of the detector's error model. It
-//! computes the robot's pose from the places in the site file. It shares no code with the crate. At no pose of a success
-//! set S_l(r), and in no look of a chain or a plan, may the error exceed the bound. The bound is not much larger than the
-//! largest error that is found.
+//! computes the robot's pose from the places in the site file. It shares no code with the crate. The error must not
+//! exceed the bound at any pose of a success set S_l(r), nor in any look of a chain or a plan. The bound is not much
+//! larger than the largest error that is found.
 
 mod nature;
 
@@ -188,7 +188,7 @@ fn random_world(random: &mut Random) -> World {
     }
 }
 
-/// At no pose of S_l(r) does the error exceed r, for stated and learnt error models.
+/// The error is at most r at every pose of S_l(r), for stated and learnt error models.
 #[test]
 fn error_is_within_r_at_every_pose_of_the_success_set() {
     let folder = folder();

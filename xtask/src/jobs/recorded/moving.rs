@@ -259,7 +259,7 @@ mod tests {
     use super::Drive;
 
     #[test]
-    fn a_drive_has_fixes_where_a_landmark_was_seen_and_odometry_in_equal_parts() {
+    fn drive_has_fixes_at_landmarks_and_odometry_in_equal_parts() {
         let text = "robot,t_s,x_m,y_m,yaw_rad,true_x_m,true_y_m,true_yaw_rad,since_landmark_s\n\
                     1,1.0,0,0,3.1,0,0,3,0.5\n2,1.0,9,9,9,9,9,9,0\n1,1.2,0.1,0,-3.1,0.2,0,-3,0.7\n1,1.25,0.1,0,-3.1,0.2,0,-3,0.01\n";
         let drive = Drive::of(text, 1).unwrap();

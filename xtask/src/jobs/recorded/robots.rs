@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_factor_counts_and_a_missing_one_is_none() {
+    fn largest_factor_is_returned_and_missing_factors_give_none() {
         let of = |overall: Value, part: Value| {
             largest(
                 &json!({"overall": {"inflation": overall}, "conditions": [{"inflation": 2.0}, {"inflation": part}]}),
