@@ -434,7 +434,7 @@ mod tests {
 
     /// The package of the C boundary is built by itself with the profile of the workspace.
     #[test]
-    fn profile_of_the_boundary_is_the_workspaces() {
+    fn profile_of_the_boundary_equals_that_of_the_workspace() {
         let profile = |path: &str| -> String {
             let text = files::read(files::root().join(path)).unwrap();
             let (_, rest) = text.split_once("[profile.firmware]\n").unwrap();

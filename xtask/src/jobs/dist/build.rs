@@ -242,7 +242,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_in_a_file_is_found() {
+    fn path_in_a_file_is_found() {
         assert!(contains(
             b"\0/home/x/.cargo/registry/src/host/a.rs",
             b"registry/src/"

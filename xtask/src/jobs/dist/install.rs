@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_a_sum_is_found() {
+    fn file_without_a_sum_is_found() {
         let folder = Scratch::new().unwrap();
         files::write(folder.join("a.deb"), "x").unwrap();
         files::write(folder.join(SUMS), "00  b.deb\n").unwrap();
