@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn defaults_stand_for_missing_arguments() {
+    fn defaults_replace_missing_arguments() {
         let given = arguments(&["7", "x/y"], "[N [SEED]]").unwrap();
         assert_eq!(given.number(0, 3).unwrap(), 7);
         assert_eq!(given.number(2, 3).unwrap(), 3);

@@ -92,7 +92,7 @@ pub fn size(path: impl AsRef<Path>) -> Result<u64> {
     Ok(metadata.len())
 }
 
-/// Returns the files of a folder whose names end so, in order.
+/// Returns the files of a folder whose names end with `end`, in order.
 pub fn files_ending(folder: impl AsRef<Path>, end: &str) -> Result<Vec<PathBuf>> {
     let folder = folder.as_ref();
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
@@ -107,7 +107,7 @@ pub fn files_ending(folder: impl AsRef<Path>, end: &str) -> Result<Vec<PathBuf>>
     Ok(found)
 }
 
-/// Returns all files below a folder; none if there is no folder.
+/// Returns all files below a folder, or nothing if it does not exist.
 pub fn files_below(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_path_buf()];

@@ -88,7 +88,7 @@ const JOBS: &[Job] = &[
     job(
         "deep",
         "",
-        "in full, what the fast suite tries a part of",
+        "the full tests of which the fast suite runs a part",
         jobs::test::deep,
     ),
     job(
@@ -178,7 +178,7 @@ const JOBS: &[Job] = &[
     job(
         "steady",
         "[RUNS]",
-        "tests that wait or look at a clock, repeated idle and under load",
+        "tests that wait or read a clock, repeated idle and under load",
         jobs::steady::steady,
     ),
     job(
@@ -244,7 +244,7 @@ const JOBS: &[Job] = &[
     job(
         "flash",
         "",
-        "bytes of flash of a whole gate in C, by part, core and level of optimization, and of a decision",
+        "bytes of flash of a complete gate in C, by part, core and level of optimization, and of a decision",
         jobs::flash::flash,
     ),
     job(
@@ -292,13 +292,13 @@ const JOBS: &[Job] = &[
     job(
         "package",
         "[FOLDER]",
-        "the crates as a stranger gets them: contents, installation, firmware",
+        "the crates as a user gets them: contents, installation, firmware",
         jobs::package::package,
     ),
     job(
         "dist",
         "[FOLDER [BUILDS]]",
-        "the files of a release: built twice alike, installed into empty roots, and run there",
+        "the files of a release: built twice with equal bytes, installed into empty roots, and run there",
         jobs::dist::dist,
     ),
     job(

@@ -1,4 +1,4 @@
-//! Tools that jobs need and a machine may lack. They are installed, with a line that says so, or named with the command that
+//! Tools that jobs need and a machine may lack. They are installed, which is logged, or named with the command that
 //! installs them.
 
 use crate::files::target_folder;

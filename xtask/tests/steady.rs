@@ -1,4 +1,4 @@
-//! `cargo xtask steady` repeats tests that start an emulator, wait, or read a clock, idle and under load: every such test
+//! `cargo xtask steady` repeats tests that start an emulator, wait, or read a clock, idle and under load. Every such test
 //! target is in the list of that job, `xtask/steady.txt`.
 
 use std::collections::BTreeSet;
@@ -79,7 +79,7 @@ fn waits(text: &str) -> bool {
         .any(|line| WORDS.iter().any(|word| line.contains(word)))
 }
 
-/// Returns every test target of the workspace, as `PACKAGE:TARGET`, and whether it waits.
+/// Returns every test target of the workspace, as `PACKAGE:TARGET`, with `true` if it waits.
 fn targets() -> Vec<(String, bool)> {
     let mut folders = vec![("posegate".to_owned(), root().join("tests"))];
     for path in entries(&root().join("crates")) {
@@ -118,7 +118,7 @@ fn listed(list: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_test_that_waits_is_run_under_load() {
+fn every_waiting_test_is_in_the_list() {
     let listed = listed(include_str!("../steady.txt"));
     let targets = targets();
     assert!(targets.len() > 30 && listed.len() >= 5);
@@ -134,7 +134,7 @@ fn every_test_that_waits_is_run_under_load() {
 }
 
 #[test]
-fn waiting_is_seen_in_code_alone() {
+fn waiting_in_comments_is_ignored() {
     assert!(waits("    std::thread::sleep(time);"));
     assert!(waits("let start = Instant::now();"));
     assert!(!waits("    // It may sleep(as it likes)."));

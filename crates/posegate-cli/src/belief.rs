@@ -74,7 +74,7 @@ impl UncertaintyArgs {
         let (Some(x), Some(y), Some(yaw_deg)) = (self.sigma_x, self.sigma_y, self.sigma_yaw_deg)
         else {
             return Err(Failure::usage(
-                "it is not said how well the pose is known".into(),
+                "the uncertainty of the pose is missing".into(),
                 "give --sigma-x, --sigma-y and --sigma-yaw-deg, or a --covariance-file",
             ));
         };

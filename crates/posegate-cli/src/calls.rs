@@ -1,6 +1,6 @@
-//! What other languages call instead of a command line: the same reading, the same checks, the same words for an error.
+//! Entry points for other languages: the same reading, checks and error messages as the command line.
 //!
-//! The package `posegate-python` is made of these functions.
+//! The package `posegate-python` calls these functions.
 
 use crate::door;
 use crate::failure::Failure;
@@ -24,7 +24,7 @@ pub(crate) fn library() -> Option<&'static Path> {
     LIBRARY.get().map(AsRef::as_ref)
 }
 
-/// Why a call was refused: what the command line prints.
+/// The reason of a refused call, as the command line prints it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
     /// What is wrong, with its causes. Printable, on one line.
@@ -98,7 +98,7 @@ pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Refusal> {
     Ok(door::task(site, name)?)
 }
 
-/// Makes the table of a task and proves it; `path` is the site's name in messages.
+/// Builds and proves the table of a task; `path` is the site's name in messages.
 ///
 /// # Errors
 /// The task does not exist, or its set gives no table that can be proven.

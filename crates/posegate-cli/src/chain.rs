@@ -57,9 +57,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         files.write(path, picture.as_bytes())?;
     }
     if arguments.json {
-        let mut whole = report.to_json();
-        whole["chain"] = json!(arguments.name);
-        print_json(&whole)?;
+        let mut line = report.to_json();
+        line["chain"] = json!(arguments.name);
+        print_json(&line)?;
     } else {
         for line in sentences(&report) {
             print(&line)?;
@@ -71,7 +71,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
 /// Returns the failure for a chain that cannot be evaluated: bad input.
 pub fn failure(site: &Input, error: PlanError) -> Failure {
     let help = match &error {
-        PlanError::Table { .. } => "see the task's success set; `posegate table build` says more",
+        PlanError::Table { .. } => {
+            "see the task's success set; `posegate table build` gives the reason"
+        }
         PlanError::Unbounded(_) => {
             "write task.NAME.table = { extent = {...} }: the poses that the table covers"
         }
@@ -94,7 +96,7 @@ pub fn sentences(report: &ChainReport) -> Vec<String> {
             (None, _) => "navigate".into(),
         };
         let [translation, yaw] = step.after.enclosing();
-        let room = match (step.failure, step.margin) {
+        let margin_text = match (step.failure, step.margin) {
             (None, Some(margin)) => format!(", inside with margin {}", factor_text(margin)),
             (Some(failure), Some(margin)) => {
                 format!(", FAILS ({failure}), margin {}", factor_text(margin))
@@ -103,7 +105,7 @@ pub fn sentences(report: &ChainReport) -> Vec<String> {
             (None, None) => String::new(),
         };
         lines.push(format!(
-            "{}. {name}{room}; then within {translation:.4} m, {:.3} deg of the estimate",
+            "{}. {name}{margin_text}; then within {translation:.4} m, {:.3} deg of the estimate",
             index + 1,
             yaw.to_degrees()
         ));

@@ -83,10 +83,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             print(&format_args!("  {name}: {shape}{table}"))?;
         }
         // The candidates of one row have one line and, often, one warning.
-        let alike = |a: &Warning, b: &Warning| {
+        let same_cause = |a: &Warning, b: &Warning| {
             (a.code, &a.message, a.line(&text)) == (b.code, &b.message, b.line(&text))
         };
-        for group in warnings.chunk_by(alike) {
+        for group in warnings.chunk_by(same_cause) {
             let [warning, others @ ..] = group else {
                 continue;
             };

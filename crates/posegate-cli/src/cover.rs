@@ -42,8 +42,8 @@ pub struct Arguments {
     /// Stop when the proven bound is below the cost by at most this share of the cost
     #[arg(long, default_value_t = 0.05)]
     gap: f64,
-    /// Stop after this many seconds and report the best choice so far with its proven bound and gap, but no sooner than the
-    /// greedy choice is complete (by default there is no limit)
+    /// Stop after this many seconds, but not before the greedy choice is complete. Report the best choice so far with its
+    /// proven bound and gap [default: no limit]
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
     /// Look at tags only from places within this distance of the straight line from start to goal, in metres
@@ -107,10 +107,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     let wrong = |error| failure(&arguments.site, error);
     let interrupt = Interrupt::new();
-    let searched = with_bars(|tick, say| {
+    let searched = with_bars(|tick, show| {
         let improved = |incumbent: Incumbent| {
             interrupt.has_answer.store(true, Ordering::Relaxed);
-            say(&progress_line(&incumbent));
+            show(&progress_line(&incumbent));
         };
         let watch = Watch {
             tick,
@@ -122,14 +122,14 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let mut found = searched.map_err(wrong)?;
     if let (Some(reach), true) = (arguments.polish, found.serves_all()) {
         let polish =
-            |tick: Tick<'_>, _: Say<'_>| polished(&text, &name, &found, &order, reach, tick);
+            |tick: Tick<'_>, _: ShowLine<'_>| polished(&text, &name, &found, &order, reach, tick);
         found = with_bars(polish)
             .map_err(wrong)?
             .ok_or_else(|| unread(&name, &name))?;
     }
     if let (Some(path), true) = (&arguments.output, found.serves_all()) {
-        let beside = path.display().to_string();
-        let text = written(&text, &beside, &found).ok_or_else(|| unread(&name, &beside))?;
+        let target = path.display().to_string();
+        let text = written(&text, &target, &found).ok_or_else(|| unread(&name, &target))?;
         files.write(path, text.as_bytes())?;
     }
     if let (Some(path), true) = (&arguments.sheet, found.serves_all()) {
@@ -144,7 +144,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if arguments.json {
         print_json(&found.to_json())?;
     } else {
-        tell(&found, &site)?;
+        print_cover(&found, &site)?;
     }
     Ok(answer(found.serves_all()))
 }
@@ -161,10 +161,10 @@ fn mounted(found: &Cover) -> Vec<Mounted> {
     found.tags.iter().map(mounted).collect()
 }
 
-fn unread(name: &str, beside: &str) -> Failure {
+fn unread(name: &str, target: &str) -> Failure {
     Failure::usage(
         format!(
-            "{name}: the candidates cannot be removed from the file's text, or it names files that are not in the folder of {beside}"
+            "{name}: the candidates cannot be removed from the file's text, or it names files that are not in the folder of {target}"
         ),
         "write each candidate as a [candidate.NAME] or [candidates.NAME] table, and the output into the same folder",
     )
@@ -174,7 +174,7 @@ fn unread(name: &str, beside: &str) -> Failure {
 type Tick<'a> = &'a (dyn Fn(Stage, Option<usize>) + Sync);
 
 /// Shows a line of text.
-type Say<'a> = &'a (dyn Fn(&str) + Sync);
+type ShowLine<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// What Ctrl-C does: the first one ends the search if it has an answer, else the program.
 struct Interrupt {
@@ -192,7 +192,7 @@ impl Interrupt {
             Arc::new(AtomicBool::new(false)),
         );
         let (asked, known) = (stop.clone(), has_answer.clone());
-        // Without a handler Ctrl-C ends the program at once, as ever.
+        // Without a handler Ctrl-C ends the program at once, as usual.
         let _ = ctrlc::set_handler(move || {
             if asked.swap(true, Ordering::Relaxed) || !known.load(Ordering::Relaxed) {
                 std::process::exit(Self::INTERRUPTED);
@@ -215,10 +215,10 @@ fn progress_line(incumbent: &Incumbent) -> String {
 
 /// Runs `work` with one progress bar per stage, or a line of text if stderr is not a terminal.
 fn with_bars<T>(
-    work: impl FnOnce(Tick<'_>, Say<'_>) -> Result<T, CoverError>,
+    work: impl FnOnce(Tick<'_>, ShowLine<'_>) -> Result<T, CoverError>,
 ) -> Result<T, CoverError> {
     let is_seen = std::io::stderr().is_terminal();
-    let said: Mutex<String> = Mutex::default();
+    let message: Mutex<String> = Mutex::default();
     let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
     let tick = |stage: Stage, of: Option<usize>| {
         let Ok(mut shown) = shown.lock() else {
@@ -238,20 +238,20 @@ fn with_bars<T>(
             *shown = Some((stage, progress(of.unwrap_or(0) as u64, what)));
         }
         if let Some((_, bar)) = shown.as_ref() {
-            if let (Stage::Rounds, Ok(said)) = (stage, said.lock()) {
-                bar.set_message(said.clone());
+            if let (Stage::Rounds, Ok(message)) = (stage, message.lock()) {
+                bar.set_message(message.clone());
             }
             bar.inc(1);
         }
     };
-    let say = |line: &str| {
+    let show = |line: &str| {
         if !is_seen {
             warn(&line);
-        } else if let Ok(mut said) = said.lock() {
-            line.clone_into(&mut said);
+        } else if let Ok(mut message) = message.lock() {
+            line.clone_into(&mut message);
         }
     };
-    let found = work(&tick, &say);
+    let found = work(&tick, &show);
     if let Ok(mut shown) = shown.lock()
         && let Some((_, bar)) = shown.take()
     {
@@ -276,7 +276,7 @@ fn failure(path: &Input, error: CoverError) -> Failure {
     Failure::usage(format!("{}: {error}", path.display()), help)
 }
 
-fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
+fn print_cover(found: &Cover, site: &Site) -> Result<(), Failure> {
     for chosen in &found.tags {
         let pose = chosen.tag.tag.pose;
         let mut line = format!(
@@ -304,7 +304,7 @@ fn tell(found: &Cover, site: &Site) -> Result<(), Failure> {
         }
         for (what, tasks) in [
             ("without it no plan for", &chosen.needed_by),
-            ("without it no second way for", &chosen.second_of),
+            ("without it no second plan for", &chosen.second_of),
         ] {
             if !tasks.is_empty() {
                 line += &format!("; {what} {}", tasks.join(", "));

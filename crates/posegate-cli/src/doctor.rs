@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         facts["pictures"] = json!(names);
         print_json(&facts)?;
     } else {
-        tell(&findings)?;
+        print_findings(&findings)?;
         print(&format_args!(
             "{} pictures in {}",
             written.len(),
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     Ok(answer(!empty))
 }
 
-fn tell(findings: &Findings) -> Result<(), Failure> {
+fn print_findings(findings: &Findings) -> Result<(), Failure> {
     let wide = |names: &mut dyn Iterator<Item = usize>| names.max().unwrap_or(0);
     let names = wide(&mut findings.tags.iter().map(|tag| tag.name.chars().count())).max(4);
     print(&format_args!(

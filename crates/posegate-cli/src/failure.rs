@@ -96,7 +96,7 @@ impl Failure {
             error if error.is_internal() => Self::internal(error.to_string()),
             error => Self::usage(
                 format!("{}: task `{task}`: {error}", site.display()),
-                "the set is thinner there than a proof can tell: choose other steps or another extent in [table] or \
+                "the set is thinner there than a proof can resolve: choose other steps or another extent in [table] or \
                  task.NAME.table, or leave slivers out of the success set",
             ),
         }
@@ -104,8 +104,7 @@ impl Failure {
 
     /// An internal error: exit code 3.
     pub fn internal(message: String) -> Self {
-        let help =
-            "this is a fault of posegate, not of the input: please report it with the site file";
+        let help = "this is an internal error of posegate: please report it with the site file";
         Self::of(3, Shown::new(&message).help(help))
     }
 
@@ -256,7 +255,7 @@ impl SourceCode for Place {
         after: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, miette::MietteError> {
         let part = self.excerpt.text.read_span(span, before, after)?;
-        // miette asks without lines around it for the place of the fault alone.
+        // miette asks for the place of the fault alone, without the lines around it.
         let column = match before {
             0 => self.column.saturating_sub(1),
             _ => part.column(),

@@ -157,7 +157,7 @@ fn movement(arguments: &Arguments) -> Result<Growth, Failure> {
 pub fn motion(speed: f64, rate: f64) -> Result<MotionBounds, Failure> {
     MotionBounds::new(speed, 0.0, rate.to_radians()).ok_or_else(|| {
         Failure::usage(
-            format!("--max-speed {speed} --max-yaw-rate {rate} are no speeds of a robot"),
+            format!("--max-speed {speed} --max-yaw-rate {rate} are not speeds of a robot"),
             "give numbers from 0 to 1000 m/s and from 0 to 1400 degrees/s",
         )
     })
@@ -191,7 +191,7 @@ fn judge(rows: &[Row], mut verdict: impl FnMut(&Row) -> Verdict) -> Decided {
             least = Some(decided);
         }
     }
-    // No report is empty.
+    // Reports are never empty.
     least.unwrap_or(Decided {
         verdict: Verdict::deny(Reason::CovarianceUnknown),
         hypothesis: None,

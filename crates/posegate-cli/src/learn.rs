@@ -76,8 +76,8 @@ pub struct Inflation {
     /// The model to write; `-` for standard output
     #[arg(short, long)]
     output: Output,
-    /// The probability, over the data, with which a condition's factor is large enough; with several robots or runs, the
-    /// probability with which it is large enough for a new one
+    /// The probability, over the data, with which a condition's factor is large enough. With several robots or runs:
+    /// large enough for a new one
     #[arg(long, default_value_t = InflationSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
     /// Learn factors for the robots (or runs) in the data alone, not for a new one
@@ -94,8 +94,8 @@ pub struct Inflation {
 /// Tests whether the outcomes of permitted dockings contradict the claim that they succeed with probability epsilon
 ///
 /// Exit code 1 if they do. The test may be run after every docking: its false alarms stay below alpha, whatever the results of
-/// earlier dockings. `lower` and `upper` limit the probability of success with confidence 1 - alpha at all of these looks together
-/// (a confidence sequence), if every docking succeeds with the same probability, independently of the others.
+/// earlier dockings. `lower` and `upper` limit the probability of success with confidence 1 - alpha in all of these tests together
+/// (a confidence sequence). This assumes that all dockings succeed with the same probability, independently of each other.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn outcomes outcomes.csv --epsilon 0.99 --json\n\nColumns: success (0 or 1); t_s if the rows are not in the order of time."
@@ -118,7 +118,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
         Command::Bounds(arguments) => bounds(arguments, files),
         Command::Inflation(arguments) => inflation(arguments, files),
-        Command::Outcomes(arguments) => look(arguments, files),
+        Command::Outcomes(arguments) => test_claim(arguments, files),
         Command::Check(arguments) => check::run(arguments, files),
         Command::Survey(arguments) => survey::run(arguments, files),
     }
@@ -179,7 +179,7 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         seed: arguments.seed,
         taken_with: arguments.taken_with.described(files)?,
     };
-    cut(&detections.runs, &name);
+    warn_of_cut_runs(&detections.runs, &name);
     let bar = indicatif::ProgressBar::new_spinner().with_message("fitting");
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let model = learn_bounds(&detections, &settings).map_err(refused);
@@ -190,15 +190,15 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         model.write().map_err(refused)?.as_bytes(),
     )?;
     if arguments.json {
-        print_json(&told(&model))?;
+        print_json(&model_json(&model))?;
     } else if !arguments.output.is_standard() {
-        tell(&model)?;
+        print_model(&model)?;
     }
     Ok(answer(true))
 }
 
-/// Warns of rows at video rate without names of runs.
-fn cut(runs: &Runs, file: &str) {
+/// Warns of rows at video rate without names of runs, which are cut into runs.
+fn warn_of_cut_runs(runs: &Runs, file: &str) {
     if let RunSource::Gaps { step_s, gap_s } = runs.source {
         warn(&format_args!(
             "{file}: no column `run`, and rows follow each other within {step_s:.3} s: such rows depend on each other. They are cut into {} runs \
@@ -208,7 +208,7 @@ fn cut(runs: &Runs, file: &str) {
     }
 }
 
-fn told(model: &ErrorModel) -> Value {
+fn model_json(model: &ErrorModel) -> Value {
     let (views, detections, flip_share) = model.counts();
     let regions = model.regions().map(|region| {
         let [d, phi, psi] = region.ends;
@@ -229,7 +229,7 @@ fn told(model: &ErrorModel) -> Value {
     })
 }
 
-fn tell(model: &ErrorModel) -> Result<(), Failure> {
+fn print_model(model: &ErrorModel) -> Result<(), Failure> {
     let (views, detections, flip_share) = model.counts();
     let [d, phi, psi] = model.reach();
     print(&format_args!(
@@ -249,7 +249,7 @@ fn tell(model: &ErrorModel) -> Result<(), Failure> {
     if let Some(runs) = model.runs() {
         let (rows, independent) = model.independent();
         print(&format_args!(
-            "{rows} rows of {runs} runs tell as much as {independent} independent ones"
+            "{rows} rows of {runs} runs count as {independent} independent rows"
         ))?;
     }
     print(&format_args!(
@@ -360,14 +360,14 @@ fn source(model: &InflationModel) -> Result<(), Failure> {
         "on the controller: inflation {own:.6}{}",
         ages.concat()
     ))?;
-    match begins_late(model) {
+    match young_age_warning(model) {
         Some(late) => print(&late),
         None => Ok(()),
     }
 }
 
-/// Returns why a model by age has no smaller factors for young estimates, if so.
-pub fn begins_late(model: &InflationModel) -> Option<String> {
+/// Returns a warning if a model by age has no smaller factors for young estimates.
+pub fn young_age_warning(model: &InflationModel) -> Option<String> {
     let late = model.begins_late()?;
     Some(format!(
         "the data begin {late} s after a fix: only data from at most 0.064 s on give smaller factors by age"
@@ -412,7 +412,7 @@ fn factors(model: &InflationModel, impossible: &[u64]) -> Value {
     })
 }
 
-fn look(arguments: &Outcomes, files: &Files) -> Outcome {
+fn test_claim(arguments: &Outcomes, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.outcomes)?;
     let fleet = outcomes(&bytes, &name).map_err(refused)?;
     let found = test_outcomes(&fleet, arguments.epsilon, arguments.alpha).map_err(refused)?;
@@ -435,11 +435,11 @@ fn look(arguments: &Outcomes, files: &Files) -> Outcome {
         ))?;
         match found.contradicted_at {
             Some(at) => print(&format_args!(
-                "the claim of {} is contradicted after {at} dockings (a bet against it stood at {:.3e})",
+                "the claim of {} is contradicted after {at} dockings (e-value {:.3e})",
                 arguments.epsilon, found.largest_e_value
             ))?,
             None => print(&format_args!(
-                "the claim of {} is not contradicted (the bet against it stands at {:.3})",
+                "the claim of {} is not contradicted (e-value {:.3})",
                 arguments.epsilon, found.e_value
             ))?,
         }

@@ -58,7 +58,7 @@ const THRESHOLDS: [[f64; 2]; 5] = [
     [0.3, 5.0],
 ];
 
-/// Which pairs of poses relative errors are computed of.
+/// The pairs of poses for which relative errors are computed.
 const PAIRS: [(&str, Pairs); 4] = [
     ("delta_1_frame", Pairs::Frames(1)),
     ("delta_10_frames", Pairs::Frames(10)),

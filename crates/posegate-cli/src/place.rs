@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 /// --candidates is tried. Exit code 1 if no place sees the tag, or if no place satisfies the objective.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --wall north --objective contained-cost --reserve 0.01,0.5\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] where the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error beyond the reserve, the same number of centimetres and of degrees). The expected cost is that of the planned place; margins hold for every place within --reserve."
+    after_help = "Example:\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --free x=0.3:7,y=-3:3,yaw_deg=0:360 --json\n  posegate place site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1 --wall north --objective contained-cost --reserve 0.01,0.5\n  posegate place site.toml --task see-t7 --exact --free x=0.3:7,z=0:2\n\nObjectives: cost (E[c]), contained-cost (E[c] if the whole pose-set is in S), margin (the largest pose-set that is in S), smallest-tag, tolerance (the largest installation error beyond the reserve, the same number of centimetres and of degrees). The expected cost is that of the planned place; margins hold for every place within --reserve."
 )]
 pub struct Arguments {
     /// The site file; `-` for standard input
@@ -41,8 +41,8 @@ pub struct Arguments {
     epsilon: Option<f64>,
     #[command(flatten)]
     weights: Weights,
-    /// Take the cost of a view from this [error_model] of the site, learnt or a formula, instead of c1, c2 and c3: 100 times the
-    /// bound in metres plus the bound in degrees, including the tolerances of tag and camera
+    /// Take the cost of a view from this [error_model] of the site instead of c1, c2 and c3. The cost is 100 times the bound in
+    /// metres plus the bound in degrees, including the tolerances of tag and camera
     #[arg(long)]
     error_model: Option<String>,
     /// Ranges of the tag's pose: x, y, z (m) and yaw_deg, such as x=0.3:7,y=-3:3,yaw_deg=0:360; on a wall only z
@@ -51,8 +51,8 @@ pub struct Arguments {
     /// Mount the tag flat on this wall of the site, on the goal's side
     #[arg(long)]
     wall: Option<String>,
-    /// How far off the installer may mount the tag, metres and degrees: the margin holds for every such error
-    /// [default: the tag's tolerance in the site, else 0.01,0.5]
+    /// Largest mounting error, metres and degrees: the margin holds for every such error [default: the tag's
+    /// tolerance in the site, else 0.01,0.5]
     #[arg(long, value_parser = reserve, value_name = "M,DEG", allow_hyphen_values = true)]
     reserve: Option<Tolerance>,
     /// Compare these places: a CSV of x, y, z, yaw_deg and optionally name, roll_deg, pitch_deg; `-` for standard input
@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let site = site(files, &arguments.site)?;
     let success = &task(&site, &arguments.task)?.success;
     let tag = chosen_tag(arguments, &site, &success.tags())?;
-    let to_hang = Task {
+    let moved_task = Task {
         reserve: arguments
             .reserve
             .unwrap_or_else(|| Task::usual_reserve(success, &tag)),
@@ -159,9 +159,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let cost = arguments.weights.cost();
     cost.check()
         .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;
-    let learnt = learnt(arguments, &site, cost.c_high, &to_hang)?;
+    let learnt = learnt(arguments, &site, cost.c_high, &moved_task)?;
     let order = PlacementProblem {
-        task: &to_hang,
+        task: &moved_task,
         known,
         cost: match &learnt {
             Some(learnt) => learnt,
@@ -172,7 +172,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if let Some(file) = &arguments.candidates {
         return compared(arguments, &site, &order, file, files);
     }
-    let space = space(arguments, &site, &to_hang)?;
+    let space = space(arguments, &site, &moved_task)?;
     let bar = progress(arguments.budget, "places");
     let optimizer = arguments.method.optimizer(arguments.budget);
     let (budget, seed) = (arguments.budget, arguments.seed);
@@ -193,18 +193,18 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     pictures(arguments, &site, &order, &before, &found, files)?;
     let serves = serves(arguments.objective, &found.best);
     if arguments.json {
-        let mut told = found.to_json();
-        told["task"] = json!(arguments.task);
-        told["site_digest"] = json!(site.digest_text());
-        told["before"] = before.map_or(Value::Null, |before| before.to_json());
-        print_json(&told)?;
+        let mut line = found.to_json();
+        line["task"] = json!(arguments.task);
+        line["site_digest"] = json!(site.digest_text());
+        line["before"] = before.map_or(Value::Null, |before| before.to_json());
+        print_json(&line)?;
     } else {
         if let Ok(before) = &before {
             print(&"before:")?;
-            tell(before)?;
+            print_placed(before)?;
             print(&"best:")?;
         }
-        tell(&found.best)?;
+        print_placed(&found.best)?;
         print(&format_args!(
             "in the site  {}",
             pose_line(&found.best.pose)
@@ -231,15 +231,15 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         ))?;
     }
     if !serves {
-        warn(&why_not(arguments, &found.best));
-    } else if let Some(told) = error_of_reserve(&site, &order, &found.best) {
-        warn(&told);
+        warn(&unmet_objective(arguments, &found.best));
+    } else if let Some(warning) = error_of_reserve(&site, &order, &found.best) {
+        warn(&warning);
     }
     Ok(answer(serves))
 }
 
-/// Returns a warning if the error that the task states is smaller than what a tag makes that is off by the reserve: the margin is about
-/// seeing the tag, not about the pose that follows.
+/// Returns a warning if a tag that is off by the reserve makes a larger error than the task states. The margin is about seeing the
+/// tag, not about the pose that follows.
 fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) -> Option<String> {
     let (name, task) = site
         .tasks
@@ -248,12 +248,12 @@ fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) ->
     let set = order.task.changed(best.pose, best.size, Some(best.reserve));
     let warning = stated_error(&set.shape, task.error_bound?, name)?;
     Some(format!(
-        "if the tag is off by the reserve and the site file still has the place above, so is every pose that it gives. {}: {}; survey the tag after mounting, and write its `pose` and `tolerance` into the site file",
+        "if the tag is off by the reserve and the site file keeps the pose above, every pose from it is off, too. {}: {}; survey the tag after mounting, and write its `pose` and `tolerance` into the site file",
         warning.about, warning.message
     ))
 }
 
-/// Prints how far apart the starts of the search ended.
+/// Prints how far apart the restarts of the search ended.
 fn restarts(found: &Placement) -> Result<(), Failure> {
     let means: Vec<f64> = found.restarts.iter().filter_map(|one| one.mean).collect();
     let Some(best) = found.best.mean.map(|mean| mean.value) else {
@@ -262,7 +262,7 @@ fn restarts(found: &Placement) -> Result<(), Failure> {
     let same = means.iter().filter(|mean| **mean <= 1.01 * best).count();
     let worst = means.iter().copied().fold(best, f64::max);
     print(&format_args!(
-        "{} different ends of the search's starts: mean costs from {best:.6} to {worst:.6}, {same} of them within 1 % of the best",
+        "{} different results of the restarts: mean costs from {best:.6} to {worst:.6}, {same} of them within 1 % of the best",
         means.len()
     ))
 }
@@ -376,7 +376,7 @@ fn serves(objective: Objective, placed: &Placed) -> bool {
     }
 }
 
-fn why_not(arguments: &Arguments, placed: &Placed) -> String {
+fn unmet_objective(arguments: &Arguments, placed: &Placed) -> String {
     let pose = placed.pose;
     let at = format!(
         "the nearest is x {:.3}, y {:.3}, z {:.3}, yaw {:.1} deg",
@@ -384,18 +384,18 @@ fn why_not(arguments: &Arguments, placed: &Placed) -> String {
     );
     if placed.p_miss >= 1.0 {
         format!(
-            "from no place looked at is the tag seen from task `{}`'s pose-set; {at}",
+            "at no evaluated place is the tag seen from task `{}`'s pose-set; {at}",
             arguments.task
         )
     } else {
         let margin = placed.margin.unwrap_or(0.0);
         format!(
-            "at no place looked at does the success set hold the pose-set; {at}, with a margin of {margin:.4} for a tag within the --reserve"
+            "no evaluated place has the pose-set inside the success set; {at}, with a margin of {margin:.4} for a tag within the --reserve"
         )
     }
 }
 
-fn tell(placed: &Placed) -> Result<(), Failure> {
+fn print_placed(placed: &Placed) -> Result<(), Failure> {
     let pose = placed.pose;
     print(&format_args!(
         "tag at x {:.4} m, y {:.4} m, z {:.4} m, yaw {:.3} deg, size {:.3} m",
@@ -481,8 +481,8 @@ fn chosen_tag(arguments: &Arguments, site: &Site, seen: &[Tag]) -> Result<Tag, F
     }
 }
 
-/// Returns the space that is searched: a room or a wall.
-fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Failure> {
+/// Returns the search space: free ranges or a wall.
+fn space(arguments: &Arguments, site: &Site, moved_task: &Task) -> Result<Space, Failure> {
     let free = arguments.free.as_deref().map(ranges).transpose();
     let free = free.map_err(|error| {
         Failure::usage(
@@ -499,11 +499,11 @@ fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Fa
     let Some(name) = &arguments.wall else {
         let ranges = free.ok_or_else(|| {
             Failure::usage(
-                "it is not said what may be chosen".into(),
+                "the search space is missing".into(),
                 "give --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360 (any of these), --wall NAME or --candidates FILE",
             )
         })?;
-        return Space::free(to_hang.tag.pose, ranges).map_err(refused);
+        return Space::free(moved_task.tag.pose, ranges).map_err(refused);
     };
     let wall = site
         .walls
@@ -527,10 +527,10 @@ fn space(arguments: &Arguments, site: &Site, to_hang: &Task) -> Result<Space, Fa
             "leave out --free, or give --free z=LOW:HIGH alone",
         ));
     }
-    let goal = to_hang.set.goal;
-    let size = to_hang.tag.size;
+    let goal = moved_task.set.goal;
+    let size = moved_task.tag.size;
     let mut known = site.tags.values();
-    let known = known.find(|known| known.tag == to_hang.tag);
+    let known = known.find(|known| known.tag == moved_task.tag);
     let whole = known.map_or(Family::WIDEST, |known| Family::whole_of(&known.family));
     Space::wall(wall, [size, size * whole], [goal.x, goal.y], z).map_err(refused)
 }
@@ -568,7 +568,7 @@ fn compared(
     let list = candidates(&bytes, &name).map_err(|error| {
         Failure::usage(
             error,
-            "the file has a header x,y,z,yaw_deg (and name, if wished) and one line per place",
+            "the file has a header x,y,z,yaw_deg (and optionally name) and one line per place",
         )
     })?;
     let poses: Vec<_> = list.iter().map(|one| one.pose).collect();
@@ -578,24 +578,24 @@ fn compared(
     let (best, placed) = looked.map_err(|error| refused(arguments, &error))?;
     let serves = serves(arguments.objective, &placed[best]);
     let named = |(one, placed): (&Candidate, &Placed)| {
-        let mut told = placed.to_json();
-        told["name"] = json!(one.name);
-        told
+        let mut line = placed.to_json();
+        line["name"] = json!(one.name);
+        line
     };
     if arguments.json {
-        let mut told = named((&list[best], &placed[best]));
-        told["evaluations"] = json!(placed.len());
-        told["site_digest"] = json!(site.digest_text());
+        let mut line = named((&list[best], &placed[best]));
+        line["evaluations"] = json!(placed.len());
+        line["site_digest"] = json!(site.digest_text());
         let all: Vec<Value> = list.iter().zip(&placed).map(named).collect();
-        told["candidates"] = json!(all);
-        print_json(&told)?;
+        line["candidates"] = json!(all);
+        print_json(&line)?;
     } else {
         print(&format_args!(
             "the best of {} is {}",
             list.len(),
             list[best].name
         ))?;
-        tell(&placed[best])?;
+        print_placed(&placed[best])?;
         for (one, placed) in list.iter().zip(&placed) {
             let mean = placed.mean.map_or(placed.cost_at_goal, |mean| mean.value);
             print(&format_args!(
@@ -605,7 +605,7 @@ fn compared(
         }
     }
     if !serves {
-        warn(&why_not(arguments, &placed[best]));
+        warn(&unmet_objective(arguments, &placed[best]));
     }
     Ok(answer(serves))
 }

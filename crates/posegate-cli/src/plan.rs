@@ -47,7 +47,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
         return Err(Failure::usage(
-            format!("--most-risk {} is no probability", arguments.most_risk),
+            format!("--most-risk {} is not a probability", arguments.most_risk),
             "give a number from 0 to 1, like 0.05",
         ));
     }

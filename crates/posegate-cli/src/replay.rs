@@ -12,7 +12,7 @@ pub use self::arguments::Arguments;
 use self::inflation::Inflated;
 use self::input::Recorded;
 use self::outputs::Outputs;
-use self::words::{asked_for, nothing, recording, sentences};
+use self::words::{check_requested, no_estimates, recording, sentences};
 use crate::door::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let mut input = Recorded::open(arguments, files, &site, radius_squared, &inflated)?;
     let odometry = odometry::odometry(arguments, files)?;
     let trust = arguments.trust(inflated.factors.inflation);
-    // What is carried along an odometry has the trust applied already.
+    // A fix that is carried along an odometry has the trust applied already.
     let carried = odometry.is_some();
     let source = Source::new(
         &arguments.frame,
@@ -106,27 +106,27 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         &mut |bytes| bar.set_position(bytes),
     );
     bar.finish_and_clear();
-    played.map_err(not_played)?;
-    let told = input.recording.told();
+    played.map_err(play_failure)?;
+    let diagnostics = input.recording.told();
     let [permits, estimates] = replay.permits();
     if estimates == 0 {
-        return Err(nothing(arguments, told, input.part.outside));
+        return Err(no_estimates(arguments, diagnostics, input.part.outside));
     }
-    asked_for(arguments, told, &replay)?;
-    if let Some(damage) = &told.damage {
+    check_requested(arguments, diagnostics, &replay)?;
+    if let Some(damage) = &diagnostics.damage {
         warn(&format_args!(
-            "{}: broken {damage}; what is whole was read",
+            "{}: broken {damage}; the intact part was read",
             input.name
         ));
     }
     let mut summary = replay.summary();
     summary["task"] = json!(arguments.task);
     if arguments.inflation_model.is_some() {
-        summary["inflation"] = inflated.told();
+        summary["inflation"] = inflated.to_json();
     }
     summary["recording"] = recording(&input);
     if let Some(looks) = &input.part.looks
-        && is_looked(&input)
+        && has_detections(&input)
     {
         let counts = looks.counts().into_iter();
         let counts: Map<String, Value> = counts
@@ -213,7 +213,7 @@ fn table(
     Ok(bytes)
 }
 
-fn not_played(error: PlayError<Failure>) -> Failure {
+fn play_failure(error: PlayError<Failure>) -> Failure {
     match error {
         PlayError::Recording(RecordingError::Io { file, source }) => FileError::Unread {
             name: file,
@@ -234,7 +234,7 @@ fn not_played(error: PlayError<Failure>) -> Failure {
 }
 
 /// Returns `true` if the recording had detections of tags.
-fn is_looked(input: &Recorded) -> bool {
+fn has_detections(input: &Recorded) -> bool {
     let counts = input.part.looks.as_ref().map(TagLocalizer::counts);
     counts.is_some_and(|counts| counts.iter().any(|(_, count)| *count > 0))
 }

@@ -46,13 +46,13 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let mut placements = Vec::new();
     for NamedInput { name: task, input } in &arguments.placement {
         let (bytes, name) = files.read(input)?;
-        let told: Value = serde_json::from_slice(&bytes).map_err(|error| {
+        let placement: Value = serde_json::from_slice(&bytes).map_err(|error| {
             Failure::usage(
                 format!("{name}: {error}"),
                 "give what `posegate place --json` prints",
             )
         })?;
-        placements.push((task.clone(), told));
+        placements.push((task.clone(), placement));
     }
     let mut pictures = Vec::new();
     for path in &arguments.picture {
@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         let svg = svg.filter(|svg| svg.contains("<svg"));
         let svg = svg.ok_or_else(|| {
             Failure::usage(
-                format!("{name} is no SVG picture"),
+                format!("{name} is not an SVG picture"),
                 "give what a command's `-o FILE.svg` writes",
             )
         })?;

@@ -18,12 +18,12 @@ use std::time::Instant;
 pub enum Command {
     /// Makes the tables, proofs and plans of a site, or of a shard of it
     #[command(
-        after_help = "Examples:\n  posegate site build site.toml -o built\n  posegate site build site.toml --shard 2/8 --resume -o built\n\nA shard is a function of the site, its index and the count. Instead of --shard there may be POSEGATE_SHARD_INDEX (from 0) and POSEGATE_SHARD_COUNT: what array jobs set. All shards must run the same program file. When all have ended: posegate site merge built"
+        after_help = "Examples:\n  posegate site build site.toml -o built\n  posegate site build site.toml --shard 2/8 --resume -o built\n\nA shard depends only on the site, its index and the count. Array jobs may set POSEGATE_SHARD_INDEX (from 0) and POSEGATE_SHARD_COUNT instead of --shard. All shards must run the same program file. When all have ended: posegate site merge built"
     )]
     Build(Build),
-    /// Puts the pieces of all shards together, with a manifest, or says what is missing
+    /// Merges the pieces of all shards, with a manifest, or names what is missing
     #[command(
-        after_help = "Examples:\n  posegate site merge built\n  posegate site merge built --site site.toml --prove\n\nWithout --prove it trusts what shards of the same program wrote in the folder: whoever can write there can forge tables and their proofs. With it every table is proven again; plans are trusted either way.\n\nExit code 1 where a work task has no plan (its file says why), and where a table is not proven (then nothing is merged)."
+        after_help = "Examples:\n  posegate site merge built\n  posegate site merge built --site site.toml --prove\n\nWithout --prove it trusts what shards of the same program wrote in the folder: whoever can write there can forge tables and their proofs. With it every table is proven again; plans are trusted either way.\n\nExit code 1 if a work task has no plan (its file has the reason), or if a table is not proven (then nothing is merged)."
     )]
     Merge(Merge),
 }
@@ -32,10 +32,10 @@ pub enum Command {
 pub struct Build {
     /// The site file; `-` for standard input
     site: Input,
-    /// Which part, from 0, of how many: I/N [default: all]
+    /// Shard I, from 0, of N: I/N [default: all]
     #[arg(long)]
     shard: Option<Shard>,
-    /// Which part, from 0
+    /// Index of the shard, from 0
     #[arg(
         long,
         env = "POSEGATE_SHARD_INDEX",
@@ -44,7 +44,7 @@ pub struct Build {
         requires = "shard_count"
     )]
     shard_index: Option<u32>,
-    /// Of how many parts
+    /// Number of shards
     #[arg(
         long,
         env = "POSEGATE_SHARD_COUNT",
@@ -53,22 +53,22 @@ pub struct Build {
         requires = "shard_index"
     )]
     shard_count: Option<u32>,
-    /// Keep pieces that are there, whole
+    /// Keep finished pieces
     #[arg(long)]
     resume: bool,
     /// The folder to write into; shards may share it
     #[arg(short, long)]
     output: OutputFolder,
-    /// Tables and proofs, no plans
+    /// Build tables and proofs, but no plans
     #[arg(long)]
     tables_only: bool,
-    /// The largest chance that a plan fails although no step does
+    /// The largest accepted risk that a plan fails although no step reports a failure
     #[arg(long, default_value_t = 0.05)]
     most_risk: f64,
-    /// How many tags may be missing, or not be detected, in plans: 0 or 1
+    /// Number of tags that may be missing or not detected: 0 or 1
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
     survive_lost_tags: u8,
-    /// Threads [default: one a core]
+    /// Number of threads [default: one per core]
     #[arg(long)]
     threads: Option<usize>,
     /// Print JSON
@@ -80,13 +80,13 @@ pub struct Build {
 pub struct Merge {
     /// The folder that the shards were built into
     folder: OutputFolder,
-    /// The site file: parts of another site are refused, and stale ones beside those of this site left out
+    /// The site file: refuse parts of another site, and leave out stale ones next to those of this site
     #[arg(long)]
     site: Option<Input>,
     /// Prove every table again, against the site file
     #[arg(long, requires = "site")]
     prove: bool,
-    /// Take parts that another program, or another version of it, has made
+    /// Accept parts of another program, or of another version
     #[arg(long)]
     any_program: bool,
     /// Print JSON
@@ -109,7 +109,7 @@ fn failure(error: SiteBuildError) -> Failure {
     Failure::list(&error.to_string(), help)
 }
 
-/// The shard that is asked for: by option, by variables, or all of the site.
+/// Returns the requested shard: by option, by variables, or all of the site.
 fn shard(arguments: &Build) -> Result<Shard, Failure> {
     let numbers = match (arguments.shard_index, arguments.shard_count) {
         (Some(index), Some(count)) => Some(Shard::new(index, count).map_err(Failure::input)?),
@@ -124,12 +124,12 @@ fn shard(arguments: &Build) -> Result<Shard, Failure> {
     }
 }
 
-/// The digest of this program's file, or of the library that another program has loaded.
+/// Returns the digest of this program's file, or of the library that another program has loaded.
 fn program() -> Result<String, Failure> {
     if let Some(library) = crate::calls::library() {
         return site_build::program(library).map_err(failure);
     }
-    // On Linux the file that runs, also where another one has its name by now.
+    // On Linux: the running file, even if another file has its name now.
     let running = Path::new("/proc/self/exe");
     let path = if running.exists() {
         running.into()
@@ -142,7 +142,7 @@ fn program() -> Result<String, Failure> {
 fn build(arguments: &Build, files: &Files) -> Outcome {
     if !(arguments.most_risk >= 0.0 && arguments.most_risk <= 1.0) {
         return Err(Failure::usage(
-            format!("--most-risk {} is no probability", arguments.most_risk),
+            format!("--most-risk {} is not a probability", arguments.most_risk),
             "give a number from 0 to 1, like 0.05",
         ));
     }
@@ -275,7 +275,7 @@ fn merge(arguments: &Merge, files: &Files) -> Outcome {
     Ok(answer(merged.without_plan.is_empty()))
 }
 
-/// The answer of a proof that fails. Nothing is merged.
+/// Prints the tables that are not proven, and returns exit code 1. Nothing is merged.
 fn not_proven(arguments: &Merge, tables: &[String]) -> Outcome {
     if arguments.json {
         print_json(&json!({"proven_again": false, "unproven": tables}))?;

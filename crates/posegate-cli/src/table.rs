@@ -211,7 +211,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         print(&format_args!(
             "{name}: {} bytes, proven inside: {} (built in {:.0} ms)",
             bytes.len(),
-            what_is_proven(proof),
+            proof_text(proof),
             seconds * 1e3,
         ))?;
         let worst = table.worst_case();
@@ -247,7 +247,7 @@ fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure
 }
 
 /// Describes a proof in words.
-fn what_is_proven(proof: Proof) -> String {
+fn proof_text(proof: Proof) -> String {
     let grid = format!("{} cells in {} runs", proof.cells, proof.runs);
     let facets = format!("{} corners of facet pieces", proof.corners);
     match (proof.cells, proof.corners) {
@@ -403,7 +403,7 @@ fn check(arguments: &Verify, files: &Files) -> Outcome {
         match &result {
             Ok(proof) => print(&format_args!(
                 "{name}: proven: {} lie inside the success set of `{}`",
-                what_is_proven(*proof),
+                proof_text(*proof),
                 table.task()
             ))?,
             Err(error) => print(&format_args!("{name}: NOT proven: {error}"))?,

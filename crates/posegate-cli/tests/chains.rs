@@ -32,9 +32,9 @@ fn changed(from: &str, to: &str) -> String {
     PAPER.replace(from, to)
 }
 
-/// A plan is about what the robot knows. A way through a block is reported, so that nobody reads "succeeds" as "drives there".
+/// A plan does not check for collisions. A path through a wall is reported, so that "succeeds" is not read as "drives there".
 #[test]
-fn a_way_through_a_block_is_reported() {
+fn path_through_a_wall_is_reported() {
     let line = "plan site.toml --from back-to-dock --to dock";
     let block = |y: f64| {
         // It is too low to hide the tag.
@@ -46,21 +46,21 @@ fn a_way_through_a_block_is_reported() {
     for (y, crosses) in [(0.1, true), (-0.6, false)] {
         let (code, out, err, _) = run(&block(y), line);
         assert_eq!(code, 0, "{out}{err}");
-        let told = err.contains("the straight way of step 2 crosses `pillar`");
-        assert_eq!(told, crosses, "{err}");
+        let reported = err.contains("the straight way of step 2 crosses `pillar`");
+        assert_eq!(reported, crosses, "{err}");
     }
 }
 
 #[test]
-fn chains_are_told_step_by_step() {
+fn chain_reports_every_step() {
     let line = "chain site.toml --name back-to-dock --json";
-    let told = json(PAPER, line, 0);
+    let chain = json(PAPER, line, 0);
     assert_eq!(
-        (&told["success"], &told["assume"]),
+        (&chain["success"], &chain["assume"]),
         (&true.into(), &"general".into())
     );
-    assert_eq!(told["risk"], 0.0);
-    let steps = told["steps"].as_array().unwrap();
+    assert_eq!(chain["risk"], 0.0);
+    let steps = chain["steps"].as_array().unwrap();
     let types: Vec<_> = steps
         .iter()
         .map(|step| step["type"].as_str().unwrap())
@@ -88,42 +88,42 @@ fn chains_are_told_step_by_step() {
     }
     assert_eq!(steps[0]["translation"], 0.05);
     assert!((steps[0]["yaw_rad"].as_f64().unwrap() - 2f64.to_radians()).abs() < 1e-15);
-    // The estimate may be anywhere that an observation may be: within the set before plus r_l.
+    // The estimate is within the previous set, enlarged by r_l.
     let spread = steps[0]["spread"]["translation"].as_f64().unwrap();
     assert!((spread - 1.05).abs() < 1e-12);
-    // As the paper reads it, the first drive adds less.
+    // With the paper's assumption the first drive adds less.
     let paper = json(PAPER, &format!("{line} --assume at-goal"), 0);
-    let grown = |told: &Value| told["steps"][1]["translation"].as_f64().unwrap();
-    assert!(grown(&paper) < grown(&told));
+    let grown = |chain: &Value| chain["steps"][1]["translation"].as_f64().unwrap();
+    assert!(grown(&paper) < grown(&chain));
 }
 
 #[test]
-fn a_step_that_fails_is_named() {
+fn failed_step_is_reported_with_its_number() {
     let site = changed(
         "translation = 1.0, yaw_deg = 2.0",
         "translation = 1.5, yaw_deg = 2.0",
     );
-    let told = json(&site, "chain site.toml --name back-to-dock --json", 1);
+    let chain = json(&site, "chain site.toml --name back-to-dock --json", 1);
     assert_eq!(
-        (&told["success"], &told["failed_step"]),
+        (&chain["success"], &chain["failed_step"]),
         (&false.into(), &0.into())
     );
-    assert_eq!(told["reason"], "not_contained");
-    assert_eq!(told["steps"][0]["contained"], false);
-    let margin = told["steps"][0]["margin"].as_f64().unwrap();
+    assert_eq!(chain["reason"], "not_contained");
+    assert_eq!(chain["steps"][0]["contained"], false);
+    let margin = chain["steps"][0]["margin"].as_f64().unwrap();
     assert!(margin > 0.8 && margin < 1.0, "{margin}");
     let (code, out, ..) = run(&site, "chain site.toml --name back-to-dock");
     assert!(code == 1 && out.contains("fails at step 1"), "{out}");
 }
 
 #[test]
-fn what_a_gaussian_set_leaves_out_is_a_risk() {
+fn gaussian_start_adds_its_risk_to_the_plan() {
     let site = changed(
         "bounded = { translation = 1.0, yaw_deg = 2.0 }",
         "covariance = [[0.04, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.0001]], epsilon = 0.98",
     );
-    let told = json(&site, "chain site.toml --name back-to-dock --json", 0);
-    assert!((told["risk"].as_f64().unwrap() - 0.02).abs() < 1e-12);
+    let chain = json(&site, "chain site.toml --name back-to-dock --json", 0);
+    assert!((chain["risk"].as_f64().unwrap() - 0.02).abs() < 1e-12);
     let planned = json(
         &site,
         "plan site.toml --from back-to-dock --to dock --json",
@@ -138,36 +138,36 @@ fn what_a_gaussian_set_leaves_out_is_a_risk() {
 }
 
 #[test]
-fn plans_are_found_or_the_nearest_miss_is_told() {
+fn infeasible_plan_reports_the_nearest_miss() {
     let line = "plan site.toml --from back-to-dock --to dock --json";
-    let told = json(PAPER, line, 0);
+    let plan = json(PAPER, line, 0);
     assert_eq!(
-        (&told["status"], &told["success"]),
+        (&plan["status"], &plan["success"]),
         (&"optimal".into(), &true.into())
     );
     assert_eq!(
-        told["steps"].as_array().unwrap().last().unwrap()["task"],
+        plan["steps"].as_array().unwrap().last().unwrap()["task"],
         "dock"
     );
     let hard = changed("x = [-0.10, 0.10]", "x = [-0.06, 0.06]");
-    let told = json(&hard, line, 1);
+    let plan = json(&hard, line, 1);
     assert_eq!(
-        (&told["status"], &told["success"]),
+        (&plan["status"], &plan["success"]),
         (&"infeasible".into(), &false.into())
     );
-    let miss = told["nearest_miss"]["margin"].as_f64().unwrap();
+    let miss = plan["nearest_miss"]["margin"].as_f64().unwrap();
     assert!(miss > 0.5 && miss < 1.0, "{miss}");
-    assert!(told["reason"].as_str().unwrap().contains("see-t7"));
+    assert!(plan["reason"].as_str().unwrap().contains("see-t7"));
     // A single tag cannot be lost.
-    let told = json(PAPER, &format!("{line} --survive-lost-tags 1"), 1);
-    assert_eq!(told["status"], "infeasible");
+    let plan = json(PAPER, &format!("{line} --survive-lost-tags 1"), 1);
+    assert_eq!(plan["status"], "infeasible");
     // A reached limit is reported as a limit.
-    let told = json(PAPER, &format!("{line} --limit 1"), 1);
-    assert_eq!(told["status"], "limit");
+    let plan = json(PAPER, &format!("{line} --limit 1"), 1);
+    assert_eq!(plan["status"], "limit");
 }
 
 #[test]
-fn costs_of_drives_are_the_users() {
+fn plan_uses_the_drive_costs_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("site.toml"), PAPER).unwrap();
     let plan = |costs: &str| {
@@ -191,28 +191,28 @@ fn costs_of_drives_are_the_users() {
             .unwrap()
     };
     let (_, free, _) = plan("from,to,cost\nstart,see-t7,0\nsee-t7,dock,0\nsee-t7,see-t7,0\n");
-    let (_, dear, _) =
+    let (_, costly, _) =
         plan("from,to,cost\nstart,see-t7,30\nstart,dock,30\nsee-t7,dock,10\nsee-t7,see-t7,30\n");
     assert!(
-        cost(&free) <= 2.0 + 1e-9 && cost(&dear) > 10.0,
-        "{free} {dear}"
+        cost(&free) <= 2.0 + 1e-9 && cost(&costly) > 10.0,
+        "{free} {costly}"
     );
-    for (bad, told) in [
+    for (bad, expected) in [
         ("to,from,cost\n", "costs.csv:1"),
         ("from,to,cost\nstart,dock,-1\n", "costs.csv:2"),
         ("from,to,cost\nstart,dock\n", "costs.csv:2"),
         ("from,to,cost\nstrat,dock,1\n", "no place `strat`"),
     ] {
         let (code, _, err) = plan(bad);
-        assert!(code == 2 && err.contains(told), "{err}");
+        assert!(code == 2 && err.contains(expected), "{err}");
     }
 }
 
 #[test]
-fn bad_input_is_told_clearly() {
+fn bad_input_is_reported_with_the_reason() {
     let chain = "chain site.toml --name back-to-dock";
     let plan = "plan site.toml --from back-to-dock --to dock";
-    for (site, line, told) in [
+    for (site, line, expected) in [
         (
             changed("{ task = \"dock\" }", "{ task = \"dok\" }"),
             chain,
@@ -286,7 +286,7 @@ fn bad_input_is_told_clearly() {
         (
             PAPER.to_owned(),
             "plan site.toml --from back-to-dock --to dock --most-risk 2",
-            "no probability",
+            "not a probability",
         ),
     ] {
         let (code, out, err, _) = run(&site, line);
@@ -296,11 +296,11 @@ fn bad_input_is_told_clearly() {
             .collect::<Vec<_>>()
             .join(" ");
         assert!(
-            code == 2 && flat.contains(told),
-            "{line}: {told}\n{out}\n{err}"
+            code == 2 && flat.contains(expected),
+            "{line}: {expected}\n{out}\n{err}"
         );
     }
-    // A site without anything to look at.
+    // A site without localization tasks and tags.
     let start = PAPER.find("[tag.t7]").unwrap();
     let end = PAPER.find("[task.dock]").unwrap();
     let steps = PAPER.find("steps = [").unwrap();
@@ -310,7 +310,7 @@ fn bad_input_is_told_clearly() {
         code == 2 && err.contains("no localization task and no tag"),
         "{err}"
     );
-    // A site without a drive model: the drive of a chain has one, or there is no drive.
+    // A site without a drive model has no drives.
     let still = changed(
         "model = { kind = \"bounded\", k_turn = 0.005, k_drift = 0.005, k_slip = 0.01 }\n",
         "",
@@ -322,7 +322,7 @@ fn bad_input_is_told_clearly() {
 
 /// The core confirms every reported plan within the requested risk, for all confidences.
 #[test]
-fn what_is_told_is_kept() {
+fn reported_plan_is_within_the_requested_risk() {
     let mut plans = 0;
     for (epsilon, sigma, heading) in [
         (0.9, 0.05, 0.01),
@@ -364,10 +364,10 @@ fn what_is_told_is_kept() {
                 "{out}{err}"
             );
             if code == 0 {
-                let told: Value = serde_json::from_str(&out).unwrap();
-                assert_eq!(told["success"], true, "{out}");
-                assert!(told["risk"].as_f64().unwrap() <= most + 1e-12, "{out}");
-                for step in told["steps"].as_array().unwrap() {
+                let planned: Value = serde_json::from_str(&out).unwrap();
+                assert_eq!(planned["success"], true, "{out}");
+                assert!(planned["risk"].as_f64().unwrap() <= most + 1e-12, "{out}");
+                for step in planned["steps"].as_array().unwrap() {
                     assert!(
                         step.get("contained").is_none_or(|inside| inside == true),
                         "{out}"

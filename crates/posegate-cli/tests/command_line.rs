@@ -53,7 +53,7 @@ impl Folder {
 const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
 
 #[test]
-fn the_whole_road() {
+fn site_becomes_a_table_that_decides() {
     let folder = Folder::new();
     folder.expect(0, "check site.toml");
     let (out, _) = folder.expect(
@@ -80,14 +80,14 @@ fn the_whole_road() {
     assert!(worst.runs > 0 && info["worst_case"] == built["worst_case"]);
     let (out, _) = folder.expect(
         0,
-        "table build site.toml --task dock -o said.posegate --layout grid",
+        "table build site.toml --task dock -o text.posegate --layout grid",
     );
-    let said = format!(
+    let bound = format!(
         "at most {} instructions on a Cortex-M4F, {} on a Cortex-M0+",
         worst.instructions_m4f(),
         worst.instructions_m0_plus()
     );
-    assert!(out.contains(&said), "{out}");
+    assert!(out.contains(&bound), "{out}");
     assert!(info["sight"].is_null());
     folder.expect(0, "table verify dock.posegate site.toml");
     folder.expect(0, "table build site.toml --task see-t7 -o see-t7.posegate");
@@ -156,7 +156,7 @@ fn the_whole_road() {
 }
 
 #[test]
-fn a_confidence_of_ones_own_changes_the_verdict() {
+fn epsilon_option_changes_the_verdict() {
     let folder = Folder::new();
     folder.expect(0, "table build site.toml --task dock -o dock.posegate");
     folder.write(
@@ -195,9 +195,9 @@ fn a_confidence_of_ones_own_changes_the_verdict() {
 fn changed(from: &str, to: &str) -> String {
     let mut done = false;
     let lines = SAMPLE.lines().map(|line| {
-        let is_it = !done && line.split('#').next().unwrap_or("").contains(from);
-        done |= is_it;
-        if is_it {
+        let is_changed = !done && line.split('#').next().unwrap_or("").contains(from);
+        done |= is_changed;
+        if is_changed {
             line.replacen(from, to, 1)
         } else {
             line.to_string()
@@ -210,7 +210,7 @@ fn changed(from: &str, to: &str) -> String {
 
 /// Each bad site file is named with its line and column, exits with 2, and leaves nothing behind.
 #[test]
-fn bad_sites_are_named_with_their_place() {
+fn bad_site_is_reported_with_line_and_column() {
     let changes = [
         ("fx = 615.0", "fx = 0.0", "above 0"),
         ("fx = 615.0", "fx = \"615\"", "is a string"),
@@ -337,7 +337,7 @@ fn bad_tables_and_recordings_are_refused() {
 }
 
 #[test]
-fn nothing_is_half_written() {
+fn failed_command_writes_no_file() {
     let folder = Folder::new();
     folder.expect(2, "table build site.toml --task nothing -o out.posegate");
     folder.expect(
@@ -372,7 +372,7 @@ fn nothing_is_half_written() {
 /// and stays what it is.
 #[cfg(unix)]
 #[test]
-fn links_and_pipes_stay_what_they_are() {
+fn links_and_pipes_are_kept_as_outputs() {
     use std::os::unix::fs::FileTypeExt;
     let folder = Folder::new();
     let path = |name: &str| folder.path().join(name);
@@ -420,7 +420,7 @@ fn links_and_pipes_stay_what_they_are() {
 /// An output that is open already is appended to, even if the file no longer has a name.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_open_output_is_not_replaced() {
+fn open_output_is_appended_to() {
     use std::io::{Read, Seek, Write};
     let folder = Folder::new();
     folder.expect(0, "table build site.toml --task dock -o plain.posegate");
@@ -452,7 +452,7 @@ fn an_open_output_is_not_replaced() {
 }
 
 #[test]
-fn exported_arrays_hold_the_bytes() {
+fn exported_array_equals_the_table() {
     let folder = Folder::new();
     folder.expect(0, "table build site.toml --task see-t7 -o t.posegate");
     let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
@@ -478,7 +478,7 @@ fn exported_arrays_hold_the_bytes() {
 }
 
 #[test]
-fn the_version_names_the_program() {
+fn version_starts_with_the_program_name() {
     let (out, _) = Folder::new().expect(0, "--version");
     assert_eq!(out.trim(), concat!("posegate ", env!("CARGO_PKG_VERSION")));
 }
@@ -534,7 +534,7 @@ fn builds_are_reproducible() {
 
 /// Sites that `check` calls valid can be built, whatever their angles and steps.
 #[test]
-fn odd_but_valid_numbers_are_built() {
+fn valid_site_with_unusual_numbers_is_built() {
     let folder = Folder::new();
     let site = |goal: &str, yaw: &str, x: &str, extent: &str, xy: &str| {
         format!(
@@ -638,7 +638,7 @@ fn elf(address: u32, bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_firmware_is_sealed_whole_or_not_at_all() {
+fn firmware_is_sealed_or_left_unchanged() {
     use posegate::gate::Seal;
     let folder = Folder::new();
     let path = |name: &str| folder.path().join(name);
@@ -646,9 +646,9 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
     let image = [&code[..], &Seal::MAGIC, &[0xff; 12], &code[..60]].concat();
     std::fs::write(path("firmware"), elf(0x0800_0000, &image)).unwrap();
     let (out, _) = folder.expect(0, "seal firmware -o sealed --json");
-    let said: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(
-        (said["start"].as_u64(), said["length"].as_u64()),
+        (report["start"].as_u64(), report["length"].as_u64()),
         (Some(0x0800_0000), Some(180))
     );
     let sealed = std::fs::read(path("sealed")).unwrap();
@@ -660,7 +660,7 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
     }
     // A file that cannot be sealed is not changed.
     std::fs::write(path("bare"), elf(0, &code)).unwrap();
-    for (name, said) in [
+    for (name, expected) in [
         ("bare", "no seal record"),
         ("site.toml", "not a 32-bit little-endian ELF file"),
         ("missing", "missing"),
@@ -669,7 +669,7 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
         let names = folder.names();
         let (_, err) = folder.expect(2, &format!("seal {name}"));
         let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(err.contains(said) && err.contains("help"), "{err}");
+        assert!(err.contains(expected) && err.contains("help"), "{err}");
         assert_eq!(std::fs::read(path(name)).ok(), before);
         assert_eq!(folder.names(), names);
     }
@@ -677,7 +677,7 @@ fn a_firmware_is_sealed_whole_or_not_at_all() {
 
 /// All sigmas zero, or a covariance of zeros, give the cost of the goal. A single zero is refused.
 #[test]
-fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
+fn exact_pose_costs_as_much_as_its_goal() {
     let folder = Folder::new();
     folder.write("zero.csv", "0,0,0\n0,0,0\n0,0,0\n");
     folder.write("flat.csv", "0.01,0,0\n0,0,0\n0,0,0.0003\n");
@@ -687,7 +687,7 @@ fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
         "--covariance-file zero.csv",
     ] {
         let (out, _) = folder.expect(0, &format!("{see} {exact} --json"));
-        let told: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&out).unwrap();
         for (name, value) in [
             ("integral", 1406.25),
             ("mass", 1.0),
@@ -695,10 +695,13 @@ fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
             ("outside_mass", 0.0),
             ("p_miss", 0.0),
         ] {
-            assert!((told[name].as_f64().unwrap() - value).abs() < 1e-9, "{out}");
-            assert_eq!(told[format!("{name}_error")], 0.0, "{out}");
+            assert!(
+                (report[name].as_f64().unwrap() - value).abs() < 1e-9,
+                "{out}"
+            );
+            assert_eq!(report[format!("{name}_error")], 0.0, "{out}");
         }
-        assert_eq!(told.as_object().unwrap().len(), 10, "{out}");
+        assert_eq!(report.as_object().unwrap().len(), 10, "{out}");
     }
     for (line, fragment) in [
         (
@@ -724,7 +727,7 @@ fn a_pose_that_is_known_exactly_costs_what_its_goal_does() {
 
 /// Invalid pose-sets, costs and views are named, and nothing is printed for them.
 #[test]
-fn costs_of_what_is_none_are_refused() {
+fn invalid_input_of_cost_is_refused() {
     let folder = Folder::new();
     let sigmas = "--sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1";
     let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas} --json"));
@@ -820,7 +823,7 @@ fn costs_of_what_is_none_are_refused() {
 }
 
 #[test]
-fn trajectories_are_compared_or_refused() {
+fn metrics_compares_or_refuses_trajectories() {
     let folder = Folder::new();
     let line = |k: u32, y: f64| format!("{k}.0 {}.5 {y} 0 0 0 0 1\n", k / 4);
     let truth: String = (0..20).map(|k| line(k, f64::from(k % 3))).collect();
@@ -921,7 +924,7 @@ fn trajectories_are_compared_or_refused() {
 }
 
 #[test]
-fn shells_and_manuals_know_every_command() {
+fn completions_and_manuals_list_every_command() {
     let folder = Folder::new();
     let (help, _) = folder.expect(0, "--help");
     let (_, commands) = help.split_once("Commands:\n").unwrap();
@@ -956,9 +959,9 @@ fn shells_and_manuals_know_every_command() {
     folder.expect(2, "man -o site.toml");
 }
 
-/// What `doctor` finds, `check` says too, with the line of the file.
+/// `check` prints all warnings of `doctor`, with the line of the file.
 #[test]
-fn check_ends_with_the_warnings_of_doctor() {
+fn check_prints_the_warnings_of_doctor() {
     let folder = Folder::new();
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
     let wall = "\n[wall.north]\nfrom = [0.0, 3.0]\nto = [6.0, 3.0]\nz = [0.0, 2.5]\n";
@@ -972,8 +975,8 @@ fn check_ends_with_the_warnings_of_doctor() {
     let warnings = found["warnings"].as_array().unwrap();
     let at = |wanted: &str, words: &str| {
         let number = line(wanted);
-        let here = |one: &serde_json::Value| {
-            one["line"] == number && one["message"].as_str().unwrap().contains(words)
+        let here = |warning: &serde_json::Value| {
+            warning["line"] == number && warning["message"].as_str().unwrap().contains(words)
         };
         assert!(
             warnings.iter().any(here),
@@ -986,7 +989,7 @@ fn check_ends_with_the_warnings_of_doctor() {
     let (words, _) = folder.expect(0, "check site.toml");
     let last = words.lines().rev().nth(1).unwrap();
     assert!(last.starts_with("WARNING site.toml:"), "{words}");
-    // What holds for all candidates of a row is said once.
+    // A warning for all candidates of a row is printed once.
     let unknown = words.lines().filter(|line| line.contains("family_unknown"));
     let unknown: Vec<&str> = unknown.collect();
     assert_eq!(unknown.len(), 1, "{words}");
@@ -995,7 +998,7 @@ fn check_ends_with_the_warnings_of_doctor() {
 
 /// A site that names its controller is warned of each table that may take too long, and only of those.
 #[test]
-fn check_compares_decisions_with_the_controllers_time() {
+fn check_warns_of_tables_beyond_the_cycle_budget() {
     let folder = Folder::new();
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
     let costly = |keys: &str| {
@@ -1044,9 +1047,9 @@ fn check_compares_decisions_with_the_controllers_time() {
     folder.expect(2, "check site.toml");
 }
 
-/// A set that is empty because its tag faces away: no finer step would help.
+/// The set is empty because its tag faces away, so finer steps are not the advice.
 #[test]
-fn an_empty_table_names_the_cause() {
+fn empty_table_is_refused_with_the_cause() {
     let folder = Folder::new();
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
     let seen = "yaw_deg = 180.0 }";
@@ -1060,9 +1063,9 @@ fn an_empty_table_names_the_cause() {
     assert!(!words.contains("make the steps finer"), "{err}");
 }
 
-/// A place is of use once it is in the site file. A reserve is in metres, and it is also an error of every pose that the tag gives.
+/// `place` prints the pose as the site file has it. A reserve is in metres, and it is also an error of every pose from that tag.
 #[test]
-fn a_place_is_printed_as_the_site_file_has_it() {
+fn place_prints_the_pose_in_site_file_syntax() {
     let folder = Folder::new();
     let place = "place site.toml --task see-t7 --sigma-x 0.05 --sigma-y 0.05 --sigma-yaw-deg 1 --free x=3.9:4 --budget 10";
     let (out, err) = folder.expect(0, &format!("{place} --reserve 0.001,0.1"));

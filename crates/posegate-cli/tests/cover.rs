@@ -1,6 +1,5 @@
-//! Covers keep their promise: on small sites every subset of the candidates is tried with `plan` itself, and none that
-//! serves is cheaper; what is written serves with and without each tag; and the answer is the same for any number of
-//! threads.
+//! Covers are optimal and valid. On small sites `plan` tries every subset of the candidates, and no subset that serves is
+//! cheaper. The written site serves with and without each tag. The answer is equal for any number of threads.
 
 use posegate_host::cover::{
     Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Watch, cover, cover_watched,
@@ -39,8 +38,8 @@ fn parsed(text: &str) -> Site {
     Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-/// The text with some of its candidates hung as tags, the others gone.
-fn hung(text: &str, has: impl Fn(usize) -> bool) -> String {
+/// Returns the text with some of its candidates as tags, and without the others.
+fn mounted(text: &str, has: impl Fn(usize) -> bool) -> String {
     let mut number = 0;
     let mut sections = Vec::new();
     for section in text.split("\n\n") {
@@ -59,7 +58,8 @@ fn hung(text: &str, has: impl Fn(usize) -> bool) -> String {
     sections.join("\n\n")
 }
 
-/// Which tasks have a plan on a site, in the order of their names; and which have one that survives the loss of a tag.
+/// Returns which tasks have a plan on a site, and which have one that survives the loss of a tag. Tasks are in the order of
+/// their names.
 fn plans(text: &str) -> [Vec<bool>; 2] {
     let site = parsed(text);
     let mut prepared = match Prepared::of(&site, None) {
@@ -87,13 +87,13 @@ fn plans(text: &str) -> [Vec<bool>; 2] {
     [plain, surviving]
 }
 
-/// For each subset of the candidates the tasks that it serves.
+/// Returns the served tasks for each subset of the candidates.
 fn all_subsets(text: &str, candidates: usize) -> Vec<[Vec<bool>; 2]> {
     let mut all: Vec<[Vec<bool>; 2]> = (0..1usize << candidates)
         .into_par_iter()
-        .map(|subset| plans(&hung(text, |number| subset >> number & 1 == 1)))
+        .map(|subset| plans(&mounted(text, |number| subset >> number & 1 == 1)))
         .collect();
-    // What survives has a plan without any one of its tags, too.
+    // A task that survives also has a plan without any one of the tags.
     for subset in (0..all.len()).rev() {
         for lost in (0..candidates).filter(|number| subset >> number & 1 == 1) {
             let plain = all[subset & !(1 << lost)][0].clone();
@@ -105,7 +105,7 @@ fn all_subsets(text: &str, candidates: usize) -> Vec<[Vec<bool>; 2]> {
     all
 }
 
-/// Sites with something to choose, and how many candidates they have.
+/// Returns sites with a choice, each with its number of candidates.
 fn sites() -> Vec<(String, usize)> {
     let mut sites: Vec<(String, usize)> = [(1, 7), (2, 6)]
         .map(|(seed, candidates)| (warehouse(seed, 1, LENGTH, DOCKS, candidates), candidates))
@@ -114,8 +114,8 @@ fn sites() -> Vec<(String, usize)> {
     sites
 }
 
-/// A dock of a large warehouse whose plan looks at one of two tags from a place that was made for the other one; with `twice`,
-/// each once more, lower, one of them dear.
+/// Returns a dock of a large warehouse. Its plan looks at one of two tags from a place that was generated for the other one. With
+/// `twice`, there is a lower copy of each candidate, and one of the copies is expensive.
 fn borrowed(twice: bool) -> String {
     let text = warehouse(1, 10, 40.0, 100, 2_000);
     let mut sections: Vec<String> = vec![];
@@ -132,9 +132,9 @@ fn borrowed(twice: bool) -> String {
             let (z, after) = rest.split_once(',').expect("a height");
             let lower = z.parse::<f64>().expect("a number") - 0.4;
             let again = format!("{before} z = {lower:?},{after}");
-            let dear = again.replace("cost = 2.5", "cost = 100.0");
+            let costly = again.replace("cost = 2.5", "cost = 100.0");
             sections.push(match of("[candidate.c643]") {
-                true => dear.replace("[candidate.c643]", "[candidate.d643]"),
+                true => costly.replace("[candidate.c643]", "[candidate.d643]"),
                 false => again.replace("[candidate.c1953]", "[candidate.d1953]"),
             });
         }
@@ -152,13 +152,13 @@ fn borrowed(twice: bool) -> String {
 }
 
 #[test]
-fn no_subset_that_serves_is_cheaper() {
+fn exact_cover_costs_no_more_than_any_serving_subset() {
     let mut served = [0, 0];
-    // The smallest one, unless all are asked for.
+    // Only the smallest site, unless the test is deep.
     let skipped = if counts::is_deep() { 0 } else { 2 };
     for (seed, (text, candidates)) in sites().into_iter().enumerate().skip(skipped) {
         let site = parsed(&text);
-        // The numbers of the text's candidates are those of their names' order: there are fewer than ten.
+        // Candidates are numbered in the order of their names: there are fewer than ten.
         let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
         let [plain, surviving]: [Vec<Vec<bool>>; 2] = {
             let all = all_subsets(&text, candidates);
@@ -181,12 +181,12 @@ fn no_subset_that_serves_is_cheaper() {
                 .map(cost_of)
                 .fold(f64::INFINITY, f64::min);
             let exact = covered(&site, &order(survive, Method::Exact));
-            let told: Vec<bool> = exact
+            let served_tasks: Vec<bool> = exact
                 .tasks
                 .iter()
                 .map(|task| task.reason.is_none())
                 .collect();
-            assert_eq!(&told, possible, "seed {seed}, survive {survive}");
+            assert_eq!(&served_tasks, possible, "seed {seed}, survive {survive}");
             assert!(
                 (exact.cost - best).abs() < 1e-9,
                 "seed {seed}, survive {survive}: {} and by trying all {best}",
@@ -211,13 +211,13 @@ fn no_subset_that_serves_is_cheaper() {
     assert!(served[0] >= least[0] && served[1] >= least[1], "{served:?}");
 }
 
-/// A site with more to choose from, that is not tried out.
+/// Returns a site with too many candidates to try all subsets.
 fn aisle() -> String {
     warehouse(5, 1, 8.0, 4, 36)
 }
 
 #[test]
-fn what_is_written_serves_with_and_without_each_tag() {
+fn written_site_serves_with_and_without_each_tag() {
     let text = aisle();
     let site = parsed(&text);
     let methods = [
@@ -254,7 +254,7 @@ fn what_is_written_serves_with_and_without_each_tag() {
                 .collect();
             assert_eq!(lost, tag.needed_by, "{}", tag.name);
             assert!(!survive || lost.is_empty(), "{}", tag.name);
-            // What nothing needs is not hung.
+            // Every chosen tag is needed.
             assert!(
                 !(tag.needed_by.is_empty() && tag.second_of.is_empty()),
                 "{}",
@@ -265,13 +265,13 @@ fn what_is_written_serves_with_and_without_each_tag() {
 }
 
 #[test]
-fn what_serves_is_whole() {
-    // The plan looks at one of the tags from a place that was made for the other one: without it there is none.
+fn cover_keeps_both_tags_that_a_plan_needs() {
+    // The plan looks at one of the tags from a place that was generated for the other one, so it needs both.
     let text = borrowed(false);
     assert_eq!(
         [0b01, 0b10, 0b11].map(|subset: usize| {
             let has = |number: usize| subset >> number & 1 == 1;
-            plans(&hung(&text, has))[0][0]
+            plans(&mounted(&text, has))[0][0]
         }),
         [false, false, true]
     );
@@ -280,8 +280,8 @@ fn what_serves_is_whole() {
     assert_eq!(found.tags.len(), 2);
 }
 
-/// How far along the first face of a wall along x a tag hangs, and how high.
-fn on_the_face(found: &Cover, name: &str) -> [f64; 2] {
+/// Returns the position of a tag on the first face of a wall along x: x and height.
+fn position_on_wall(found: &Cover, name: &str) -> [f64; 2] {
     let tag = found.tags.iter().find(|tag| tag.name == name);
     let pose = tag.expect("the tag").tag.tag.pose;
     [pose.x, pose.z]
@@ -289,7 +289,7 @@ fn on_the_face(found: &Cover, name: &str) -> [f64; 2] {
 
 #[test]
 #[ignore = "takes a minute: ./ci.sh deep"]
-fn polished_tags_leave_more_room() {
+fn polished_tags_tolerate_larger_errors() {
     const REACH: f64 = 0.4;
     let text = aisle();
     let site = parsed(&text);
@@ -301,7 +301,7 @@ fn polished_tags_leave_more_room() {
     };
     let better = polish(&text, &found);
     assert!(better.serves_all() && better.cost == found.cost);
-    // What is told is what `plan` finds on what is written.
+    // `plan` finds a plan for each task on the written site.
     let out = written(&text, "site.toml", &better).expect("a site file");
     assert!(plans(&out)[0].iter().all(|plan| *plan));
     let mut moved = 0;
@@ -316,7 +316,7 @@ fn polished_tags_leave_more_room() {
         } = after.polished.expect("a tag that is looked at");
         assert!(by.iter().all(|by| by.abs() <= REACH * (1.0 + 1e-9)));
         assert!(low >= 1.0 && high >= low);
-        // With errors that are so many times as large there is a plan for each task that looks at it.
+        // With errors larger by this factor each task that looks at the tag has a plan.
         let larger = |text: &str| {
             let [m, deg] = [0.25, 3.0].map(|v: f64| v * high);
             let start = format!("bounded = {{ translation = {m:?}, yaw_deg = {deg:?} }}");
@@ -345,7 +345,7 @@ fn polished_tags_leave_more_room() {
         assert!(b.z >= half && b.z <= 2.5 - half && b.x >= half && b.x <= 8.0 - half);
     }
     assert!(moved > 0);
-    // A keep-out on either side of where a tag hangs leaves it there.
+    // A keep-out on each side of a mounted tag keeps it in place.
     let first = better
         .tags
         .iter()
@@ -354,15 +354,15 @@ fn polished_tags_leave_more_room() {
                 .is_some_and(|polished| polished.moved != [0.0, 0.0])
         })
         .expect("a tag that was moved");
-    let [x, z] = on_the_face(&found, &first.name);
+    let [x, z] = position_on_wall(&found, &first.name);
     let half = 0.5 * 1.25 * first.tag.tag.size;
     let all = [0.0, 2.5];
-    // Walls are blocks, their corners counter-clockwise from the lower left: the second face of length is walked backwards.
+    // Walls are blocks, their corners counter-clockwise from the lower left: the second long face runs backwards.
     let mirrored = |v: f64| 8.0 + 1.2 + 8.0 - v;
     let [left, right] = [x - half - 0.001, x + half + 0.001];
     let [under, over] = [[0.0, z - half - 0.001], [z + half + 0.001, 2.5]];
-    let mut held = found.clone();
-    for wall in &mut held.site.walls {
+    let mut blocked = found.clone();
+    for wall in &mut blocked.site.walls {
         let on = |v: f64| {
             wall.corners
                 .iter()
@@ -389,9 +389,9 @@ fn polished_tags_leave_more_room() {
             ]
         };
     }
-    assert_ne!(held.site, found.site);
-    let stays = polish(&text, &held);
-    let same = on_the_face(&stays, &first.name);
+    assert_ne!(blocked.site, found.site);
+    let stays = polish(&text, &blocked);
+    let same = position_on_wall(&stays, &first.name);
     assert_eq!(same, [x, z]);
 
     let wrong = polished(&text, "site.toml", &found, &order, f64::NAN, &|_, _| ());
@@ -399,7 +399,7 @@ fn polished_tags_leave_more_room() {
 }
 
 #[test]
-fn any_number_of_threads_chooses_the_same() {
+fn cover_is_equal_for_any_number_of_threads() {
     let text = if counts::is_deep() {
         aisle()
     } else {
@@ -424,14 +424,14 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn bad_input_is_named() {
+fn bad_input_is_reported_with_the_reason() {
     let text = warehouse(1, 1, LENGTH, 2, 3);
     let with = |from: &str, to: &str| text.replacen(from, to, 1);
     let error = |text: &str| {
         let found = cover(&parsed(text), &CoverOptions::default(), &|_, _| ());
         found.expect_err("a fault")
     };
-    assert_eq!(error(&hung(&text, |_| true)), CoverError::NoCandidates);
+    assert_eq!(error(&mounted(&text, |_| true)), CoverError::NoCandidates);
     assert_eq!(
         error(&with("from = \"from-", "# from = \"from-")),
         CoverError::NoStart("dock-0".into())
@@ -462,32 +462,41 @@ fn bad_input_is_named() {
     // Numbers and names of the file.
     let twice = with("[candidate.c0]\n", "[candidate.c0]\nid = 3\n");
     let twice = twice.replacen("[candidate.c1]\n", "[candidate.c1]\nid = 3\n", 1);
-    let said = refused(&twice);
+    let error_text = refused(&twice);
     assert!(
-        said.contains("the candidate `c1` has the number 3 of candidate `c0`"),
-        "{said}"
+        error_text.contains("the candidate `c1` has the number 3 of candidate `c0`"),
+        "{error_text}"
     );
-    let tag = hung(&text, |number| number == 0);
+    let tag = mounted(&text, |number| number == 0);
     let candidates = &text[text.find("[candidate.c0]").expect("a candidate")..];
-    let said = refused(&format!("{tag}\n\n{candidates}"));
+    let error_text = refused(&format!("{tag}\n\n{candidates}"));
     assert!(
-        said.contains("the candidate `c0` has the name of a tag"),
-        "{said}"
+        error_text.contains("the candidate `c0` has the name of a tag"),
+        "{error_text}"
     );
     let own = candidates.replacen("[candidate.c0]\n", "[candidate.d0]\nid = 0\n", 1);
-    let said = refused(&format!("{tag}\n\n{own}"));
-    assert!(said.contains("has the number 0 of tag `c0`"), "{said}");
-    let said = refused(&with("cost = ", "cost = -"));
-    assert!(said.contains("`candidate.c0.cost` is -"), "{said}");
-    let said = refused(&with("from = \"from-", "from = \"form-"));
-    assert!(said.contains("there is no chain `form-"), "{said}");
+    let error_text = refused(&format!("{tag}\n\n{own}"));
+    assert!(
+        error_text.contains("has the number 0 of tag `c0`"),
+        "{error_text}"
+    );
+    let error_text = refused(&with("cost = ", "cost = -"));
+    assert!(
+        error_text.contains("`candidate.c0.cost` is -"),
+        "{error_text}"
+    );
+    let error_text = refused(&with("from = \"from-", "from = \"form-"));
+    assert!(
+        error_text.contains("there is no chain `form-"),
+        "{error_text}"
+    );
 }
 
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn two_tags_never_have_one_place() {
+fn chosen_tags_have_distinct_places() {
     let text = warehouse(5, 1, 8.0, 1, 18);
-    // The same places once more, under other names: with two of a place nothing would survive its loss.
+    // The same places again, under other names. Two tags at one place would not survive its loss.
     let candidates = &text[text.find("[candidate.").expect("a candidate")..];
     let twice = format!(
         "{text}\n\n{}",
@@ -503,11 +512,11 @@ fn two_tags_never_have_one_place() {
 }
 
 #[test]
-fn tags_have_room_and_a_number() {
+fn chosen_tag_needs_wall_space_and_a_free_id() {
     let text = warehouse(5, 1, 8.0, 1, 18);
-    // Candidates where small tags hang already, which are of no use: none of them has room.
+    // Candidates at places that small, useless tags occupy: no candidate has space.
     let alone = borrowed(false);
-    let has_both = hung(&alone, |_| true);
+    let has_both = mounted(&alone, |_| true);
     let again = &alone[alone.find("[candidate.").expect("a candidate")..];
     let again = again.replace("[candidate.c", "[candidate.d");
     let taken = has_both.replace("size = 0.3\n", "size = 0.1\n");
@@ -518,7 +527,7 @@ fn tags_have_room_and_a_number() {
     assert!(!found.serves_all() && found.tags.is_empty() && found.bound == 0.0);
 
     // A candidate on a keep-out, and one whose border reaches over it.
-    let kept = |to: f64| {
+    let with_keep_out = |to: f64| {
         let all = format!("keep_out = [{{ along = [0.0, {to:?}], z = [0.0, 2.5] }}]\n");
         let heads = ["[wall.rack-0]\n", "[wall.rack-1]\n"];
         let text = heads.iter().fold(text.clone(), |text, head| {
@@ -526,23 +535,26 @@ fn tags_have_room_and_a_number() {
         });
         cover(&parsed(&text), &CoverOptions::default(), &|_, _| ())
     };
-    assert!(matches!(kept(18.4), Err(CoverError::KeepOut { .. })));
-    assert!(kept(1e-3).is_ok());
+    assert!(matches!(
+        with_keep_out(18.4),
+        Err(CoverError::KeepOut { .. })
+    ));
+    assert!(with_keep_out(1e-3).is_ok());
 
-    // A family of thirty tags, all of which hang.
-    let mut hung = text.replace("family = \"tag36h11\"", "family = \"tag16h5\"");
-    hung = hung.replace("px_per_bit_min = 4.0", "px_per_bit_min = 5.0");
+    // A family of thirty tags, all of which are mounted.
+    let mut mounted = text.replace("family = \"tag36h11\"", "family = \"tag16h5\"");
+    mounted = mounted.replace("px_per_bit_min = 4.0", "px_per_bit_min = 5.0");
     for id in 0..30 {
-        hung += &format!(
+        mounted += &format!(
             "\n[tag.t{id}]\nid = {id}\nfamily = \"tag16h5\"\nsize = 0.3\npose = {{ x = {id}.0, y = 90.0, z = 1.0, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }}\n"
         );
     }
-    let full = cover(&parsed(&hung), &CoverOptions::default(), &|_, _| ());
+    let full = cover(&parsed(&mounted), &CoverOptions::default(), &|_, _| ());
     assert!(matches!(full, Err(CoverError::NoNumber(_))), "{full:?}");
 }
 
 #[test]
-fn a_start_that_is_known_exactly_needs_no_tag() {
+fn exact_start_needs_no_tag() {
     let text = warehouse(1, 1, LENGTH, 2, 3)
         .replace(
             "bounded = { translation = 0.25, yaw_deg = 3.0 }",
@@ -560,10 +572,10 @@ fn a_start_that_is_known_exactly_needs_no_tag() {
 }
 
 #[test]
-fn tags_that_hang_are_free() {
+fn mounted_tags_cost_nothing() {
     let text = warehouse(5, 1, 12.0, 2, 30);
-    let all = hung(&text, |_| true);
-    // The same candidates once more, under other names.
+    let all = mounted(&text, |_| true);
+    // The same candidates again, under other names.
     let candidates = &text[text.find("[candidate.").expect("a candidate")..];
     let again = candidates.replace("[candidate.c", "[candidate.d");
     let found = covered(
@@ -574,7 +586,7 @@ fn tags_that_hang_are_free() {
 }
 
 #[test]
-fn tasks_that_cannot_be_served_are_named_with_the_reason() {
+fn unserved_task_is_reported_with_the_reason() {
     let reason = |text: &str| {
         let found = covered(&parsed(text), &CoverOptions::default());
         assert!(!found.serves_all());
@@ -584,8 +596,8 @@ fn tasks_that_cannot_be_served_are_named_with_the_reason() {
     let text = warehouse(5, 1, 12.0, 1, 10);
     // Far away.
     let far = text.replace("goal = { x = ", "goal = { x = 10");
-    let told = reason(&far);
-    assert!(told.contains("none is near enough"), "{told}");
+    let message = reason(&far);
+    assert!(message.contains("none is near enough"), "{message}");
     // Turned to the wall.
     let turned = text.replace(
         "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
@@ -596,18 +608,18 @@ fn tasks_that_cannot_be_served_are_named_with_the_reason() {
         "roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = -90.0 }",
     );
     let turned = turned.replace("yaw_deg = +90.5 }", "yaw_deg = 90.0 }");
-    let told = reason(&turned);
-    assert!(told.contains("walls hide them"), "{told}");
-    // A dock that is narrower than what an observation leaves.
+    let message = reason(&turned);
+    assert!(message.contains("walls hide them"), "{message}");
+    // A dock that is narrower than the error after an observation.
     let from = text.find("x = [-0.").expect("a box");
     let to = from + text[from..].find(", yaw_deg").expect("a box");
     let narrow = text.replacen(&text[from..to], "x = [-0.01, 0.01], y = [-0.01, 0.01]", 1);
-    let told = reason(&narrow);
-    assert!(told.contains("the nearest miss"), "{told}");
+    let message = reason(&narrow);
+    assert!(message.contains("the nearest miss"), "{message}");
 }
 
 #[test]
-fn the_command_writes_what_plan_takes() {
+fn cover_writes_a_site_that_plan_accepts() {
     let folder = tempfile::tempdir().expect("a folder");
     let (site, out) = (
         folder.path().join("site.toml"),
@@ -625,8 +637,8 @@ fn the_command_writes_what_plan_takes() {
     let (site, out) = (site.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
     let (code, text) = posegate(&["cover", site, "-o", out, "--json"]);
     assert_eq!(code, Some(0), "{text}");
-    let told: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    assert!(told["success"] == true && told["gap"].as_f64().expect("a gap") <= 0.05);
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert!(report["success"] == true && report["gap"].as_f64().expect("a gap") <= 0.05);
     for task in ["dock-0", "dock-1"] {
         assert_eq!(posegate(&["plan", out, "--to", task, "--json"]).0, Some(0));
     }
@@ -645,7 +657,7 @@ fn the_command_writes_what_plan_takes() {
 
 /// A search that is stopped after its first choice costs no more than the greedy choice, and its bound holds.
 #[test]
-fn stopped_searches_keep_the_best_choice() {
+fn stopped_search_keeps_the_best_choice() {
     let mut unfinished = 0;
     let skipped = if counts::is_deep() { 0 } else { 2 };
     for (text, _) in sites().into_iter().skip(skipped) {
@@ -675,7 +687,7 @@ fn stopped_searches_keep_the_best_choice() {
             );
             assert!(stopped.bound <= best.cost + 1e-9);
             assert_eq!(stopped.serves_all(), best.serves_all());
-            // Out of time at once: the same.
+            // With no time at all the result is equal.
             let limited = CoverOptions {
                 time_limit: Some(1e-9),
                 ..order(survive, Method::Exact)

@@ -14,8 +14,9 @@ const PICTURES: [&str; 5] = [
     "fig4-placement.svg",
 ];
 
-/// Task, translation or sigma (m), yaw or its sigma (degrees), whether the set is inside, true scale s*
-/// (from the reference cases; docking's by hand: the smaller of 6 cm over the radius and 4 over 2 degrees).
+/// Task, translation or sigma (m), yaw or its sigma (degrees), `true` if the set is inside, true scale s*.
+/// The scales are from the reference cases. That of docking is computed manually: the smaller of 6 cm over
+/// the radius and 4 over 2 degrees.
 const BOUNDED: [(&str, f64, f64, bool, f64); 7] = [
     ("park", 0.1, 2.0, true, 2.02623),
     ("park", 1.0, 2.0, false, 0.24370),
@@ -47,7 +48,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn the_case_study_comes_out_as_in_the_paper() {
+fn case_study_reproduces_the_paper() {
     let folder = tempfile::tempdir().unwrap();
     let output = posegate(&["demo", "-o", "once/more"], folder.path());
     let out = folder.path().join("once/more");
@@ -123,7 +124,7 @@ fn check_numbers(numbers: &Value, out: &Path) {
         assert_eq!(answer["reason"].is_null(), *inside, "{answer}");
         assert_eq!(answer["worst_pose"].is_null(), *inside, "{answer}");
         assert_eq!(margin >= 1.0, *inside, "{answer}");
-        // Sound: never above the true scale. Tight: not far below.
+        // Sound: at most the true scale. Tight: not far below it.
         assert!(margin <= *scale && margin >= 0.9 * scale, "{answer}");
     }
     assert_eq!(numbers["chain"]["holds"], true);
@@ -134,7 +135,7 @@ fn check_numbers(numbers: &Value, out: &Path) {
 /// Fig. 4 places that are never worse than the start.
 fn check_figures(out: &Path, numbers: &Value) {
     let text = |name: &str| String::from_utf8(read(out, name)).unwrap();
-    // A car of 4.5 m by 1.5 m in a space of 5 m by 3 m has 25 cm before and behind it, and 75 cm at each side.
+    // A car of 4.5 m by 1.5 m in a space of 5 m by 3 m has slacks of 25 cm along and 75 cm across.
     let parking = text("fig1-parking.svg");
     for shown in [
         "(a) error along x",
@@ -170,7 +171,7 @@ fn check_figures(out: &Path, numbers: &Value) {
     assert_eq!(places.len(), 4);
     let mean = |index: usize| places[index]["mean"].as_f64().unwrap();
     let margin = |index: usize| places[index]["margin"].as_f64().unwrap();
-    // The start is on the border of sight; the search makes it better, and better still if some poses may miss the tag.
+    // The start is on the border of sight. The search improves it, and more so if some poses may miss the tag.
     assert!(margin(0) < 0.3 && margin(0) > 0.0);
     assert!(mean(2) <= mean(3) && mean(3) < 0.01 * mean(0));
     assert!(margin(3) >= 1.0 && places[3]["contained"] == true);
@@ -213,7 +214,7 @@ fn check_picture(text: &str, name: &str) {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_is_refused() {
+fn folder_that_cannot_be_created_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("file"), "").unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_posegate"))

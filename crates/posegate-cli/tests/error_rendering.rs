@@ -76,7 +76,7 @@ fn long_line(before: usize, after: usize) -> String {
 }
 
 #[test]
-fn faults_far_along_a_line_are_shown_with_their_place() {
+fn fault_in_a_long_line_is_shown_with_its_column() {
     let folder = Folder::new();
     for (before, after) in [(10, 10), (70_000, 10), (10, 70_000), (3_000_000, 3_000_000)] {
         folder.write("long.toml", long_line(before, after));
@@ -96,7 +96,7 @@ fn faults_far_along_a_line_are_shown_with_their_place() {
 
 /// Megabytes of text as a key, a value, a table's name, one line, and in a file that the site names.
 #[test]
-fn megabytes_are_not_printed() {
+fn error_of_a_huge_input_is_short() {
     let folder = Folder::new();
     let long = "k".repeat(4_000_000);
     for text in [
@@ -137,7 +137,7 @@ fn megabytes_are_not_printed() {
 
 /// The caret is below the fault even if the line has escaped characters before the fault.
 #[test]
-fn carets_stay_aligned() {
+fn caret_is_below_the_fault_after_escaped_characters() {
     let folder = Folder::new();
     folder.write("bad.toml", "[table]\n\"\u{202e}\u{9b}\" = 1\n# last\n");
     let message = error(&folder, &["check", "bad.toml"]);
@@ -153,7 +153,7 @@ fn carets_stay_aligned() {
 
 /// Hostile names, keys and contents in errors of every reader.
 #[test]
-fn errors_are_printable() {
+fn error_with_hostile_names_is_printable() {
     let folder = Folder::new();
     let file = |name: &str| format!("{name}{HOSTILE}.toml");
     let sites = [
@@ -302,7 +302,7 @@ fn errors_are_printable() {
 
 /// Answers about a site with hostile names, as text and as JSON.
 #[test]
-fn answers_are_printable_and_json_is_valid() {
+fn answer_with_hostile_names_is_printable_and_valid_json() {
     let folder = Folder::new();
     // Names with control characters are refused; characters that change the direction of text are allowed.
     const NAME: &str = "a\u{202e}\u{2066}\u{200f}\u{feff}";
@@ -432,7 +432,7 @@ fn panic_in_main_is_one_line_and_exit_code_3() {
 
 /// Lists keep their line ends.
 #[test]
-fn messages_of_several_lines_stay_so() {
+fn message_of_several_lines_keeps_its_lines() {
     let folder = Folder::new();
     std::fs::remove_dir_all(folder.path().join("built/parts")).unwrap();
     std::fs::create_dir(folder.path().join("built/parts")).unwrap();

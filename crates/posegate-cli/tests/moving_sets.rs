@@ -29,7 +29,7 @@ fn lines(output: &Output) -> Vec<Value> {
 
 /// A movement makes a cylinder wider, exactly.
 #[test]
-fn a_bounded_set_grows_by_speed_times_time() {
+fn bounded_set_grows_by_speed_times_time() {
     let poses = "x_m,y_m,yaw_rad\n0.0,0.0,0.0\n0.02,0.0,0.0\n0.0,0.03,-0.01\n0.04,0.0,0.0\n";
     for (translation, yaw_deg, speed, rate) in [
         (0.01, 0.5, 0.1, 5.0),
@@ -58,7 +58,7 @@ fn a_bounded_set_grows_by_speed_times_time() {
 
 /// The dock ends at 0.08 m: an ellipsoid of 1 cm at 99 % reaches 3.37 cm.
 #[test]
-fn an_ellipsoid_grows_by_speed_times_time() {
+fn ellipsoid_grows_by_speed_times_time() {
     let estimate = |x: f64| format!("{HEADER}0,{x},0,0,1e-4,0,0,1e-6,0,1e-6,0\n");
     let code = |x: f64, arguments: &str| gate(&estimate(x), arguments).status.code();
     let moving = "--max-speed 0.1 --max-yaw-rate 1 --horizon-ms 200";
@@ -72,7 +72,7 @@ fn an_ellipsoid_grows_by_speed_times_time() {
 }
 
 #[test]
-fn a_report_is_permitted_if_every_hypothesis_is_inside() {
+fn report_is_permitted_if_every_hypothesis_is_inside() {
     let small = "1e-6,0,0,1e-6,0,1e-6";
     let estimates = format!(
         "{HEADER}1,0,0,0,{small},0\n1,0.03,0,0,{small},1\n2,0,0,0,{small},0\n2,0.5,0,0,{small},1\n2,0.6,0,0,{small},2\n3,0,0,0,{small},0\n"
@@ -86,15 +86,15 @@ fn a_report_is_permitted_if_every_hypothesis_is_inside() {
     assert_eq!(lines[1]["index"], 1);
     assert_eq!(lines[1]["hypothesis"], 1);
     assert_eq!(lines[0]["hypothesis"], 1);
-    // The margin is that of the hypothesis that is nearest to the border.
+    // The margin is that of the hypothesis nearest to the border.
     assert!(lines[0]["margin"].as_f64() < lines[2]["margin"].as_f64());
 }
 
 #[test]
-fn what_is_not_a_movement_or_a_report_is_refused() {
+fn invalid_movement_or_report_is_refused() {
     let small = "1e-6,0,0,1e-6,0,1e-6";
     let good = format!("{HEADER}1,0,0,0,{small},0\n");
-    for (arguments, said) in [
+    for (arguments, expected) in [
         ("--max-speed 0.1", "--horizon-ms"),
         ("--horizon-ms 100", "--max-speed"),
         ("--max-speed=-0.1 --horizon-ms 100", "--max-speed"),
@@ -105,7 +105,7 @@ fn what_is_not_a_movement_or_a_report_is_refused() {
         let output = gate(&good, arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments}");
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(error.contains(said), "{arguments}: {error}");
+        assert!(error.contains(expected), "{arguments}: {error}");
     }
     let broken = format!("{good}1,0,0,0,{small},2\n");
     let output = gate(&broken, "");

@@ -123,9 +123,9 @@ fn no_output_file_replaces_an_input() {
     assert!(pairs > 60, "{pairs}");
 }
 
-/// An input that is given through a link is protected as the file that the link leads to.
+/// An input through a link is protected like the target of the link.
 #[test]
-fn an_input_through_a_link_is_protected() {
+fn input_through_a_link_is_not_replaced() {
     let folder = Folder::new();
     symlink("site.toml", folder.path().join("soft")).unwrap();
     let line = [
@@ -141,7 +141,7 @@ fn an_input_through_a_link_is_protected() {
 }
 
 #[test]
-fn two_outputs_are_not_one_file() {
+fn two_outputs_to_one_file_are_refused() {
     let mut pairs = 0;
     for (leaf, line) in LINES {
         let all = arguments(leaf, line);
@@ -242,7 +242,7 @@ fn no_file_in_an_output_folder_replaces_an_input() {
 }
 
 #[test]
-fn a_picture_of_the_doctor_does_not_replace_the_site() {
+fn doctor_picture_does_not_replace_the_site() {
     let (_, names) = written_into("doctor", "doctor {site} -o {output}");
     for name in names {
         let folder = Folder::new();
@@ -256,7 +256,7 @@ fn a_picture_of_the_doctor_does_not_replace_the_site() {
 }
 
 #[test]
-fn a_site_file_among_the_parts_of_a_build_is_refused() {
+fn site_file_inside_the_build_folder_is_refused() {
     let folder = Folder::new();
     let parts = folder.path().join("built/parts");
     for name in NAMED_BY_SITE.into_iter().chain(["site.toml"]) {
@@ -274,7 +274,7 @@ fn a_site_file_among_the_parts_of_a_build_is_refused() {
 
 /// Input and output files that the shell has opened.
 #[test]
-fn redirected_inputs_and_outputs_are_known() {
+fn redirected_input_is_not_replaced() {
     let folder = Folder::new();
     let open = |name: &str| fs::File::open(folder.path().join(name)).unwrap();
     let append = |name: &str| {
@@ -320,9 +320,9 @@ fn redirected_inputs_and_outputs_are_known() {
     assert!(!String::from_utf8_lossy(&done.stderr).contains("same file"));
 }
 
-/// `seal` works in place without -o; -o with the same file is a mistake and is refused.
+/// `seal` works in place without -o. An -o with the same file is refused.
 #[test]
-fn seal_works_in_place_alone() {
+fn seal_replaces_its_input_only_without_output_option() {
     let folder = Folder::new();
     assert!(folder.run(&["seal", "firmware"]).status.success());
     refused(
@@ -333,7 +333,7 @@ fn seal_works_in_place_alone() {
 }
 
 #[test]
-fn standard_input_is_one_input() {
+fn standard_input_is_used_once() {
     for (leaf, line) in LINES {
         let all = inputs(leaf, line);
         let named: Vec<&String> = all.iter().filter_map(|(name, _)| name.as_ref()).collect();
@@ -350,7 +350,7 @@ fn standard_input_is_one_input() {
 
 /// Only the module `files` opens files: the program's code names no other function that does.
 #[test]
-fn subcommands_open_no_file_by_themselves() {
+fn subcommands_open_files_only_through_the_files_module() {
     let root =
         Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("crates/posegate-cli/src");
     let mut open = vec![root];

@@ -27,7 +27,7 @@ fn data(page: &str) -> Value {
 }
 
 #[test]
-fn it_shows_every_task_and_asks_for_nothing() {
+fn page_shows_every_task_and_fetches_nothing() {
     let page = made(SAMPLE, |_| ()).expect("a page");
     let data = data(&page);
     let site = Site::parse(SAMPLE, "site.toml").expect("a site");
@@ -65,21 +65,21 @@ fn it_shows_every_task_and_asks_for_nothing() {
         assert!(!page.contains(asked), "{asked}");
     }
     assert!(page.contains("default-src 'none'") && !page.contains("{{"));
-    // The same bytes again.
+    // A second run gives the same bytes.
     assert_eq!(page, made(SAMPLE, |_| ()).expect("a page"));
 }
 
 #[test]
-fn names_are_text() {
-    let nasty = "</script><b id='x'>{{core}}&\\\"";
-    let text = SAMPLE.replace("[task.dock]", &format!("[task.\"{nasty}\"]"));
-    let text = text.replace("task = \"dock\"", &format!("task = \"{nasty}\""));
+fn names_are_escaped_in_the_page() {
+    let hostile = "</script><b id='x'>{{core}}&\\\"";
+    let text = SAMPLE.replace("[task.dock]", &format!("[task.\"{hostile}\"]"));
+    let text = text.replace("task = \"dock\"", &format!("task = \"{hostile}\""));
     let page = made(&text, |order| order.title = "a</title><i>{{data}}".into()).expect("a page");
     assert!(!page.contains("<b id") && !page.contains("<i>"));
     assert_eq!(page.matches("class Core").count(), 1);
     assert_eq!(page.matches("</script>").count(), 2);
-    let told = data(&page)["tasks"].to_string();
-    assert!(told.contains("</script><b id='x'>{{core}}&"));
+    let tasks = data(&page)["tasks"].to_string();
+    assert!(tasks.contains("</script><b id='x'>{{core}}&"));
 }
 
 /// Returns the sections of a WebAssembly module: number and content.
@@ -104,7 +104,7 @@ fn sections(mut bytes: &[u8]) -> Vec<(u8, &[u8])> {
 }
 
 #[test]
-fn the_core_imports_nothing() {
+fn wasm_core_has_no_imports() {
     let sections = sections(CORE);
     assert!(sections.iter().all(|(number, _)| *number != 2), "an import");
     let exports = sections.iter().find(|(number, _)| *number == 7);
@@ -126,46 +126,51 @@ fn placements_are_checked_and_shown() {
         "tag_pose": { "x": 2.5, "y": 0.25, "z": 0.5, "roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 170.0 },
         "mean": 109.5, "p_miss": 4e-7, "margin": 1.2499999, "others": [],
     });
-    let mut told = place.clone();
-    told["before"] = place;
+    let mut placement = place.clone();
+    placement["before"] = place;
     let site = Site::parse(SAMPLE, "site.toml").expect("a site");
-    let hangs = site.tasks["see-t7"].success.tags()[0].pose;
-    told["before"]["tag_pose"] = json!({
-        "x": hangs.x, "y": hangs.y, "z": hangs.z,
-        "roll_deg": hangs.roll_deg, "pitch_deg": hangs.pitch_deg, "yaw_deg": hangs.yaw_deg,
+    let mounted = site.tasks["see-t7"].success.tags()[0].pose;
+    placement["before"]["tag_pose"] = json!({
+        "x": mounted.x, "y": mounted.y, "z": mounted.z,
+        "roll_deg": mounted.roll_deg, "pitch_deg": mounted.pitch_deg, "yaw_deg": mounted.yaw_deg,
     });
     let page = made(SAMPLE, |order| {
-        order.placements.push(("see-t7".into(), told.clone()))
+        order.placements.push(("see-t7".into(), placement.clone()))
     });
     let page = page.expect("a page");
-    let before = format!("<td>before</td><td>{:.4}</td>", hangs.x);
+    let before = format!("<td>before</td><td>{:.4}</td>", mounted.x);
     assert!(page.contains(&before) && page.contains("<td>109.500000</td>"));
     // A probability is rounded up, a margin down.
     assert!(page.contains("<td>0.000001</td><td>1.249999</td>"));
-    let wrong = |task: &str, told: Value| {
-        let page = made(SAMPLE, |order| order.placements.push((task.into(), told)));
+    let wrong = |task: &str, placement: Value| {
+        let page = made(SAMPLE, |order| {
+            order.placements.push((task.into(), placement))
+        });
         page.expect_err("a fault")
     };
-    let mut moved = told.clone();
-    moved["before"]["tag_pose"]["x"] = json!(hangs.x + 0.001);
+    let mut moved = placement.clone();
+    moved["before"]["tag_pose"]["x"] = json!(mounted.x + 0.001);
     assert_eq!(wrong("see-t7", moved), PageError::OtherTag("see-t7".into()));
-    assert_eq!(wrong("no", told.clone()), PageError::NoTask("no".into()));
+    assert_eq!(
+        wrong("no", placement.clone()),
+        PageError::NoTask("no".into())
+    );
     // A placement names the site file that it was made from.
-    told["site_digest"] = json!(site.digest_text());
+    placement["site_digest"] = json!(site.digest_text());
     let page = made(SAMPLE, |order| {
-        order.placements.push(("see-t7".into(), told.clone()))
+        order.placements.push(("see-t7".into(), placement.clone()))
     });
     assert!(page.unwrap().contains("have the tag at the place"));
     let later = SAMPLE.replace("psi_max_deg = 50.0", "psi_max_deg = 49.0");
     let error = made(&later, |order| {
-        order.placements.push(("see-t7".into(), told.clone()))
+        order.placements.push(("see-t7".into(), placement.clone()))
     });
     assert!(
         matches!(error, Err(PageError::OtherSite(..))),
         "{:?}",
         error.err()
     );
-    // Once the found place is in the site file, the page shows the tag there; a pose is copied with some decimals.
+    // After the found place is written into the site file, the page shows the tag there. The copied pose may be rounded.
     let own =
         "pose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }";
     assert!(SAMPLE.contains(own));
@@ -173,11 +178,11 @@ fn placements_are_checked_and_shown() {
         SAMPLE.replace(own, &format!("pose = {{ x = {x}, y = 0.25, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 170.0 }}"))
     };
     let page = made(&at("2.50004"), |order| {
-        order.placements.push(("see-t7".into(), told.clone()))
+        order.placements.push(("see-t7".into(), placement.clone()))
     });
     assert!(page.unwrap().contains("has the tag at the best place"));
     let page = made(&at("2.51"), |order| {
-        order.placements.push(("see-t7".into(), told.clone()))
+        order.placements.push(("see-t7".into(), placement.clone()))
     });
     assert_eq!(page.err(), Some(PageError::OtherTag("see-t7".into())));
     assert_eq!(
@@ -189,7 +194,7 @@ fn placements_are_checked_and_shown() {
 /// The page shows the chains of the paper's example with their steps and failures, the site from above, the sheet of its tags,
 /// and plans.
 #[test]
-fn chains_plans_and_the_sheet_are_there() {
+fn page_has_chains_plans_and_the_sheet() {
     let text = include_str!("../../../examples/sites/paper-chain.toml");
     let site = Site::parse(text, "site.toml").expect("a site");
     let shown = made(text, |_| ()).expect("a page");
@@ -225,7 +230,7 @@ fn chains_plans_and_the_sheet_are_there() {
         );
     }
     assert!(shown.contains("succeeds; risk at most "));
-    // A dock that is too narrow: no chain leads to it.
+    // A dock that is too narrow for every chain.
     let narrow = text.replacen(
         "[task.dock]",
         "[task.dock]\ntolerance = { translation = 0.02, yaw_deg = 0.5 }",
@@ -239,7 +244,7 @@ fn chains_plans_and_the_sheet_are_there() {
 
 /// The page has the numbers of the camera's view, from the goal and from the worst poses of the expected set.
 #[test]
-fn images_have_their_numbers() {
+fn image_has_a_table_of_its_numbers() {
     let head = "[task.see-t7]\n";
     let expected = format!("{head}expected = {{ translation = 0.1, yaw_deg = 2.0 }}\n");
     for (text, worst) in [
@@ -258,7 +263,7 @@ fn images_have_their_numbers() {
 
 /// The sections at the ends of a set's headings are not empty.
 #[test]
-fn the_ends_of_a_set_are_not_empty() {
+fn sections_at_the_end_headings_are_not_empty() {
     let text = include_str!("../../../examples/sites/docks.toml");
     let page = made(text, |_| ()).expect("a page");
     for task in data(&page)["tasks"].as_array().expect("tasks") {
@@ -275,7 +280,7 @@ fn the_ends_of_a_set_are_not_empty() {
 
 /// Walls of a large hall do not make the page larger if little of them is shown.
 #[test]
-fn long_walls_are_cheap() {
+fn page_size_is_independent_of_wall_length() {
     let wall = |length: f64| {
         let wall = format!(
             "[wall.long]\ncorners = [[-{length:?}, -3.0], [{length:?}, -3.0], [{length:?}, 3.9], [-{length:?}, 3.9]]\nz = [3.0, 4.0]\n"
@@ -289,33 +294,33 @@ fn long_walls_are_cheap() {
 }
 
 #[test]
-fn the_command_writes_a_page_or_nothing() {
+fn report_writes_a_page_or_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("site.toml"), SAMPLE).expect("a file");
     std::fs::write(path("no.svg"), "text").expect("a file");
     std::fs::write(path("no.json"), "{").expect("a file");
     let run = |more: &[&str]| {
-        let told = Command::new(env!("CARGO_BIN_EXE_posegate"))
+        let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
             .current_dir(folder.path())
             .args(["report", "site.toml", "-o", "report.html"])
             .args(more)
             .output()
             .expect("the program runs");
         (
-            told.status.code(),
-            String::from_utf8_lossy(&told.stderr).into_owned(),
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
         )
     };
     for (more, what) in [
-        (["--picture", "no.svg"], "is no SVG picture"),
+        (["--picture", "no.svg"], "is not an SVG picture"),
         (["--placement", "see-t7=no.json"], "posegate place --json"),
         (["--placement", "no.json"], "expected TASK=FILE"),
         (["--picture", "none.svg"], "none.svg"),
     ] {
-        let (code, said) = run(&more);
-        assert_eq!(code, Some(2), "{said}");
-        assert!(said.contains(what), "{said}");
+        let (code, error) = run(&more);
+        assert_eq!(code, Some(2), "{error}");
+        assert!(error.contains(what), "{error}");
         assert!(!path("report.html").exists());
     }
     assert_eq!(run(&[]), (Some(0), String::new()));
@@ -325,8 +330,8 @@ fn the_command_writes_a_page_or_nothing() {
 
 const HALL: &str = include_str!("../../../examples/sites/hall.toml");
 
-/// Returns the hall with its first docks, with tags of 30 cm on its north wall, at these places along it in metres, and without
-/// candidates.
+/// Returns the hall with its first docks and without candidates. Tags of 30 cm are on its north wall, at these places along it
+/// in metres.
 fn hall(docks: u32, along: &[f64]) -> String {
     let rest = format!("[task.dock-{}]", docks + 1);
     let (site, _) = HALL
@@ -351,9 +356,9 @@ fn element<'p>(page: &'p str, id: &str) -> &'p str {
 /// The tags that serve the first two docks.
 const TAGS_OF_TWO: [f64; 2] = [5.25, 8.25];
 
-/// The first thing that a manager reads is whether the docks are served, by how many tags, and how near to the limit.
+/// The page begins with the number of served docks, the number of tags and the worst margin.
 #[test]
-fn the_page_begins_with_a_summary() {
+fn page_begins_with_a_summary() {
     let all = made(&hall(3, &[5.25, 8.25]), |_| ()).expect("a page");
     let summary = element(&all, "summary");
     assert!(
@@ -380,7 +385,7 @@ fn the_page_begins_with_a_summary() {
     assert!(shown <= least && least < shown + 0.01, "{shown} {least}");
     let (header, _) = all.split_once("<main>").expect("a header");
     assert!(header.contains("id=\"summary\""));
-    // Without the first tag, the first dock is not served: this is said, not hidden.
+    // Without the first tag the first dock is not served, and the summary reports it.
     let fewer = made(&hall(2, &TAGS_OF_TWO[1..]), |_| ()).expect("a page");
     let summary = element(&fewer, "summary");
     assert!(
@@ -389,22 +394,22 @@ fn the_page_begins_with_a_summary() {
     );
     assert!(fewer.contains("<p id=\"summary\" class=\"bad\">"));
     assert!(fewer.contains("<li>NOT served: dock-1: "));
-    // Docks that are alike are described once.
+    // Equal docks are described once.
     assert!(all.contains("<p>3 tasks are alike in the frames of their goals."));
     assert_eq!(
         all.matches("<details><summary>the pictures of dock-")
             .count(),
         2
     );
-    // Nothing is claimed of tasks without a start.
+    // The page claims nothing about tasks without a start.
     let sample = made(SAMPLE, |_| ()).expect("a page");
     assert_eq!(element(&sample, "summary"), "3 of 3 success sets proven");
     assert!(sample.contains("unknown whether a robot can reach dock, park: no start"));
 }
 
 #[test]
-fn tasks_that_are_alike_are_folded() {
-    // One that is narrower is shown by itself.
+fn equal_tasks_are_described_once() {
+    // A narrower dock is shown separately.
     let site = hall(3, &[5.25, 8.25]);
     let (before, last) = site.split_once("[task.dock-3]").expect("a task");
     let narrow = last.replacen("x = [-0.1, 0.1]", "x = [-0.1, 0.09]", 1);
@@ -417,9 +422,9 @@ fn tasks_that_are_alike_are_folded() {
     );
 }
 
-/// A stated error that the tag's tolerance alone exceeds makes a plan that is proven, and wrong: the summary says so.
+/// If the tag's tolerance alone exceeds the stated error, a plan is proven but wrong. The summary warns of it.
 #[test]
-fn warnings_stand_beside_the_claim() {
+fn summary_shows_warnings() {
     let doubtful = hall(2, &TAGS_OF_TWO) + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
     let page = made(&doubtful, |_| ()).expect("a page");
     assert!(page.contains("<p id=\"summary\" class=\"warned\">2 of 2 docks"));
@@ -428,9 +433,9 @@ fn warnings_stand_beside_the_claim() {
     assert!(page.contains("<p id=\"summary\" class=\"good\">") && !page.contains("WARNING"));
 }
 
-/// Where nothing is known the page says so: 0.000 m would promise that a tag is exactly where the file says.
+/// A missing tolerance is shown as unknown: 0.000 m would claim that the tag is exactly at the pose of the file.
 #[test]
-fn an_unknown_tolerance_is_not_zero() {
+fn unknown_tolerance_is_not_shown_as_zero() {
     let page = made(&hall(1, &[5.25]), |_| ()).expect("a page");
     let (_, tags) = page.split_once("<section id=\"tags\">").expect("tags");
     assert!(tags.contains("<td>unknown</td>") && !tags.contains("<td>0.000 m"));

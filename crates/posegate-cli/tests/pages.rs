@@ -96,7 +96,7 @@ fn functions(sentence: &str) -> Vec<String> {
         let call = span.split('(').next().unwrap_or("");
         if let Some((path, name)) = call.rsplit_once("::") {
             found.push(name.to_string());
-            // Its type; modules need not be named where it is used.
+            // Its type: modules need not be named at its use.
             let of = path.rsplit("::").next().unwrap_or("");
             if of.starts_with(|c: char| c.is_ascii_uppercase()) {
                 found.push(of.to_string());
@@ -140,9 +140,7 @@ fn faults(text: &str, folder: &Path) -> Vec<String> {
             .collect();
         for name in functions(&sentence) {
             if !texts.iter().any(|text| has_word(text, &name)) {
-                faults.push(format!(
-                    "`{name}` does not stand in what this links: {sentence}"
-                ));
+                faults.push(format!("`{name}` is not in the linked files: {sentence}"));
             }
         }
         for part in PARTS
@@ -158,7 +156,7 @@ fn faults(text: &str, folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn pages_say_what_their_programs_do() {
+fn pages_name_only_what_their_programs_contain() {
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();
         let faults = faults(&text, page.parent().unwrap());
@@ -173,7 +171,7 @@ fn pages_say_what_their_programs_do() {
 
 /// The check finds a missing function, a missing part and a missing file, and reports no fault in a correct page.
 #[test]
-fn a_page_that_says_otherwise_is_found() {
+fn fault_of_a_page_is_found() {
     let folder = root().join("docs");
     let right = "[a gate](../examples/c/docking_gate.c) calls `posegate_gate_step(..) == X` once. It has no link, and `posegate_none`.";
     assert_eq!(faults(right, &folder), Vec::<String>::new());

@@ -1,5 +1,5 @@
 //! `posegate draw` and `posegate doctor`: the pictures in the pages are those that the program draws. A picture that
-//! cannot be drawn is refused with a message that says what to do.
+//! cannot be drawn is refused with advice.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ fn table(folder: &Path, task: &str) -> String {
 }
 
 #[test]
-fn the_pictures_of_the_pages_are_drawn() {
+fn committed_pictures_equal_the_drawn_ones() {
     let folder = tempfile::tempdir().unwrap();
     let table = table(folder.path(), "enter-bay");
     let sections = ["--task", "enter-bay", "--table", &table, "--expected"];
@@ -45,9 +45,9 @@ fn the_pictures_of_the_pages_are_drawn() {
         ("see-bay-plan.svg", plan.as_slice()),
     ] {
         let picture = done(&[&["draw", SITE, "-o", "-"], arguments].concat());
-        let kept = std::fs::read(root().join("docs").join(name)).unwrap();
+        let committed = std::fs::read(root().join("docs").join(name)).unwrap();
         assert!(
-            picture == kept,
+            picture == committed,
             "docs/{name} is not what the program draws: look at `./ci.sh figures DIR`, and copy it"
         );
         let page = std::fs::read_to_string(root().join("docs/host.md")).unwrap();
@@ -56,7 +56,7 @@ fn the_pictures_of_the_pages_are_drawn() {
 }
 
 #[test]
-fn the_plan_of_the_pages_is_drawn() {
+fn committed_plan_equals_the_drawn_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("plan.svg");
     let site = "examples/sites/paper-chain.toml";
@@ -69,7 +69,7 @@ fn the_plan_of_the_pages_is_drawn() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused() {
+fn undrawable_picture_is_refused_with_advice() {
     let folder = tempfile::tempdir().unwrap();
     let table = table(folder.path(), "see-bay");
     let dock = "examples/sites/dock.toml";
@@ -104,15 +104,15 @@ fn what_cannot_be_drawn_is_refused() {
         ),
     ] {
         let output = posegate(&[arguments.as_slice(), &["-o", "-"]].concat());
-        let told = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
+        let error = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(told.contains(words), "{arguments:?}: {told}");
+        assert!(error.contains(words), "{arguments:?}: {error}");
         assert!(output.stdout.is_empty());
     }
     let expected = posegate(&["draw", dock, "--task", "dock", "--expected", "-o", "-"]);
     assert_eq!(expected.status.code(), Some(2));
-    let told = String::from_utf8_lossy(&expected.stderr).into_owned();
-    assert!(told.contains("no `expected`"), "{told}");
+    let error = String::from_utf8_lossy(&expected.stderr).into_owned();
+    assert!(error.contains("no `expected`"), "{error}");
     // A table of this task from before the site file changed.
     let text = std::fs::read_to_string(root().join(SITE)).unwrap();
     let newer = folder.path().join("newer.toml");
@@ -125,7 +125,7 @@ fn what_cannot_be_drawn_is_refused() {
 }
 
 #[test]
-fn estimates_are_drawn_where_they_are_pose_sets() {
+fn estimates_with_pose_sets_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("estimates.csv");
     let header = "x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
@@ -151,7 +151,7 @@ fn estimates_are_drawn_where_they_are_pose_sets() {
 }
 
 #[test]
-fn the_doctor_sees_a_turned_tag() {
+fn doctor_warns_of_a_turned_tag() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out/side");
     let out = out.to_str().unwrap();

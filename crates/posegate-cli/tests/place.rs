@@ -1,4 +1,4 @@
-//! `posegate place`: optima that are known, the contract of the command line, and what each bad input is told.
+//! `posegate place`: optima that are known, the contract of the command line, and the message for each bad input.
 
 use posegate_testkit::counts;
 use serde_json::Value;
@@ -7,17 +7,17 @@ use std::process::{Command, Stdio};
 
 const SITE: &str = include_str!("../../../tests/data/reference-a.toml");
 
-/// The free room of the paper's Fig. 4.
+/// The search space of the paper's Fig. 4.
 const FREE: &str = "--free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360";
 
-struct Told {
+struct Run {
     code: i32,
     out: String,
     err: String,
 }
 
 /// Runs a line in a folder with this site file.
-fn run_in(folder: &Path, site: &str, line: &str, threads: Option<&str>) -> Told {
+fn run_in(folder: &Path, site: &str, line: &str, threads: Option<&str>) -> Run {
     std::fs::write(folder.join("site.toml"), site).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_posegate"));
     if let Some(threads) = threads {
@@ -30,21 +30,21 @@ fn run_in(folder: &Path, site: &str, line: &str, threads: Option<&str>) -> Told 
         .output()
         .unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Told {
+    Run {
         code: output.status.code().unwrap(),
         out: text(output.stdout),
         err: text(output.stderr),
     }
 }
 
-fn run(site: &str, line: &str) -> Told {
+fn run(site: &str, line: &str) -> Run {
     run_in(tempfile::tempdir().unwrap().path(), site, line, None)
 }
 
 fn json(site: &str, line: &str, code: i32) -> Value {
-    let told = run(site, &format!("{line} --json"));
-    assert_eq!(told.code, code, "{line}\n{}\n{}", told.out, told.err);
-    serde_json::from_str(&told.out).unwrap()
+    let output = run(site, &format!("{line} --json"));
+    assert_eq!(output.code, code, "{line}\n{}\n{}", output.out, output.err);
+    serde_json::from_str(&output.out).unwrap()
 }
 
 fn place(sigma: &str, more: &str) -> String {
@@ -53,53 +53,56 @@ fn place(sigma: &str, more: &str) -> String {
     )
 }
 
-fn number(told: &Value, key: &str) -> f64 {
-    told[key]
+fn number(placed: &Value, key: &str) -> f64 {
+    placed[key]
         .as_f64()
-        .unwrap_or_else(|| panic!("{key} in {told}"))
+        .unwrap_or_else(|| panic!("{key} in {placed}"))
 }
 
-fn pose(told: &Value, key: &str) -> f64 {
-    number(&told["tag_pose"], key)
+fn pose(placed: &Value, key: &str) -> f64 {
+    number(&placed["tag_pose"], key)
 }
 
 #[test]
-fn a_pose_that_is_known_has_its_tag_as_near_as_it_is_seen() {
+fn exact_pose_places_the_tag_at_the_nearest_visible_distance() {
     // d = (s / 2) fy / (height / 2), straight ahead.
     let nearest = 0.15 * 615.0 / 240.0;
     for exact in ["--exact", "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0"] {
-        let told = json(
+        let placed = json(
             SITE,
             &format!("place site.toml --task see-t7 {exact} {FREE}"),
             0,
         );
         assert!(
-            (number(&told, "distance") - 0.25 - nearest).abs() < 1e-3,
-            "{told}"
+            (number(&placed, "distance") - 0.25 - nearest).abs() < 1e-3,
+            "{placed}"
         );
-        assert!((pose(&told, "z") - 0.5).abs() < 1e-3, "{told}");
-        assert!((pose(&told, "yaw_deg") - 180.0).abs() < 0.5, "{told}");
-        assert!((number(&told, "cost_at_goal") - 100.0 * nearest * nearest).abs() < 0.1);
-        assert!(told["mean"].is_null() && told["margin"].is_null());
-        assert_eq!(number(&told, "p_miss"), 0.0);
+        assert!((pose(&placed, "z") - 0.5).abs() < 1e-3, "{placed}");
+        assert!((pose(&placed, "yaw_deg") - 180.0).abs() < 0.5, "{placed}");
+        assert!((number(&placed, "cost_at_goal") - 100.0 * nearest * nearest).abs() < 0.1);
+        assert!(placed["mean"].is_null() && placed["margin"].is_null());
+        assert_eq!(number(&placed, "p_miss"), 0.0);
     }
 }
 
-/// A tenth of what a middle run of SciPy's differential evolution takes (6,330 and 4,560 looks), and its best of 20 runs, with the
-/// usual seed: what `./ci.sh placement` measures, with more seeds.
+/// `place` needs a tenth of the evaluations of SciPy's median run (6,330 and 4,560) for the best result of SciPy's 20 runs.
+/// `./ci.sh placement` measures it with more seeds.
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn a_tenth_of_the_looks_is_enough() {
+fn place_needs_a_tenth_of_the_evaluations_of_scipy() {
     for (sigma, looks, best) in [("0.1", 633, 109.696_268), ("0.3", 456, 636.134_418)] {
         let line = place(sigma, &format!("{FREE} --budget {looks}"));
-        let told = json(SITE, &line, 0);
-        assert!(number(&told, "evaluations") <= f64::from(looks), "{told}");
-        assert!(number(&told, "mean") <= 1.001 * best, "{told}");
+        let placed = json(SITE, &line, 0);
+        assert!(
+            number(&placed, "evaluations") <= f64::from(looks),
+            "{placed}"
+        );
+        assert!(number(&placed, "mean") <= 1.001 * best, "{placed}");
     }
 }
 
 #[test]
-fn more_looks_are_no_worse() {
+fn larger_budget_is_not_worse() {
     let mean = |looks: u32| {
         let line = place("0.1", &format!("{FREE} --budget {looks}"));
         number(&json(SITE, &line, 0), "mean")
@@ -112,7 +115,7 @@ fn more_looks_are_no_worse() {
 
 #[test]
 #[ignore = "takes a minute: ./ci.sh deep"]
-fn the_less_is_known_the_farther_the_tag_hangs() {
+fn larger_uncertainty_places_the_tag_farther_away() {
     let exact = json(
         SITE,
         &format!("place site.toml --task see-t7 --exact {FREE}"),
@@ -122,23 +125,26 @@ fn the_less_is_known_the_farther_the_tag_hangs() {
     // The pose-sets of Fig. 4: E[c]'s own optimum is not quite contained.
     for (sigma, scale, mean) in [("0.1", 0.9985, 109.698), ("0.3", 0.9898, 636.07)] {
         let line = place(sigma, &format!("{FREE} --budget 3000 --reserve 0,0"));
-        let told = json(SITE, &line, 0);
-        assert!(number(&told, "distance") > before + 0.3, "{told}");
-        before = number(&told, "distance");
-        assert!((number(&told, "mean") / mean - 1.0).abs() < 1e-3, "{told}");
+        let placed = json(SITE, &line, 0);
+        assert!(number(&placed, "distance") > before + 0.3, "{placed}");
+        before = number(&placed, "distance");
         assert!(
-            (number(&told, "margin") / scale - 1.0).abs() < 2e-3,
-            "{told}"
+            (number(&placed, "mean") / mean - 1.0).abs() < 1e-3,
+            "{placed}"
         );
-        assert_eq!(told["contained"], false);
-        assert!(number(&told, "evaluations") <= 3000.0);
+        assert!(
+            (number(&placed, "margin") / scale - 1.0).abs() < 2e-3,
+            "{placed}"
+        );
+        assert_eq!(placed["contained"], false);
+        assert!(number(&placed, "evaluations") <= 3000.0);
         if sigma == "0.3" {
-            // Tilted; its mirror image is as good, and square is worse.
-            let tilt = pose(&told, "yaw_deg") - 180.0;
-            assert!((tilt.abs() - 21.6).abs() < 2.0, "{told}");
+            // The tag is tilted. The mirror image is equally good, and a head-on tag is worse.
+            let tilt = pose(&placed, "yaw_deg") - 180.0;
+            assert!((tilt.abs() - 21.6).abs() < 2.0, "{placed}");
             let square = json(SITE, &place(sigma, "--free x=0.3:7,z=0:2 --budget 1000"), 0);
             assert!(
-                number(&square, "mean") > 1.003 * number(&told, "mean"),
+                number(&square, "mean") > 1.003 * number(&placed, "mean"),
                 "{square}"
             );
         }
@@ -147,7 +153,7 @@ fn the_less_is_known_the_farther_the_tag_hangs() {
 
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn contained_places_are_contained() {
+fn proven_margin_agrees_with_the_gate() {
     let free = "--free x=0.3:7,yaw_deg=90:270 --budget 1200 --reserve 0,0";
     let plain = json(SITE, &place("0.1", free), 0);
     let held = json(
@@ -162,7 +168,7 @@ fn contained_places_are_contained() {
     );
     let more = number(&held, "mean") / number(&plain, "mean");
     assert!((1.0..1.01).contains(&more), "{held}");
-    // What is proven is what the gate says of a table of that site, as near as its facets are to the set.
+    // The gate's margin on the table of that site is near the proven margin: facets are slightly inside the set.
     let moved = moved(&held);
     let folder = tempfile::tempdir().unwrap();
     let built = run_in(
@@ -191,9 +197,9 @@ fn contained_places_are_contained() {
     );
 }
 
-/// The site with its tag where it was placed, and a table about it.
-fn moved(told: &Value) -> String {
-    let at = |key: &str| pose(told, key);
+/// Returns the site with the tag at the found place, and with a table.
+fn moved(placed: &Value) -> String {
+    let at = |key: &str| pose(placed, key);
     let from = "x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0";
     assert!(SITE.contains(from));
     let to = format!(
@@ -209,7 +215,7 @@ fn moved(told: &Value) -> String {
 
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn margins_and_tolerances_are_made_large() {
+fn objectives_margin_and_tolerance_are_maximized() {
     let margin = json(
         SITE,
         &place(
@@ -241,7 +247,7 @@ fn margins_and_tolerances_are_made_large() {
         "{tolerant}"
     );
     assert!((number(&tolerant["tolerance"], "translation") - 0.01 * off).abs() < 1e-12);
-    // A site whose survey is so far off still holds the pose-set; not one that is off by a tenth more.
+    // The pose-set is inside if the survey is off by nearly this tolerance, and not if it is off by a tenth more.
     for (share, held) in [(0.99, true), (1.1, false)] {
         let tolerance = format!(
             "size = 0.30\ntolerance = {{ translation = {:?}, yaw_deg = {:?} }}",
@@ -257,27 +263,27 @@ fn margins_and_tolerances_are_made_large() {
                 x - 1e-9
             ),
         );
-        let told = json(&site, &line, 0);
-        assert_eq!(told["contained"], held, "{share}: {told}");
+        let placed = json(&site, &line, 0);
+        assert_eq!(placed["contained"], held, "{share}: {placed}");
     }
 }
 
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn the_smallest_tag_is_just_seen() {
+fn smallest_tag_is_just_large_enough() {
     let sharp = SITE.replace(
         "psi_max_deg = 50.0 }",
         "psi_max_deg = 50.0, px_per_bit_min = 3.0 }",
     );
     assert_ne!(sharp, SITE);
-    let told = json(
+    let placed = json(
         &sharp,
         &place("0.1", "--free x=1:4 --budget 200 --objective smallest-tag"),
         0,
     );
-    let size = number(&told, "size");
-    assert!(size < 0.25 && told["contained"] == true, "{told}");
-    let x = pose(&told, "x");
+    let size = number(&placed, "size");
+    assert!(size < 0.25 && placed["contained"] == true, "{placed}");
+    let x = pose(&placed, "x");
     for (share, held) in [(1.01, true), (0.97, false)] {
         let other = sharp.replace("size = 0.30", &format!("size = {:?}", size * share));
         let line = place(
@@ -287,21 +293,21 @@ fn the_smallest_tag_is_just_seen() {
                 x - 1e-9
             ),
         );
-        let told = json(&other, &line, 0);
-        assert_eq!(told["contained"], held, "{share}: {told}");
+        let placed = json(&other, &line, 0);
+        assert_eq!(placed["contained"], held, "{share}: {placed}");
     }
-    let told = run(SITE, &place("0.1", "--free x=1:4 --objective smallest-tag"));
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("px_per_bit_min"), "{}", told.err);
+    let output = run(SITE, &place("0.1", "--free x=1:4 --objective smallest-tag"));
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("px_per_bit_min"), "{}", output.err);
 }
 
 const WALL: &str = "\n[wall.north]\nfrom = [4.5, 3.0]\nto = [4.5, -3.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n";
 
 #[test]
 #[ignore = "takes a minute: ./ci.sh deep"]
-fn tags_hang_on_walls_and_not_in_doors() {
+fn tag_is_placed_on_the_wall_and_outside_the_door() {
     let site = SITE.to_owned() + WALL;
-    let told = json(
+    let placed = json(
         &site,
         &place(
             "0.1",
@@ -309,19 +315,19 @@ fn tags_hang_on_walls_and_not_in_doors() {
         ),
         0,
     );
-    let (x, y) = (pose(&told, "x"), pose(&told, "y"));
+    let (x, y) = (pose(&placed, "x"), pose(&placed, "y"));
     // On the wall, looking to the goal's side.
     let along = 3.0 - y;
-    assert!((x - 4.5).abs() < 1e-9, "{told}");
+    assert!((x - 4.5).abs() < 1e-9, "{placed}");
     assert!(
-        (pose(&told, "yaw_deg").abs() - 180.0).abs() < 1e-9,
-        "{told}"
+        (pose(&placed, "yaw_deg").abs() - 180.0).abs() < 1e-9,
+        "{placed}"
     );
     let half = 0.5 * 0.3 * 1.25;
-    let in_door = along > 2.4 - half && along < 3.6 + half && pose(&told, "z") < 2.1 + half;
-    assert!(!in_door, "{told}");
-    assert_eq!(told["contained"], true);
-    // Without the door it hangs better.
+    let in_door = along > 2.4 - half && along < 3.6 + half && pose(&placed, "z") < 2.1 + half;
+    assert!(!in_door, "{placed}");
+    assert_eq!(placed["contained"], true);
+    // Without the door there is a better place.
     let no_door = site.replace("keep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n", "");
     let freely = json(
         &no_door,
@@ -331,8 +337,11 @@ fn tags_hang_on_walls_and_not_in_doors() {
         ),
         0,
     );
-    assert!(number(&freely, "mean") < number(&told, "mean"), "{freely}");
-    // A wall that is all door.
+    assert!(
+        number(&freely, "mean") < number(&placed, "mean"),
+        "{freely}"
+    );
+    // A wall that consists of a door.
     let doors = site.replace("[2.4, 3.6], z = [0.0, 2.1]", "[0.0, 6.0], z = [0.0, 2.5]");
     let refused = run(&doors, &place("0.1", "--wall north"));
     assert_eq!(refused.code, 2);
@@ -341,7 +350,7 @@ fn tags_hang_on_walls_and_not_in_doors() {
         "{}",
         refused.err
     );
-    // One that no view reaches.
+    // A wall that no view reaches.
     let far = site.replace(
         "from = [4.5, 3.0]\nto = [4.5, -3.0]",
         "from = [30.0, 2.0]\nto = [30.0, -2.0]",
@@ -350,7 +359,7 @@ fn tags_hang_on_walls_and_not_in_doors() {
     let none = run(&far, &place("0.1", "--wall north --budget 300"));
     assert_eq!(none.code, 1, "{}", none.err);
     assert!(
-        none.err.contains("from no place looked at is the tag seen"),
+        none.err.contains("at no evaluated place is the tag seen"),
         "{}",
         none.err
     );
@@ -358,8 +367,8 @@ fn tags_hang_on_walls_and_not_in_doors() {
 
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn a_wall_that_carries_a_tag_hides_another_one() {
-    // The other tag hangs behind the wall: were it seen through it, the tag could hang up there, out of the image.
+fn wall_with_a_tag_hides_tags_behind_it() {
+    // The other tag is behind the wall. If it were seen through the wall, the tag could be mounted out of the image.
     let view = |tag: &str| {
         format!(
             "{{ shape = \"visibility\", camera = \"front\", tag = \"{tag}\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }}"
@@ -372,13 +381,13 @@ fn a_wall_that_carries_a_tag_hides_another_one() {
     let site = SITE.replace(&view("t7"), &both);
     let site = format!("{site}\n[tag.t8]\n{tag}\n\n[wall.north]\n{wall}\n");
     let line = place("0.1", "--tag t7 --wall north --free z=2.25:2.3 --budget 20");
-    let told = json(&site, &line, 1);
-    assert_eq!(told["contained"], false, "{told}");
-    assert_eq!(number(&told, "p_miss"), 1.0, "{told}");
+    let placed = json(&site, &line, 1);
+    assert_eq!(placed["contained"], false, "{placed}");
+    assert_eq!(number(&placed, "p_miss"), 1.0, "{placed}");
 }
 
 #[test]
-fn answers_are_the_same_at_any_number_of_threads() {
+fn result_is_equal_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let budget = if counts::is_deep() { 600 } else { 60 };
     for method in counts::one_a_day(&["cmaes", "ga"]) {
@@ -400,9 +409,9 @@ fn answers_are_the_same_at_any_number_of_threads() {
     }
 }
 
-/// What `contained_places_are_contained` shows in full.
+/// A quick variant of `proven_margin_agrees_with_the_gate`.
 #[test]
-fn a_contained_place_has_a_margin() {
+fn contained_place_has_a_margin_of_at_least_1() {
     let free = "--free x=0.3:7 --budget 40 --objective contained-cost";
     let held = json(SITE, &place("0.1", free), 0);
     assert_eq!(held["contained"], true);
@@ -410,9 +419,9 @@ fn a_contained_place_has_a_margin() {
     assert_eq!(number(&held, "p_miss"), 0.0, "{held}");
 }
 
-/// Wherever within the reserve the tag hangs, the margin is the one that was printed, or larger.
+/// If the tag is mounted within the reserve, the margin is at least the printed one.
 #[test]
-fn the_margin_holds_within_the_reserve() {
+fn margin_holds_for_every_mounting_error_within_the_reserve() {
     let folder = tempfile::tempdir().unwrap();
     let line = "--free x=0.3:7,yaw_deg=150:210 --budget 60 --objective contained-cost";
     for (more, [metres, degrees]) in [("", [0.01, 0.5]), (" --reserve 0.04,3", [0.04, 3.0])] {
@@ -446,9 +455,9 @@ fn the_margin_holds_within_the_reserve() {
             }
             std::fs::write(folder.path().join("c.csv"), csv).unwrap();
             let line = place("0.1", "--candidates c.csv --reserve 0,0 --json");
-            let told = run_in(folder.path(), SITE, &line, None);
-            let told: Value = serde_json::from_str(&told.out).unwrap();
-            for one in told["candidates"].as_array().unwrap() {
+            let output = run_in(folder.path(), SITE, &line, None);
+            let compared: Value = serde_json::from_str(&output.out).unwrap();
+            for one in compared["candidates"].as_array().unwrap() {
                 // Proofs are tried at 0.9999 of the largest scale.
                 assert!(number(one, "margin") > 0.9998 * margin, "{one} {held}");
             }
@@ -457,20 +466,23 @@ fn the_margin_holds_within_the_reserve() {
 }
 
 #[test]
-fn the_reserve_is_the_tolerance_of_the_tag() {
+fn default_reserve_is_the_tolerance_of_the_tag() {
     let tolerance = "size = 0.30\ntolerance = { translation = 0.02, yaw_deg = 2.0 }";
     let site = SITE.replace("size = 0.30", tolerance);
     assert_ne!(site, SITE);
     let line = place("0.1", "--free x=3.9:4.1 --budget 30");
-    let told = json(&site, &line, 0);
-    assert_eq!(number(&told["reserve"], "translation"), 0.02);
-    assert_eq!(number(&told["reserve"], "yaw_deg"), 2.0);
+    let placed = json(&site, &line, 0);
+    assert_eq!(number(&placed["reserve"], "translation"), 0.02);
+    assert_eq!(number(&placed["reserve"], "yaw_deg"), 2.0);
     let other = json(&site, &format!("{line} --reserve 0.03,1"), 0);
     assert_eq!(number(&other["reserve"], "translation"), 0.03);
     let known = json(SITE, &place("0.1", "--free x=3.9:4.1 --budget 30"), 0);
     assert_eq!(number(&known["reserve"], "translation"), 0.01);
     assert_eq!(number(&known["reserve"], "yaw_deg"), 0.5);
-    assert!(number(&known, "margin") > number(&told, "margin"), "{told}");
+    assert!(
+        number(&known, "margin") > number(&placed, "margin"),
+        "{placed}"
+    );
 }
 
 #[test]
@@ -478,19 +490,19 @@ fn candidates_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let csv = "name,x,y,z,yaw_deg\nfar,4,0,0.5,180\npost,1.5,0,0.5,180\nbehind,-3,0,0.5,0\n";
     std::fs::write(folder.path().join("c.csv"), csv).unwrap();
-    let told = run_in(
+    let output = run_in(
         folder.path(),
         SITE,
         &place("0.1", "--candidates c.csv --json"),
         None,
     );
-    assert_eq!(told.code, 0, "{}", told.err);
-    let told: Value = serde_json::from_str(&told.out).unwrap();
-    assert_eq!(told["name"], "post");
-    assert_eq!(told["evaluations"], 3);
-    let all = told["candidates"].as_array().unwrap();
+    assert_eq!(output.code, 0, "{}", output.err);
+    let compared: Value = serde_json::from_str(&output.out).unwrap();
+    assert_eq!(compared["name"], "post");
+    assert_eq!(compared["evaluations"], 3);
+    let all = compared["candidates"].as_array().unwrap();
     assert_eq!(number(&all[2], "p_miss"), 1.0);
-    // The same numbers as `cost` has.
+    // The numbers equal those of `cost`.
     let line = "cost site.toml --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1";
     let cost = json(SITE, line, 0);
     assert_eq!(number(&all[0], "mean"), number(&cost, "mean"));
@@ -499,8 +511,8 @@ fn candidates_are_compared() {
 
 #[test]
 #[ignore = "takes long: ./ci.sh deep"]
-fn a_learnt_model_hangs_the_tag_askew() {
-    // Errors as real detectors have them: a tag that is seen squarely gives the worst pose.
+fn learnt_model_turns_the_tag_away_from_head_on() {
+    // As with real detectors, a head-on tag gives the worst pose.
     let mut csv = String::from("d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n");
     let mut state = 1u64;
     let mut random = || {
@@ -518,18 +530,18 @@ fn a_learnt_model_hangs_the_tag_askew() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("views.csv"), csv).unwrap();
     let learn = "learn bounds views.csv --quantile 0.95 -o model.toml";
-    let told = run_in(folder.path(), SITE, learn, None);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = run_in(folder.path(), SITE, learn, None);
+    assert_eq!(output.code, 0, "{}", output.err);
     let site = SITE.to_owned() + "\n[error_model.detector]\nfile = \"model.toml\"\n";
     let line = place(
         "0.05",
         "--free x=0.8:4,yaw_deg=110:250 --budget 300 --error-model detector --objective contained-cost --json",
     );
-    let told = run_in(folder.path(), &site, &line, None);
-    assert_eq!(told.code, 0, "{}{}", told.out, told.err);
-    let best: Value = serde_json::from_str(&told.out).unwrap();
-    let askew = (pose(&best, "yaw_deg") - 180.0).abs();
-    assert!((30.0..60.0).contains(&askew), "{best}");
+    let output = run_in(folder.path(), &site, &line, None);
+    assert_eq!(output.code, 0, "{}{}", output.out, output.err);
+    let best: Value = serde_json::from_str(&output.out).unwrap();
+    let tilt = (pose(&best, "yaw_deg") - 180.0).abs();
+    assert!((30.0..60.0).contains(&tilt), "{best}");
     assert_eq!(best["contained"], true);
     let other = run_in(
         folder.path(),
@@ -546,7 +558,7 @@ fn a_learnt_model_hangs_the_tag_askew() {
 
 /// A formula with the paper's weights gives the paper's cost: a metre counts as 100, a degree as 1.
 #[test]
-fn a_formula_is_a_cost() {
+fn formula_with_the_weights_of_the_paper_gives_its_cost() {
     let folder = tempfile::tempdir().unwrap();
     let formula = |name: &str, translation: &str, yaw: &str| {
         format!("\n[error_model.{name}]\ntranslation = {translation}\nyaw_deg = {yaw}\n")
@@ -559,9 +571,9 @@ fn a_formula_is_a_cost() {
         + &formula("below", "[0.1, 1.0, 0.5, -1.0]", "[0.0, 0.0, 0.0, 0.0]");
     let mean = |model: &str| {
         let line = place("0.05", "--free x=0.8:4,yaw_deg=110:250 --budget 100 --json");
-        let told = run_in(folder.path(), &site, &format!("{line}{model}"), None);
-        assert_eq!(told.code, 0, "{}{}", told.out, told.err);
-        let best: Value = serde_json::from_str(&told.out).unwrap();
+        let output = run_in(folder.path(), &site, &format!("{line}{model}"), None);
+        assert_eq!(output.code, 0, "{}{}", output.out, output.err);
+        let best: Value = serde_json::from_str(&output.out).unwrap();
         best["mean"].as_f64().unwrap()
     };
     let paper = mean("");
@@ -577,16 +589,19 @@ fn a_formula_is_a_cost() {
     // Oblique views are better here: the cost is below that of a tag seen head-on.
     let square = mean(" --error-model square");
     assert!(square > 100.0 && square < 100.0 + paper, "{square} {paper}");
-    let told = run_in(
+    let output = run_in(
         folder.path(),
         &site,
         &place("0.05", "--error-model below"),
         None,
     );
     assert!(
-        told.code == 2 && told.err.contains("has a bound below 0 at a psi of 50 deg"),
+        output.code == 2
+            && output
+                .err
+                .contains("has a bound below 0 at a psi of 50 deg"),
         "{}",
-        told.err
+        output.err
     );
 }
 
@@ -597,8 +612,8 @@ fn pictures_are_drawn() {
         "0.1",
         "--free x=1:4 --budget 200 -o places.svg --sheet sheet.svg",
     );
-    let told = run_in(folder.path(), SITE, &line, None);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = run_in(folder.path(), SITE, &line, None);
+    assert_eq!(output.code, 0, "{}", output.err);
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let places = read("places.svg");
     assert!(
@@ -612,11 +627,11 @@ fn pictures_are_drawn() {
 }
 
 #[test]
-fn bad_input_is_told_clearly() {
+fn bad_input_is_reported_with_the_reason() {
     let boxed = "\n[task.dock]\nkind = \"work\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\nsuccess = { shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }\n";
     let site = SITE.to_owned() + WALL + boxed;
     for (line, what) in [
-        (place("0.1", ""), "it is not said what may be chosen"),
+        (place("0.1", ""), "the search space is missing"),
         (
             place("0.1", "--free w=1:2"),
             "`w` is nothing that can be free",
@@ -658,7 +673,7 @@ fn bad_input_is_told_clearly() {
         ),
         (
             "place site.toml --task see-t7 --free x=1:2".into(),
-            "not said how well the pose is known",
+            "the uncertainty of the pose is missing",
         ),
         (
             "place site.toml --task see-t7 --exact --free x=1:2 --objective margin".into(),
@@ -673,18 +688,18 @@ fn bad_input_is_told_clearly() {
             "see-t7",
         ),
     ] {
-        let told = run(&site, &line);
-        assert_eq!(told.code, 2, "{line}\n{}{}", told.out, told.err);
+        let output = run(&site, &line);
+        assert_eq!(output.code, 2, "{line}\n{}{}", output.out, output.err);
         // The report is wrapped to a width.
-        let plain = told.err.replace(['\n', '│'], " ");
+        let plain = output.err.replace(['\n', '│'], " ");
         let words: Vec<&str> = plain.split_whitespace().collect();
-        assert!(words.join(" ").contains(what), "{line}: {}", told.err);
+        assert!(words.join(" ").contains(what), "{line}: {}", output.err);
     }
 }
 
 /// A wall whose best places are narrow gaps between keep-outs, and a tilted camera: every seed finds the same place.
 #[test]
-fn seeds_agree() {
+fn every_seed_finds_the_same_place() {
     let wall = "\n[wall.north]\nfrom = [2.2, 3.0]\nto = [1.6, -3.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [0.3, 2.5], z = [0.0, 2.1] }, { along = [2.95, 3.4], z = [0.0, 1.5] }]\n";
     let site = SITE.replace(
         "pitch_deg = 0.0, yaw_deg = 0.0 }",
@@ -699,13 +714,13 @@ fn seeds_agree() {
     let mut worst = 0.0f64;
     for seed in seeds {
         let line = place("0.1", &format!("--wall north --seed {seed} --budget 1200"));
-        let told = json(&site, &line, 0);
-        let mean = number(&told, "mean");
+        let placed = json(&site, &line, 0);
+        let mean = number(&placed, "mean");
         (best, worst) = (best.min(mean), worst.max(mean));
-        let restarts = told["restarts"].as_array().unwrap();
-        assert!(!restarts.is_empty(), "{told}");
+        let restarts = placed["restarts"].as_array().unwrap();
+        assert!(!restarts.is_empty(), "{placed}");
         for one in restarts {
-            assert!(number(one, "mean") >= 0.98 * mean, "{told}");
+            assert!(number(one, "mean") >= 0.98 * mean, "{placed}");
             assert!(one["tag_pose"]["yaw_deg"].is_number());
         }
     }

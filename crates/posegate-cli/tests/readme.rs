@@ -1,5 +1,5 @@
-//! The README and the pages of `docs` are correct: the README's lines of Rust are those of an example that runs, the
-//! lines of site files are valid, and the named files and jobs exist.
+//! The README and the pages of `docs` are correct. The README's Rust code is in an example that runs, the lines of
+//! site files are valid, and the named files and jobs exist.
 
 use std::path::PathBuf;
 
@@ -30,7 +30,7 @@ fn blocks(text: &str, language: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_rust_of_the_readme_is_the_examples() {
+fn readme_code_is_in_an_example() {
     let example = read("examples/may_dock.rs");
     let lines = example
         .split("// readme: begin\n")
@@ -61,7 +61,7 @@ fn documents() -> Vec<String> {
 }
 
 #[test]
-fn the_readme_is_short() {
+fn readme_is_short() {
     assert!(
         read("README.md").lines().count() <= 150,
         "the README has at most 150 lines: move what is long to a page of docs/"
@@ -69,7 +69,7 @@ fn the_readme_is_short() {
 }
 
 #[test]
-fn the_site_of_the_pages_is_valid() {
+fn documented_site_files_are_valid() {
     let shown = blocks(&read("docs/host.md"), "toml");
     let site = shown
         .iter()
@@ -102,7 +102,7 @@ fn paths(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn the_files_of_the_documents_exist() {
+fn named_files_exist() {
     for document in documents() {
         let text = read(&document);
         let found = paths(&text);
@@ -115,7 +115,7 @@ fn the_files_of_the_documents_exist() {
 
 /// Every job that a document names is in the list of `cargo xtask`.
 #[test]
-fn the_jobs_of_the_documents_exist() {
+fn named_jobs_exist() {
     let list = read("xtask/src/main.rs");
     let (_, list) = list.split_once("const JOBS").unwrap();
     let jobs: Vec<&str> = list
@@ -147,7 +147,7 @@ fn the_jobs_of_the_documents_exist() {
 
 /// Types and functions that a step of CONTRIBUTING.md names in code are in a file that the same step names.
 #[test]
-fn the_names_of_the_steps_stand_in_their_files() {
+fn names_of_a_step_are_in_its_files() {
     let text = read("CONTRIBUTING.md");
     let mut steps: Vec<String> = Vec::new();
     for line in text.lines() {
@@ -180,9 +180,9 @@ fn the_names_of_the_steps_stand_in_their_files() {
                 continue;
             }
             for name in simple.split("::").filter(|name| !name.is_empty()) {
-                let stands = there.split(|c| !is_name(c)).any(|word| word == name);
+                let is_named = there.split(|c| !is_name(c)).any(|word| word == name);
                 assert!(
-                    stands,
+                    is_named,
                     "`{name}` is in no file that this step names: {step}"
                 );
                 names += 1;
@@ -205,19 +205,19 @@ fn every_feature_is_documented() {
         .filter(|name| *name != "default")
         .collect();
     let library = read("src/lib.rs");
-    let mut told: Vec<&str> = library
+    let mut documented: Vec<&str> = library
         .lines()
         .filter_map(|line| line.strip_prefix("//! | `")?.split_once("` |"))
         .map(|(name, _)| name)
         .collect();
     there.sort_unstable();
-    told.sort_unstable();
-    assert_eq!(told, there);
+    documented.sort_unstable();
+    assert_eq!(documented, there);
 }
 
 /// The front page of the API documents replaces each link of the README to a file, and shows the README's picture.
 #[test]
-fn the_front_page_has_no_link_to_a_file() {
+fn front_page_has_no_link_to_a_file() {
     let readme = read("README.md");
     assert!(
         !readme.contains("](docs/") && !readme.contains("](examples/"),
@@ -245,7 +245,7 @@ fn the_front_page_has_no_link_to_a_file() {
 }
 
 #[test]
-fn the_picture_of_the_front_page_is_the_readmes() {
+fn front_page_picture_equals_the_readme_picture() {
     let definition = read("docs/first-picture.uri");
     let text = definition
         .strip_prefix("[first-picture]: data:image/svg+xml,")

@@ -88,7 +88,7 @@ fn drive() -> Vec<Pose> {
 
 /// Each row has the verdict of `posegate gate`: all kinds of sets, ages and invalid numbers, on facets and in a view.
 #[test]
-fn verdicts_are_those_of_the_gate() {
+fn verdicts_equal_those_of_the_gate() {
     for (task, table) in [
         ("dock", "examples/tables/dock.posegate"),
         ("see-t7", "examples/tables/see-t7.posegate"),
@@ -133,7 +133,7 @@ fn verdicts_are_those_of_the_gate() {
 
 /// `--fast` takes the verdicts from the gate's own steps.
 #[test]
-fn fast_verdicts_are_the_same() {
+fn fast_replay_gives_the_same_verdicts() {
     let estimates = "tests/data/estimates.csv";
     let folder = Folder::of(b"");
     for task in ["dock", "see-t7"] {
@@ -155,9 +155,9 @@ fn fast_verdicts_are_the_same() {
     }
 }
 
-/// A whole bag in each compression, with an index and without: the gate opens near the dock and stays open.
+/// An intact bag in each compression, with an index and without: the gate opens near the dock and stays open.
 #[test]
-fn good_bags_are_read_whole() {
+fn intact_bag_is_read_completely() {
     for compression in [None, Some(Compression::Lz4), Some(Compression::Zstd)] {
         for index in [true, false] {
             let mut bag = Bag::new(compression, index);
@@ -206,7 +206,7 @@ fn good_bags_are_read_whole() {
 
 /// A truncated bag is read up to the break, and the place of the break is reported.
 #[test]
-fn cut_bags_are_read_up_to_where_they_break() {
+fn truncated_bag_is_read_up_to_the_break() {
     let mut bag = Bag::new(None, true);
     for pose in drive() {
         bag.pose("/amcl_pose", &pose);
@@ -235,7 +235,7 @@ fn cut_bags_are_read_up_to_where_they_break() {
     damaged[place] ^= 1;
     let (rows, summary) = Folder::of(&damaged).replay("dock", &["--topic", "/amcl_pose"]);
     assert!(!rows.is_empty());
-    // The whole chunk is left out, and nothing else.
+    // Only the damaged chunk is skipped.
     assert_eq!(summary["recording"]["bad_chunks"], 1);
     let has = |line: &Value| rows.iter().any(|row| row["t_s"] == line["t_s"]);
     let out: Vec<&Value> = all.iter().filter(|line| !has(line)).collect();
@@ -261,7 +261,7 @@ fn cut_bags_are_read_up_to_where_they_break() {
 
 /// Each fault of a message is counted and denied for its own reason, and the message is in all counts.
 #[test]
-fn faults_of_messages_are_counted_and_denied() {
+fn faulty_messages_are_counted_and_denied() {
     let near = Pose {
         t_s: 0.0,
         ..Pose::AT_DOCK
@@ -315,7 +315,7 @@ fn faults_of_messages_are_counted_and_denied() {
     for (row, (_, fault)) in rows.iter().zip(&poses) {
         match *fault {
             None => assert_eq!(row["verdict"], "permit", "{row}"),
-            // The single estimates are good; the gate denies them because of earlier ones.
+            // Each estimate alone is good. The gate denies them because of earlier ones.
             Some("repeated stamp" | "backwards") => {
                 assert_eq!(row["verdict"], "permit");
                 assert_eq!(row["gate_reason"], "time_backwards", "{row}");
@@ -349,7 +349,7 @@ fn faults_of_messages_are_counted_and_denied() {
 
 /// Requested topics that cannot be read are named with the reason, and nothing is written.
 #[test]
-fn topics_that_cannot_be_read_are_named() {
+fn unreadable_topic_is_named_with_the_reason() {
     let mut bag = Bag::new(None, true);
     bag.pose("/amcl_pose", &Pose::AT_DOCK);
     bag.other("/strange", "own_msgs/msg/Estimate", 2);
@@ -375,7 +375,7 @@ fn topics_that_cannot_be_read_are_named() {
         folder.path("o.mcap"),
         folder.path("r"),
     );
-    for (topic, said) in [
+    for (topic, expected) in [
         (Some("/strange"), "unknown_schema"),
         (Some("/changed"), "other_fields"),
         (Some("/nothing"), "/amcl_pose"),
@@ -388,7 +388,7 @@ fn topics_that_cannot_be_read_are_named() {
         let output = posegate(&arguments);
         assert_eq!(output.status.code(), Some(2), "{topic:?}");
         assert!(
-            words(&output).contains(said),
+            words(&output).contains(expected),
             "{topic:?}: {}",
             words(&output)
         );
@@ -415,7 +415,7 @@ fn topics_that_cannot_be_read_are_named() {
 /// False permits, false denials, coverage and NEES for a truth that is shifted so that the numbers are known. The truth
 /// is a topic, a TUM file or columns of a CSV.
 #[test]
-fn the_truth_tells_false_permits() {
+fn false_permits_are_counted_with_a_truth() {
     let site = Site::read(at_root(SITE)).unwrap();
     let success: &SuccessSet = &site.task("dock").unwrap().success;
     let poses = drive();
@@ -542,7 +542,7 @@ fn the_truth_tells_false_permits() {
 
 /// Only estimates with stamps in the range are evaluated; the others are counted.
 #[test]
-fn ranges_of_time_are_kept_to() {
+fn estimates_outside_the_time_range_are_counted() {
     let mut bag = Bag::new(None, true);
     for pose in drive() {
         bag.pose("/amcl_pose", &pose);
@@ -557,7 +557,7 @@ fn ranges_of_time_are_kept_to() {
 
 /// Old estimates are stale by the recorded times, and count as fresh if only stamps are used.
 #[test]
-fn ages_are_those_of_the_recording() {
+fn age_is_log_time_minus_stamp() {
     let mut bag = Bag::new(None, true);
     for (k, late) in [0.05, 0.15, 0.3, 0.05].into_iter().enumerate() {
         let t_s = 5.0 + k as f64;
@@ -587,7 +587,7 @@ fn ages_are_those_of_the_recording() {
 /// The corners of t7 from 1.5 m give a pose near the true one, whose set the gate accepts. Also tests another tag and
 /// no tag.
 #[test]
-fn looks_at_tags_are_estimates() {
+fn detections_become_estimates() {
     let mut bag = Bag::new(Some(Compression::Lz4), true);
     let pose = [1.7, 0.7, -0.25];
     bag.look("/detections", 1.0, 7, pose);
@@ -595,8 +595,8 @@ fn looks_at_tags_are_estimates() {
     let folder = Folder::of(&bag.finish());
     let (rows, summary) = folder.replay("see-t7", &["--topic", "/detections", "--sigma-px", "0.1"]);
     assert_eq!(rows.len(), 1);
-    for (told, real) in rows[0]["pose"].as_array().unwrap().iter().zip(pose) {
-        assert!((told.as_f64().unwrap() - real).abs() < 1e-6, "{}", rows[0]);
+    for (found, real) in rows[0]["pose"].as_array().unwrap().iter().zip(pose) {
+        assert!((found.as_f64().unwrap() - real).abs() < 1e-6, "{}", rows[0]);
     }
     assert_eq!(rows[0]["verdict"], "permit", "{}", rows[0]);
     assert_eq!(summary["looks"]["fixes"], 1);
@@ -606,7 +606,7 @@ fn looks_at_tags_are_estimates() {
 
 /// Trajectories have no covariance: they are denied, or evaluated with a bound around each pose.
 #[test]
-fn trajectories_are_read() {
+fn tum_trajectory_is_replayed() {
     let folder = Folder::of(b"");
     let text = "# t x y z q\n1 0 0 0 0 0 0 1\n1.05 0 nan 0 0 0 0 1\n1.1 0 0 0 0 0 0 1.1\n1.15 0 0 0 0 0 0 1\n";
     std::fs::write(folder.path("drive.mcap"), text).unwrap();
@@ -639,7 +639,7 @@ fn trajectories_are_read() {
 }
 
 #[test]
-fn a_replay_is_drawn() {
+fn replay_is_drawn() {
     let mut bag = Bag::new(None, true);
     for pose in drive() {
         bag.pose("/amcl_pose", &pose);
@@ -676,9 +676,9 @@ fn a_replay_is_drawn() {
     assert_eq!(folder.files(), 4);
 }
 
-/// A time of use is used however far it is from the stamp, as in `posegate gate`.
+/// `now_s` is used at any distance from the stamp, as in `posegate gate`.
 #[test]
-fn times_of_use_are_those_of_the_gate() {
+fn now_s_is_used_as_in_the_gate() {
     let folder = Folder::of(b"");
     let header = "t_s,now_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
     let set = "0,0,0,1e-6,0,0,1e-6,0,1e-6\n";
@@ -708,7 +708,7 @@ fn times_of_use_are_those_of_the_gate() {
 
 /// One strange stamp does not switch off freshness. If nearly all stamps are of another clock, that is reported.
 #[test]
-fn clocks_are_told_apart_by_many_stamps() {
+fn clock_is_chosen_by_the_majority_of_stamps() {
     let bag = |stamp: &dyn Fn(f64) -> f64| {
         let mut bag = Bag::new(None, true);
         for k in 0..50 {
@@ -736,8 +736,8 @@ fn clocks_are_told_apart_by_many_stamps() {
     let other = bag(&|logged_s| logged_s - 8000.0);
     let (_, summary) = other.replay("dock", &["--topic", "/amcl_pose"]);
     assert_eq!(summary["clock"], "stamps");
-    let told = summary["freshness"].as_str().unwrap();
-    assert!(told.starts_with("not checked"), "{told}");
+    let freshness = summary["freshness"].as_str().unwrap();
+    assert!(freshness.starts_with("not checked"), "{freshness}");
     let drive = other.path("drive.mcap");
     let output = posegate(&[
         "replay",
@@ -748,13 +748,13 @@ fn clocks_are_told_apart_by_many_stamps() {
         "--topic",
         "/amcl_pose",
     ]);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(said.contains(told), "{said}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains(freshness), "{text}");
 }
 
 /// A requested topic or truth that does not exist is an error.
 #[test]
-fn a_truth_or_topic_that_is_not_there_is_refused() {
+fn missing_truth_or_topic_is_refused() {
     let mut bag = Bag::new(None, true);
     for (k, pose) in drive().iter().enumerate() {
         bag.pose("/amcl_pose", pose);
@@ -777,7 +777,7 @@ fn a_truth_or_topic_that_is_not_there_is_refused() {
     }
     let folder = Folder::of(&bag.finish());
     let drive = folder.path("drive.mcap");
-    for (options, said) in [
+    for (options, expected) in [
         (
             &["--truth", "/nothing"][..],
             "/nothing: none of 100 estimates",
@@ -804,7 +804,7 @@ fn a_truth_or_topic_that_is_not_there_is_refused() {
         let output = posegate(&arguments);
         assert_eq!(output.status.code(), Some(2), "{options:?}");
         assert!(
-            words(&output).contains(said),
+            words(&output).contains(expected),
             "{options:?}: {}",
             words(&output)
         );
@@ -817,7 +817,7 @@ fn a_truth_or_topic_that_is_not_there_is_refused() {
 /// True poses that are in another frame, not unit or tilted are refused and counted. An estimate in another frame has
 /// no error.
 #[test]
-fn frames_and_orientations_of_the_truth_are_looked_at() {
+fn true_pose_in_another_frame_or_tilted_is_rejected() {
     let mut bag = Bag::new(None, true);
     for (k, pose) in drive().iter().enumerate() {
         let estimate = Pose {
@@ -878,7 +878,7 @@ fn frames_and_orientations_of_the_truth_are_looked_at() {
 
 /// A stamp far in the future delays only the truth of its own row.
 #[test]
-fn a_stamp_far_ahead_takes_no_other_rows_truth() {
+fn stamp_far_ahead_does_not_take_the_truth_of_other_rows() {
     let mut bag = Bag::new(Some(Compression::Lz4), true);
     for k in 0..150_000 {
         let t_s = 10.0 + 0.0005 * f64::from(k);
@@ -901,9 +901,9 @@ fn a_stamp_far_ahead_takes_no_other_rows_truth() {
     assert_eq!(summary["truth"]["without"], 1);
 }
 
-/// Looks of two cameras are refused.
+/// Detections of two cameras are refused.
 #[test]
-fn looks_of_two_cameras_are_refused() {
+fn detections_of_two_cameras_are_refused() {
     let mut bag = Bag::new(None, true);
     let pose = [1.7, 0.7, -0.25];
     bag.look("/detections", 1.0, 7, pose);
@@ -928,9 +928,9 @@ fn looks_of_two_cameras_are_refused() {
     assert!(words(&output).contains("rear_camera"), "{}", words(&output));
 }
 
-/// The age is 0 for equal times of the present date: nanoseconds are not rounded before they become milliseconds.
+/// The age is 0 for equal times of the present date, because nanoseconds are not rounded before the conversion to milliseconds.
 #[test]
-fn equal_times_are_no_age() {
+fn age_is_zero_when_stamp_equals_log_time() {
     let mut bag = Bag::new(None, true);
     for k in 0..500 {
         let nanoseconds = 1_700_000_000_000_000_000 + k * 33_000_000;
@@ -948,7 +948,7 @@ fn equal_times_are_no_age() {
 /// A bound around each estimate changes the gate's sets, not the input of other rules. Rules do not evaluate estimates
 /// that lack what they need.
 #[test]
-fn rules_judge_by_what_was_recorded() {
+fn rules_use_the_recorded_estimate() {
     let mut bag = Bag::new(None, true);
     for pose in drive() {
         bag.pose("/amcl_pose", &pose);

@@ -1,4 +1,4 @@
-//! `posegate replay`: why the interlock was shut, and what it takes to open it.
+//! `posegate replay`: the reasons of a shut interlock, and the setting that opens it.
 
 use serde_json::Value;
 use std::process::{Command, Stdio};
@@ -35,9 +35,9 @@ fn openings(summary: &Value) -> u64 {
     summary["interlock"]["openings"].as_u64().expect("a count")
 }
 
-/// The value with which the interlock opens is told, and it is the least.
+/// The report names the least value with which the interlock opens.
 #[test]
-fn the_setting_that_decides_is_told_with_the_value_that_opens() {
+fn deciding_setting_is_reported_with_the_least_value_that_opens() {
     let slow = every(0.5, 20, 0.0);
     let mut lost = every(0.02, 40, 0.0);
     for (index, estimate) in lost.iter_mut().enumerate() {
@@ -91,7 +91,7 @@ fn the_setting_that_decides_is_told_with_the_value_that_opens() {
 }
 
 #[test]
-fn seconds_open_and_shut_add_up() {
+fn open_and_shut_seconds_add_up() {
     let summary = replay(&every(0.02, 200, 0.0), "");
     let interlock = &summary["interlock"];
     assert_eq!(openings(&summary), 1);
@@ -109,14 +109,14 @@ fn seconds_open_and_shut_add_up() {
 
 /// The dock is 8 cm deep. At 0.3 m/s the robot drives 6 cm until the permission ends.
 #[test]
-fn a_robot_that_drives_is_denied_where_one_that_stands_is_not() {
+fn moving_robot_is_denied_where_a_still_robot_is_permitted() {
     let near = every(0.02, 100, 0.04);
     let long = "--permit-hold-ms 180";
     assert!(openings(&replay(&near, long)) > 0);
     let moving = replay(&near, &format!("{long} --max-speed 0.3 --max-yaw-rate 10"));
     assert_eq!(openings(&moving), 0);
     assert_eq!(moving["reasons"]["not_contained"], 100);
-    let amid = every(0.02, 100, 0.0);
-    let moving = replay(&amid, "--max-speed 0.2 --max-yaw-rate 5");
+    let centred = every(0.02, 100, 0.0);
+    let moving = replay(&centred, "--max-speed 0.2 --max-yaw-rate 5");
     assert!(openings(&moving) > 0);
 }

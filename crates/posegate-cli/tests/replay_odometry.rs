@@ -1,4 +1,4 @@
-//! `posegate replay --odom FILE`: fixes that come twice a second are carried along an odometry, and a faulty file is refused by its line.
+//! `posegate replay --odom FILE`: fixes that come twice a second are carried along an odometry, and a faulty file is refused with its line.
 
 use serde_json::Value;
 use std::process::{Command, Output, Stdio};
@@ -45,7 +45,7 @@ fn fixes() -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The odometry of that robot at 50 Hz, in a frame of its own that is turned and elsewhere.
+/// The odometry of that robot at 50 Hz, in a turned and displaced frame.
 fn driven() -> Vec<(f64, [f64; 3])> {
     let (sin, cos) = 2.0f64.sin_cos();
     let pose = |t: f64| [7.0 + cos * place(t), -3.0 + sin * place(t), 2.0];
@@ -75,13 +75,13 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn an_odometry_from_a_file_opens_the_interlock_between_fixes() {
+fn odometry_file_keeps_the_interlock_open_between_fixes() {
     let without = summary(&replay(&fixes(), b"", "--max-speed 0.1 --max-yaw-rate 5"));
     assert_eq!(without["interlock"]["openings"], 0, "{without}");
     let with = summary(&replay(&fixes(), csv(&driven()).as_bytes(), MOVING));
     let interlock = &with["interlock"];
     assert_eq!(interlock["openings"], 1, "{interlock}");
-    // The dock is 16 cm long: 3.2 s, less the sets, the slip and what the robot may drive until a permission ends.
+    // The dock is 16 cm long: 3.2 s, less the sets, the slip and the allowed drive until a permission ends.
     assert!(number(&interlock["open_s"]) > 1.5, "{interlock}");
     assert!(number(&interlock["open_s"]) < 3.1, "{interlock}");
     let of_tum = summary(&replay(&fixes(), tum(&driven()).as_bytes(), MOVING));
@@ -89,9 +89,9 @@ fn an_odometry_from_a_file_opens_the_interlock_between_fixes() {
     assert!(differ.abs() < 0.05, "{differ}");
 }
 
-/// No fix comes after half a second; the odometry tells that the robot leaves the dock.
+/// No fix comes after half a second, and by the odometry the robot leaves the dock.
 #[test]
-fn the_interlock_closes_where_the_odometry_leads_out() {
+fn interlock_closes_when_the_odometry_leaves_the_dock() {
     let fixes = [(2.5, place(2.5)), (3.0, place(3.0)), (12.0, 0.5)];
     let stays: Vec<_> = driven().into_iter().filter(|(t, _)| *t >= 2.0).collect();
     let leaves: Vec<_> = stays
@@ -110,14 +110,14 @@ fn the_interlock_closes_where_the_odometry_leads_out() {
         );
         number(&interlock["open_s"])
     };
-    // From the middle it has 8 cm, less the sets, the slip and what it may drive.
+    // From the middle it has 8 cm, less the sets, the slip and the allowed drive.
     let (stays, leaves) = (open(&stays), open(&leaves));
     assert!(stays > leaves + 0.4 && leaves > 0.4, "{stays} {leaves}");
 }
 
 /// Each fault is reported with the file, its line, and what was expected.
 #[test]
-fn a_faulty_odometry_is_refused_by_its_line() {
+fn faulty_odometry_is_refused_with_its_line() {
     let good = "0.00,0,0,0\n0.02,0,0,0\n0.04,0,0,0\n";
     let file = |header: &str, rows: &str| format!("{header}{rows}").into_bytes();
     let with_row = |row: &str| file(ODOMETRY, &format!("{good}{row}\n"));
@@ -191,7 +191,7 @@ fn a_faulty_odometry_is_refused_by_its_line() {
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{words:?}: {error}");
         assert!(output.stdout.is_empty());
-        // A message may be broken into lines.
+        // Messages are wrapped into lines.
         let joined: Vec<&str> = error
             .split_whitespace()
             .filter(|word| *word != "│")
@@ -204,7 +204,7 @@ fn a_faulty_odometry_is_refused_by_its_line() {
 }
 
 #[test]
-fn an_odometry_needs_a_file_that_exists_and_a_speed() {
+fn odometry_needs_an_existing_file_and_a_speed() {
     for (arguments, words) in [
         (
             "--odom other.csv --max-speed 0.1",

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::process::{Command, Output, Stdio};
 
 const SITE: &str = include_str!("../../../examples/sites/dock.toml");
-/// The odometry's frame in the world: turned, and elsewhere.
+/// The odometry's frame in the world: turned and displaced.
 const CORRECTION: [f64; 3] = [-3.0, 2.0, 0.7];
 const MOVING: &str = "--max-speed 0.1 --max-yaw-rate 5";
 
@@ -22,8 +22,8 @@ fn in_odometry(x: f64) -> [f64; 3] {
     [c * dx + s * dy, c * dy - s * dx, -turn]
 }
 
-/// A drive with AMCL's poses twice a second in `frame`, and transforms at 50 Hz as Nav2 writes them: the correction a second ahead, in
-/// messages that also have a wheel.
+/// Returns a drive with AMCL's poses twice a second in `frame`, and transforms at 50 Hz as Nav2 writes them. The correction is a
+/// second ahead, and messages also contain a wheel.
 fn drive(frame: &'static str, base: &str) -> Vec<u8> {
     let mut bag = Bag::new(None, true);
     for k in 0..400u32 {
@@ -80,7 +80,7 @@ fn refused(output: &Output) -> String {
 }
 
 #[test]
-fn transforms_are_the_odometry_of_a_bag_that_has_no_other() {
+fn transforms_replace_a_missing_odometry_topic() {
     for base in ["base_link", "base_footprint"] {
         let bag = drive("map", base);
         let fixes = format!("--json --topic /amcl_pose {MOVING}");
@@ -95,15 +95,15 @@ fn transforms_are_the_odometry_of_a_bag_that_has_no_other() {
         assert!((most - 0.05).abs() < 1e-6, "{driven}");
         let interlock = &summary["interlock"];
         assert_eq!(interlock["openings"], 1, "{interlock}");
-        // The dock is 16 cm long: 3.2 s, less the sets and what the robot may drive.
+        // The dock is 16 cm long: 3.2 s, less the sets and the allowed drive.
         let open = interlock["open_s"].as_f64().expect("seconds");
         assert!((1.5..3.1).contains(&open), "{interlock}");
     }
 }
 
-/// An odometry that is faster than the stated bounds is a jump; the bounds that would do are told.
+/// An odometry faster than the stated bounds is a jump. The message has the bounds that are sufficient.
 #[test]
-fn an_odometry_that_is_too_fast_is_told_with_the_speed_that_would_do() {
+fn too_fast_odometry_is_reported_with_the_sufficient_speed() {
     let bag = drive("map", "base_link");
     let slow = "--topic /amcl_pose --odom /tf --max-speed 0.03 --max-yaw-rate 5";
     let (output, _) = replay(&bag, slow);
@@ -120,10 +120,10 @@ fn an_odometry_that_is_too_fast_is_told_with_the_speed_that_would_do() {
 }
 
 #[test]
-fn the_pose_is_the_correction_composed_with_the_odometry() {
+fn pose_is_the_correction_composed_with_the_odometry() {
     let bounded = "--json --topic /tf --set bounded --translation 0.01 --yaw-deg 0.5";
     let (output, rows) = replay(&drive("map", "base_link"), &format!("{bounded} {MOVING}"));
-    // Without the first second, in which no correction holds.
+    // The first second has no valid correction.
     assert_eq!(rows.len(), 350);
     for row in &rows {
         let t_s = row["t_s"].as_f64().expect("a time");
@@ -140,7 +140,7 @@ fn the_pose_is_the_correction_composed_with_the_odometry() {
 }
 
 #[test]
-fn a_missing_odometry_and_missing_frames_are_named() {
+fn missing_odometry_or_frame_is_named() {
     let bag = drive("map", "base_link");
     let (output, _) = replay(&bag, &format!("--topic /amcl_pose --odom /odom {MOVING}"));
     let error = refused(&output);
@@ -168,7 +168,7 @@ fn a_missing_odometry_and_missing_frames_are_named() {
 }
 
 #[test]
-fn a_frame_that_does_not_match_is_named() {
+fn mismatched_frame_is_named() {
     let bag = drive("odom", "base_link");
     let (output, _) = replay(&bag, "--json --topic /amcl_pose");
     let summary = summary(&output);
@@ -182,7 +182,7 @@ fn a_frame_that_does_not_match_is_named() {
         text.contains("the frames seen are `odom` (16); expected `map`"),
         "{text}"
     );
-    // In words also where the fixes are carried along an odometry.
+    // The text has it also if the fixes are carried along an odometry.
     let (output, _) = replay(&bag, &format!("--topic /amcl_pose --odom /tf {MOVING}"));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("the frames seen are `odom` (16)"), "{text}");

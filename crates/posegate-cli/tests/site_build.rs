@@ -1,5 +1,5 @@
-//! A site built in shards is the same bytes for any number of shards and threads. No finished piece is lost, and a merge takes no
-//! missing or damaged piece.
+//! A site built in shards has the same bytes for any number of shards and threads. No finished piece is lost. A merge with a
+//! missing or damaged piece is refused.
 
 #[path = "site_build/disk.rs"]
 mod disk;
@@ -49,7 +49,7 @@ impl Folder {
     }
 
     fn expect(&self, code: i32, line: &str) -> (String, String) {
-        told(code, line, self.command(line).output().unwrap())
+        checked(code, line, self.command(line).output().unwrap())
     }
 
     /// Finished pieces of a build: names that are keys.
@@ -83,7 +83,7 @@ impl Folder {
         results
     }
 
-    /// A build of two shards beside the first.
+    /// Copies the parts of a build to another output folder.
     fn copied(&self, from: &str, to: &str) {
         let to = self.path().join(to).join("parts");
         std::fs::create_dir_all(&to).unwrap();
@@ -120,9 +120,9 @@ fn gather(root: &Path, folder: &Path, results: &mut Results) {
     }
 }
 
-fn told(code: i32, line: &str, output: Output) -> (String, String) {
+fn checked(code: i32, line: &str, output: Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    // Lines of an error are broken for the reader's screen.
+    // Errors are wrapped into lines.
     let joined = |text: String| {
         let words = text.split(|c: char| c.is_whitespace() || c == '\u{2502}');
         words
@@ -158,7 +158,7 @@ fn two_shards() -> Folder {
 }
 
 #[test]
-fn the_same_bytes_for_every_number_of_shards_and_threads() {
+fn bytes_are_equal_for_any_number_of_shards_and_threads() {
     let folder = Folder::with(&PLANT);
     folder.expect(0, "site build site.toml --threads 1 -o one");
     let (out, _) = folder.expect(0, "site merge one --json");
@@ -175,13 +175,13 @@ fn the_same_bytes_for_every_number_of_shards_and_threads() {
     folder.expect(0, "site merge threads");
     assert!(folder.results("threads") == one, "two threads");
     for shard in 0..2 {
-        // As an array job says it.
+        // As an array job states the shard.
         let line = "site build site.toml --threads 1 -o two";
         let mut command = folder.command(line);
         command
             .env("POSEGATE_SHARD_INDEX", format!("{shard}"))
             .env("POSEGATE_SHARD_COUNT", "2");
-        told(0, line, command.output().unwrap());
+        checked(0, line, command.output().unwrap());
     }
     folder.expect(0, "site merge two");
     assert!(folder.results("two") == one, "two shards");
@@ -206,7 +206,7 @@ fn the_same_bytes_for_every_number_of_shards_and_threads() {
         assert_eq!(file["sha256"], sha256(bytes));
     }
 
-    // And each is what the command for it alone makes.
+    // Each result equals the output of the single command.
     let task = "see-0";
     folder.expect(0, "table build site.toml --task see-0 -o see-0.posegate");
     let alone = std::fs::read(folder.path().join("see-0.posegate")).unwrap();
@@ -224,7 +224,7 @@ fn the_same_bytes_for_every_number_of_shards_and_threads() {
     assert_eq!(String::from_utf8_lossy(&one[plan]), out);
 }
 
-/// The digest that `sha256sum` tells.
+/// Returns the digest that `sha256sum` prints.
 fn sha256(bytes: &[u8]) -> String {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), bytes).unwrap();
@@ -232,7 +232,7 @@ fn sha256(bytes: &[u8]) -> String {
     String::from_utf8(output.stdout).unwrap()[..64].to_owned()
 }
 
-/// Turns a bit near the end of a finished piece over, in what it holds.
+/// Flips a bit in the content of a finished piece, near its end.
 fn flip(piece: &Path) {
     let mut bytes = std::fs::read(piece).unwrap();
     let place = bytes.len() - 200;
@@ -240,7 +240,7 @@ fn flip(piece: &Path) {
     std::fs::write(piece, bytes).unwrap();
 }
 
-/// Changes the files of a finished piece, with all that it says of itself made right again.
+/// Changes the files of a finished piece, and corrects its header for them.
 fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
     let bytes = std::fs::read(piece).unwrap();
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
@@ -265,7 +265,7 @@ fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
 }
 
 #[test]
-fn what_cannot_be_made_is_named_and_the_rest_is_there() {
+fn impossible_piece_is_named_and_the_others_are_built() {
     let folder = Folder::with(&format!(
         "{}[task.\"../yard\"]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
          success = {{ shape = \"clear\", footprint = [[0.0, 0.0]], obstacle = [[1.0, 0.0], [2.0, 0.0], [2.0, 1.0]] }}\n",
@@ -286,7 +286,7 @@ fn what_cannot_be_made_is_named_and_the_rest_is_there() {
         ),
         "{err}"
     );
-    // The five are not pieces of the corrected site. The name stays within the folder.
+    // The five pieces do not belong to the corrected site. The name stays within the folder.
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
     folder.write(
         "corrected.toml",
@@ -301,9 +301,9 @@ fn what_cannot_be_made_is_named_and_the_rest_is_there() {
     );
 }
 
-/// A work task without a plan is an answer, and the answer is no.
+/// A work task without a plan is the answer no.
 #[test]
-fn a_work_task_without_a_plan_says_so() {
+fn work_task_without_a_plan_is_reported() {
     let folder = Folder::with(&format!(
         "{}from = \"gate\"\n[chain.gate]\nstart = {{ x = -3.0, y = 0.0, yaw_deg = 0.0, bounded = {{ translation = 0.5, yaw_deg = 2.0 }} }}\n",
         boxes()
@@ -328,9 +328,9 @@ fn a_work_task_without_a_plan_says_so() {
 }
 
 #[test]
-fn usage_that_means_nothing_is_refused() {
+fn invalid_usage_is_refused() {
     let folder = Folder::with(&boxes());
-    for (line, says) in [
+    for (line, expected) in [
         ("--shard 3/2 -o out", "counted from 0, the last of 2 is 1/2"),
         ("--shard 0/0 -o out", "one shard at least"),
         ("--shard half -o out", "`half` is no shard"),
@@ -358,26 +358,26 @@ fn usage_that_means_nothing_is_refused() {
             "the last of 2 is 1/2",
         ),
         ("--threads 0 -o out", "--threads 0 does no work"),
-        ("--most-risk nan -o out", "no probability"),
+        ("--most-risk nan -o out", "not a probability"),
         (
             "-o site.toml",
             "site.toml: is a file, and a folder is needed",
         ),
     ] {
         let (_, err) = folder.expect(2, &format!("site build site.toml {line}"));
-        assert!(err.contains(says), "{line}: {err}");
+        assert!(err.contains(expected), "{line}: {err}");
     }
     assert!(!folder.path().join("out").exists());
     let (_, err) = folder.expect(2, "site merge site.toml");
     assert!(err.contains("is a file"), "{err}");
     let (_, err) = folder.expect(2, "site merge out --prove");
     assert!(err.contains("--site"), "{err}");
-    // The same said twice.
+    // The same shard by both options.
     folder.expect(
         0,
         "site build site.toml --shard 1/2 --shard-index 1 --shard-count 2 -o same",
     );
-    // A folder with tables of somebody's own is left alone.
+    // A folder with foreign tables is left unchanged.
     std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
     folder.write("own/tables/mine", "1");
     let (_, err) = folder.expect(2, "site build site.toml -o own");

@@ -134,7 +134,7 @@ fn demo_reports_a_full_standard_output() {
 
 /// A standard error that cannot be written does not change the exit code.
 #[test]
-fn full_standard_error_is_no_panic() {
+fn full_standard_error_does_not_change_the_exit_code() {
     for (line, code) in [
         ("check nowhere.toml", 2),
         ("explain --nonsense", 2),

@@ -1,6 +1,5 @@
-//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line: its verdicts are, bit for
-//! bit, those that `posegate gate` prints and that the host computes. Its interlock is high after a permit
-//! and at no other time.
+//! The firmware of `examples/estimate_bench.rs` in QEMU, over its serial line. Its verdicts equal those of
+//! `posegate gate` and of the host, bit for bit. Its interlock is high only after a permit.
 //!
 //! With `POSEGATE_FIRMWARE=c` the same tests run with `examples/c/estimate_bench.c`.
 //! `POSEGATE_BLESS=1 cargo test -p posegate-cli --test uart_replay` rewrites the estimates.
@@ -338,10 +337,10 @@ fn permit(board: &mut Board, sequence: u16) {
 }
 
 #[test]
-fn the_estimates_are_the_generators() {
+fn committed_estimates_equal_the_generated_ones() {
     assert!(
         *COMMITTED == estimates::text(),
-        "{ESTIMATES} differs: POSEGATE_BLESS=1 writes it anew"
+        "{ESTIMATES} differs: POSEGATE_BLESS=1 rewrites it"
     );
     let rows = estimates::parse(&COMMITTED);
     assert!(rows.len() >= 400, "{} rows", rows.len());
@@ -352,7 +351,7 @@ fn the_estimates_are_the_generators() {
 
 /// The comparison itself is in [`verdicts_of_board`]. This test shows that it was not vacuous.
 #[test]
-fn the_board_judges_as_this_machine_does() {
+fn board_and_host_give_equal_verdicts() {
     let mut reasons: [BTreeMap<Reason, usize>; 2] = Default::default();
     for (table, sets, verdicts) in REPLAYED.iter() {
         let place = format!("{} {sets:?}", TABLES[usize::from(table.number)]);
@@ -393,7 +392,7 @@ fn the_board_judges_as_this_machine_does() {
 
 /// There are margins within 1 % of the border on both sides, where a wrong bit would be detected.
 #[test]
-fn the_replay_has_close_calls() {
+fn replay_has_margins_close_to_1() {
     let close = |(_, _, verdicts): &(Flashed, Sets, Vec<Verdict>), permit: bool| {
         let margins = verdicts.iter().filter_map(|verdict| match verdict {
             Verdict::Permit { margin } if permit => Some(margin),
@@ -413,7 +412,7 @@ fn the_replay_has_close_calls() {
 }
 
 #[test]
-fn the_board_judges_as_the_command_line_does() {
+fn board_and_command_line_give_equal_verdicts() {
     for (table, sets, verdicts) in REPLAYED.iter() {
         let path = TABLES[usize::from(table.number)];
         let lines = lines_of_cli(path, &at_root(ESTIMATES), *sets);
@@ -487,7 +486,7 @@ fn heapless_body(bytes: &[u8]) -> heapless::Vec<u8, { posegate::wire::LONGEST_BO
 }
 
 #[test]
-fn a_truncated_frame_is_refused() {
+fn truncated_frame_is_refused() {
     let mut board = permitted_board();
     let frame = encode(&good(7).body());
     for length in 1..frame.len() - 1 {
@@ -496,7 +495,7 @@ fn a_truncated_frame_is_refused() {
 }
 
 #[test]
-fn a_flipped_bit_is_refused() {
+fn flipped_bit_is_refused() {
     let mut board = permitted_board();
     let frame = encode(&good(7).body());
     // Without the closing zero: the truncation and garbage tests cover its loss.
@@ -508,7 +507,7 @@ fn a_flipped_bit_is_refused() {
 }
 
 #[test]
-fn an_unknown_table_is_refused() {
+fn unknown_table_is_refused() {
     let mut board = permitted_board();
     for table in [2, 3, 255] {
         let request = Request { table, ..good(8) };
@@ -519,7 +518,7 @@ fn an_unknown_table_is_refused() {
 
 /// Reads the interlock from the board's register, independent of the firmware's messages.
 #[test]
-fn the_interlock_is_high_after_a_permit_alone() {
+fn interlock_is_high_only_after_a_permit() {
     let mut board = permitted_board();
     let stale = Request {
         now_ms: 2_000,
@@ -535,7 +534,7 @@ fn the_interlock_is_high_after_a_permit_alone() {
 }
 
 #[test]
-fn a_permit_ends_with_the_senders_silence() {
+fn permit_ends_when_the_sender_is_silent() {
     let mut board = Board::start(&FIRMWARE);
     for sequence in 0..5 {
         // The reply reports that the controller has read its output as high.

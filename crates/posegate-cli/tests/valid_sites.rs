@@ -1,5 +1,5 @@
-//! A valid site never ends in an internal error (exit code 3): its table is built and proven, or refused with a
-//! message that states the reason.
+//! A valid site never ends in an internal error (exit code 3). Its table is built and proven, or refused with
+//! the reason.
 
 use posegate_testkit::counts;
 use std::path::Path;
@@ -50,15 +50,15 @@ fn built(text: &str) -> [i32; 4] {
         ];
         let output = posegate(folder, &build);
         let code = output.status.code().unwrap();
-        let told = String::from_utf8_lossy(&output.stderr);
+        let error = String::from_utf8_lossy(&output.stderr);
         assert!(
             code == 0 || code == 2,
-            "{layout}: exit code {code}: {told}\n{text}"
+            "{layout}: exit code {code}: {error}\n{text}"
         );
         if code == 2 {
             assert!(
-                told.contains("help:") && told.contains("task `t`"),
-                "{layout}: {told}"
+                error.contains("help:") && error.contains("task `t`"),
+                "{layout}: {error}"
             );
         } else {
             let verify = posegate(folder, &["table", "verify", &file, "site.toml"]);
@@ -68,10 +68,10 @@ fn built(text: &str) -> [i32; 4] {
     })
 }
 
-/// Boxes whose arc falls short of the whole circle by less than a unit of the table's headings, by some, and by a
-/// hundredth of a degree; in tables of the same arc, and of the whole circle.
+/// Boxes whose arc is below a full turn by less than a unit of the table's headings, by some units, or by a
+/// hundredth of a degree. The tables have the same arc, or a full turn.
 #[test]
-fn arcs_of_nearly_the_whole_circle_are_built() {
+fn arc_of_nearly_a_full_turn_is_built() {
     let arc = |[lo, hi]: [f64; 2]| {
         format!(
             "{{ shape = \"box\", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [{lo:?}, {hi:?}] }}"
@@ -95,9 +95,9 @@ fn arcs_of_nearly_the_whole_circle_are_built() {
     assert_eq!(tried, if counts::is_deep() { 100 } else { 20 });
 }
 
-/// A table of an arc is never a table of the whole circle.
+/// A table of an arc is never a table of a full turn.
 #[test]
-fn an_arc_that_falls_short_is_no_circle() {
+fn arc_below_a_full_turn_is_not_a_full_turn() {
     let folder = tempfile::tempdir().unwrap();
     let shape =
         "{ shape = \"box\", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [0.0, 359.99999999] }";
@@ -121,12 +121,12 @@ fn an_arc_that_falls_short_is_no_circle() {
     assert!(!pieces.is_empty() && pieces.iter().all(|piece| !piece.is_whole_circle()));
 }
 
-/// Regions that share an edge or a corner, overlap or leave a crack by micrometres and less, slivers among them, corners
-/// that lie nearly on an edge, thin robots and thin obstacles.
+/// Regions that share an edge or a corner, or that overlap or leave a crack by micrometres or less. Also slivers,
+/// corners nearly on an edge, thin robots and thin obstacles.
 #[test]
-fn slivers_are_built_or_refused_with_words() {
+fn slivers_are_built_or_refused_with_a_message() {
     let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";
-    let room = "[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]";
+    let square = "[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]";
     let table = table([-0.6, 1.1], [-0.6, 0.6], [-10.0, 10.0], [0.1, 5.0]);
     let mut regions = Vec::new();
     for off in [
@@ -138,20 +138,22 @@ fn slivers_are_built_or_refused_with_words() {
         "0.499999999999999",
     ] {
         regions.push(format!(
-            "{room}, [[{off}, -0.5], [1.0, -0.5], [1.0, 0.5], [{off}, 0.5]]"
+            "{square}, [[{off}, -0.5], [1.0, -0.5], [1.0, 0.5], [{off}, 0.5]]"
         ));
         regions.push(format!(
-            "{room}, [[{off}, {off}], [1.0, {off}], [1.0, 1.0], [{off}, 1.0]]"
+            "{square}, [[{off}, {off}], [1.0, {off}], [1.0, 1.0], [{off}, 1.0]]"
         ));
         regions.push(format!(
-            "{room}, [[{off}, -0.5], [1.0, -0.4], [0.50001, 0.5]]"
+            "{square}, [[{off}, -0.5], [1.0, -0.4], [0.50001, 0.5]]"
         ));
     }
     for thin in ["0.500001", "0.500000001", "0.500000000001"] {
         regions.push(format!(
-            "{room}, [[0.5, -0.5], [{thin}, -0.5], [{thin}, 0.5], [0.5, 0.5]]"
+            "{square}, [[0.5, -0.5], [{thin}, -0.5], [{thin}, 0.5], [0.5, 0.5]]"
         ));
-        regions.push(format!("{room}, [[0.5, -0.5], [{thin}, 0.0], [0.5, 0.5]]"));
+        regions.push(format!(
+            "{square}, [[0.5, -0.5], [{thin}, 0.0], [0.5, 0.5]]"
+        ));
     }
     regions.push("[[-0.5, -0.5], [0.0, -0.5000000000001], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], [[0.5, -0.5], [1.0, -0.5], [1.0, 0.5], [0.5, 0.5]]".into());
     let mut sets: Vec<String> = regions
@@ -161,13 +163,13 @@ fn slivers_are_built_or_refused_with_words() {
         })
         .collect();
     for thin in ["0.000001", "0.000000001"] {
-        sets.push(format!("{{ shape = \"footprint\", footprint = [[0.2, 0.0], [-0.2, {thin}], [-0.2, 0.0]], region = {room} }}"));
+        sets.push(format!("{{ shape = \"footprint\", footprint = [[0.2, 0.0], [-0.2, {thin}], [-0.2, 0.0]], region = {square} }}"));
         sets.push(format!(
-            "{{ all = [{{ shape = \"footprint\", footprint = {robot}, region = {room} }}, {{ shape = \"clear\", footprint = {robot}, \
+            "{{ all = [{{ shape = \"footprint\", footprint = {robot}, region = {square} }}, {{ shape = \"clear\", footprint = {robot}, \
              obstacle = [[0.4, 0.3], [0.4{}, 0.3], [0.4{}, 0.5], [0.4, 0.5]] }}] }}",
             &thin[2..], &thin[2..]
         ));
-        // Hardly any room for the robot.
+        // Hardly any slack for the robot.
         sets.push(format!("{{ shape = \"footprint\", footprint = {robot}, region = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1{}], [-0.2, 0.1{}]] }}", &thin[3..], &thin[3..]));
     }
     let mut proven = 0;
@@ -180,7 +182,7 @@ fn slivers_are_built_or_refused_with_words() {
 
 /// Facets of which no piece is proven are refused with a message if they are requested; otherwise cells are built.
 #[test]
-fn facets_that_are_not_proven_are_refused_with_words() {
+fn unproven_facets_are_refused_with_a_message() {
     // A corner of the robot that is nearly on an edge, and regions that touch within 3e-13 m.
     let set = "{ shape = \"footprint\", footprint = [[0.2, -0.1], [0.2, 0.1], [0, 0.10000000071453756], [-0.2, 0.1], [-0.2, -0.1]], \
         regions = [[[0.5656854249492381, 0.565685424949238], [-0.7727406610312546, 0.2070552360820168], [0.20705523608201615, -0.7727406610312547]], \
@@ -190,10 +192,9 @@ fn facets_that_are_not_proven_are_refused_with_words() {
     assert_eq!(built(&site(set, 33.3, "")), [0, 2, 0, 2]);
 }
 
-/// The goal need not lie in the union of regions. This is no obstacle: the table covers the poses at which the robot
-/// fits.
+/// The goal need not lie in the union of regions: the table covers the poses at which the robot fits.
 #[test]
-fn a_goal_outside_of_a_union_of_regions_is_valid() {
+fn goal_outside_of_all_regions_is_valid() {
     let robot = "[[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]";
     let set = format!(
         "{{ shape = \"footprint\", footprint = {robot}, regions = [[[-2.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [-2.0, 1.0]], \
@@ -201,7 +202,7 @@ fn a_goal_outside_of_a_union_of_regions_is_valid() {
     );
     let table = table([-2.1, 2.1], [-1.1, 1.1], [-10.0, 10.0], [0.1, 5.0]);
     assert_eq!(built(&site(&set, 30.0, &table)), [0; 4]);
-    // The answer about a pose names no obstacle, either.
+    // The answer about a pose names no obstacle either.
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("site.toml"), site(&set, 0.0, &table)).unwrap();
     std::fs::write(

@@ -25,7 +25,7 @@ PERMIT, DENY = "tab:green", "tab:red"
 
 
 def verdicts(site: str, recording: str, task: str, topics: list[str]) -> list[dict[str, Any]]:
-    """Returns what the gate says about each estimate of a recording."""
+    """Returns the gate's decision on each estimate of a recording."""
     with tempfile.TemporaryDirectory() as folder:
         rows = Path(folder) / "rows.jsonl"
         command = [sys.executable, "-m", "posegate", "replay", site, recording, "--task", task, "--json", "--rows", str(rows)]

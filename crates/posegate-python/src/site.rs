@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// Poses from which a task of a thread is worth its start.
+/// The number of poses from which a thread is worth its start.
 const CHUNK: usize = 1024;
 
 /// The cameras, tags and tasks of a place.
@@ -42,7 +42,7 @@ impl PySite {
         format!("<posegate.Site {path:?}, {} tasks>", self.site.tasks.len())
     }
 
-    /// Returns for each pose, an array of shape (n, 3), whether it is in the success set of a task.
+    /// Returns `True` for each pose (an array of shape (n, 3)) that is in the success set of a task.
     fn contains<'py>(
         &self,
         py: Python<'py>,

@@ -19,9 +19,9 @@ use pyo3::types::PyBytes;
 use self_cell::self_cell;
 use std::path::PathBuf;
 
-/// Estimates have no age here: any limit will do.
+/// Estimates have no age here, so any limit works.
 const MAXIMUM_AGE_MS: u32 = 200;
-/// Rows from which the work goes to all cores.
+/// The number of rows from which the work uses all cores.
 const MANY: usize = 4096;
 
 type Parsed<'a> = (Table<'a>, Evaluator<'a>);
@@ -43,7 +43,7 @@ pub struct PyTable {
 }
 
 impl PyTable {
-    /// Checks the bytes of a table; `name` is what messages call them.
+    /// Checks the bytes of a table; `name` is their name in messages.
     pub fn checked(py: Python<'_>, bytes: Vec<u8>, name: &str) -> PyResult<Self> {
         calls::check_table(&bytes, name).map_err(|error| refused(py, error))?;
         let checked = Checked::try_new(bytes, |bytes| {
@@ -126,7 +126,7 @@ impl PyTable {
         Ok(verdict.into())
     }
 
-    /// Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3). Returns two arrays: whether each is permitted, and the
+    /// Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3). Returns two arrays: `True` for each that is permitted, and the
     /// code of its reason, an index of `REASONS`.
     #[pyo3(signature = (poses, covs, epsilon=None))]
     #[allow(clippy::type_complexity)]

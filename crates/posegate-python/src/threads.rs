@@ -1,5 +1,5 @@
-//! Work on all cores, also in a process that was forked: threads do not survive a fork, so the first pool of one would wait for
-//! them forever.
+//! Work on all cores, also in a forked process. Threads do not survive a fork, so the parent's pool would wait for them
+//! forever.
 
 use rayon::ThreadPoolBuilder;
 use std::process;
@@ -13,7 +13,7 @@ pub fn on_all_cores<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     if *OWNER.get_or_init(process::id) == process::id() {
         return work();
     }
-    // A pool of its own; without one, the work would hang.
+    // A separate pool; without one, the work would wait forever.
     match ThreadPoolBuilder::new().build() {
         Ok(pool) => pool.install(work),
         Err(error) => panic!("no threads: {error}"),

@@ -20,7 +20,7 @@ pub fn reasons() -> Vec<Option<&'static str>> {
     names
 }
 
-/// What the gate says about one estimate. True if it permits.
+/// The gate's decision on one estimate. True if it permits.
 #[pyclass(frozen, eq, name = "Verdict", module = "posegate")]
 #[derive(PartialEq)]
 pub struct PyVerdict {
@@ -30,7 +30,7 @@ pub struct PyVerdict {
     /// The name of the reason of a denial.
     #[pyo3(get)]
     reason: Option<&'static str>,
-    /// By which factor the pose-set could be scaled: at least 1 with a permit.
+    /// The largest factor by which the pose-set could be scaled: at least 1 with a permit.
     #[pyo3(get)]
     margin: Option<f64>,
     /// A pose of the pose-set that is not in the success set: x, y, yaw in the world frame.

@@ -29,14 +29,14 @@ def estimates() -> tuple[list[list[str]], Floats, Floats]:
 
 
 def same(found: Optional[float], printed: Optional[float]) -> bool:
-    """Whether two numbers are equal bit for bit."""
+    """Returns `True` if two numbers are equal bit for bit."""
     if found is None or printed is None:
         return found is None and printed is None
     return math.copysign(1, found) == math.copysign(1, printed) and found == printed
 
 
 def is_same(verdict: posegate.Verdict, line: dict[str, Any]) -> bool:
-    """Whether a verdict is the one that the program prints."""
+    """Returns `True` if a verdict is the one that the program prints."""
     pose, printed = verdict.worst_pose, line["worst_pose"]
     poses = pose is None and printed is None or (pose is not None and printed is not None and list(pose) == printed)
     decided = verdict.permit == (line["verdict"] == "permit") and verdict.reason == line["reason"]

@@ -1,6 +1,6 @@
 """`decide_many`: equal to `decide` row by row, faster than plain NumPy, in constant memory, next to other threads and after a fork.
 
-Usage: many.py SETS; SETS is how many sets the memory is watched over.
+Usage: many.py SETS; SETS is the number of sets over which the memory is watched.
 """
 
 import multiprocessing
@@ -36,7 +36,7 @@ def rows_agree() -> None:
 
 
 def layouts_agree() -> None:
-    """Arrays of other types, orders and strides, lists, and none at all."""
+    """Arrays of other types, orders and strides, lists, and empty ones."""
     table = open_table(ROOT / "examples/tables/dock.posegate")
     poses, covs = pose_sets(500, 7, 0.1)
     expected = table.decide_many(poses, covs)

@@ -1,4 +1,4 @@
-"""A plain NumPy implementation of the decision on a facet table: what a program without Posegate's core would do with the same bytes.
+"""A plain NumPy implementation of the decision on a facet table: a decision on the same bytes without Posegate's core.
 
 To first order in the yaw, with the bounds of the head of src/contain/frame.rs for the rest, in floats and without a budget for rounding:
 for comparison of speed, not for use.
@@ -39,7 +39,7 @@ class FacetTable:
             self.pieces.append((start * turn, width * turn, width == 2**32 - 1, parts))
 
     def decide_many(self, poses: Floats, covs: Floats) -> NDArray[np.bool_]:
-        """Returns whether each pose-set is inside one piece."""
+        """Returns `True` for each pose-set that is inside one piece."""
         scaled = covs * self.radius
         minors = scaled[:, 0, 0] * scaled[:, 1, 1] - scaled[:, 0, 1] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -59,12 +59,12 @@ def main() -> None:
         else:
             run = subprocess.run([sys.executable, "-c", text], cwd=folder, env=env, capture_output=True, text=True, check=False)
             require(run.returncode == 0, f"{text}{run.stderr}")
-            require(expected != "" and run.stdout == expected, f"{text}prints\n{run.stdout}the page says\n{expected}")
+            require(expected != "" and run.stdout == expected, f"{text}prints\n{run.stdout}the page states\n{expected}")
             scripts += 1
     picture = folder / "verdicts.png"
     require(picture.is_file() and picture.stat().st_size > 10_000, "no picture")
     figure("python: commands of docs/for-python.md that run", commands, "commands", 7)
-    figure("python: scripts of docs/for-python.md that print what it says", scripts, "scripts", 3)
+    figure("python: scripts of docs/for-python.md that print the stated output", scripts, "scripts", 3)
 
 
 main()

@@ -12,8 +12,8 @@ use std::time::Instant;
 /// Tasks added to the sample site.
 const MORE_TASKS: &str = include_str!("browser_tasks.toml");
 
-/// Tests the page: the vector file, dragging, keys, the command line's verdicts, nothing fetched, no WebAssembly; and the size and the
-/// time of a page of 50 tasks. Screenshots go to FOLDER, if one is given.
+/// Tests the page: the vector file, dragging, keys, the command line's verdicts, nothing fetched, and no WebAssembly. Measures the
+/// size and the time of a page of 50 tasks. Screenshots go to FOLDER, if one is given.
 pub fn browser(given: &Arguments) -> Result {
     need::command("chromium", "chromium")?;
     let python = need::python("browser-venv", "playwright", "playwright")?;

@@ -42,8 +42,8 @@ pub fn budgets(_: &Arguments) -> Result {
     report.finish()
 }
 
-/// Prints estimates per second through the gate and megabytes of a bag per second of one core, and checks that memory does not
-/// grow with the bag (1 GB against 100 MB, made in a temporary folder).
+/// Prints estimates per second through the gate, and megabytes of a bag per second of one core. Checks that memory does not
+/// grow with the bag (1 GB against 100 MB, in a temporary folder).
 pub fn replay_speed(_: &Arguments) -> Result {
     cmd("cargo build --release -p posegate-host --example replay_speed").run()?;
     program_at(&release("examples/replay_speed")).print()

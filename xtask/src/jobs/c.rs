@@ -19,8 +19,8 @@ const COMPILERS: [(&str, &str); 4] = [
     ("arm-none-eabi-g++ -std=c++11", "c++"),
 ];
 
-/// Checks that the header is current and clean, that misuse is refused, and that C firmware, built by Make and by CMake, answers the
-/// vector file and the serial line as the firmware in Rust does.
+/// Checks that the header is current and clean, and that misuse is refused. Builds C firmware by Make and by CMake. It must answer
+/// the vector file and the serial line as the firmware in Rust does.
 pub fn c(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;

@@ -17,8 +17,8 @@ pub fn paving(given: &Arguments) -> Result {
         .print()
 }
 
-/// Compares the lens models, and the windows that are proven for them, with OpenCV's projections: the largest difference of 1,000
-/// random points of each lens, and how far a point of a window is outside the image.
+/// Compares the lens models, and the windows that are proven for them, with OpenCV's projections. Prints the largest difference
+/// of 1,000 random points of each lens, and how far a point of a window is outside the image.
 pub fn lenses(_: &Arguments) -> Result {
     let python = need::python("lenses-venv", "cv2, numpy", "opencv-python-headless numpy")?;
     cmd("cargo build --release -p posegate-host --example lenses").run()?;
@@ -29,8 +29,8 @@ pub fn lenses(_: &Arguments) -> Result {
         .print()
 }
 
-/// Compares the best place of a tag: `place` and its genetic algorithm, and RUNS long runs (20) of SciPy's differential evolution on
-/// the same cost, for the two pose-sets of Fig. 4; and counts how many poses and places are evaluated per second.
+/// Compares the best place of a tag by `place`, by its genetic algorithm, and by RUNS long runs (20) of SciPy's differential
+/// evolution. The cost is the same, for the two pose-sets of Fig. 4. Counts the poses and places that are evaluated per second.
 pub fn placement(given: &Arguments) -> Result {
     let (runs, iterations) = (given.or(0, "20"), given.or(1, "1000"));
     let python = need::python("scipy-venv", "scipy", "scipy")?;
@@ -52,7 +52,7 @@ pub fn placement(given: &Arguments) -> Result {
                 "tests/data/reference-a.toml see-t7 {sigma} {sigma} 1 {runs} {iterations}"
             ))
             .read()?;
-        // A tenth of the evaluations of SciPy's median run; and the usual number.
+        // A tenth of the evaluations of SciPy's median run, and the default number.
         let tenth = (median_evaluations(&evolved)? / 10.0) as u64;
         write("scipy", evolved)?;
         let place = |more: &str| {

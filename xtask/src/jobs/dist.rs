@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// What the archives of a release are named by.
 const SUMS: &str = "SHA256SUMS";
-/// How often everything is built, if the arguments do not say.
+/// The default number of builds.
 const BUILDS: u64 = 2;
 /// The commands of the README that only this job runs: they need the files of a release.
 const INSTALLERS: [&str; 4] = [
@@ -134,7 +134,7 @@ fn compare(first: &Path, second: &Path, report: &mut Report) -> Result {
         }
     }
     report.at_least(
-        "dist: files that two builds in two folders made alike",
+        "dist: files that are equal in two builds in two folders",
         equal,
         "files",
         expected.len(),
@@ -167,7 +167,7 @@ fn version() -> Result<String> {
     Ok(version)
 }
 
-/// Empties a folder that an earlier run of this job has filled, or makes it.
+/// Empties a folder of an earlier run of this job, or makes the folder.
 fn clear(folder: &Path) -> Result {
     if folder.exists() {
         let is_ours = folder.join(SUMS).is_file() || fs::read_dir(folder)?.next().is_none();
@@ -190,14 +190,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_commands_that_install_are_left_to_this_job() {
+    fn only_installing_commands_are_left_to_this_job() {
         assert!(installs("sudo dpkg -i posegate_0.1.0-1_amd64.deb"));
         assert!(installs("pip install posegate-0.1.0-*.whl"));
         assert!(!installs("posegate demo -o x") && !installs("pip install maturin"));
     }
 
     #[test]
-    fn a_release_whose_bytes_differ_is_refused() {
+    fn release_with_differing_bytes_is_refused() {
         let folders = [Scratch::new().unwrap(), Scratch::new().unwrap()];
         for (folder, text) in folders.iter().zip(["one", "two"]) {
             files::write(folder.join("same"), "x").unwrap();
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_with_other_files_is_not_emptied() {
+    fn folder_with_other_files_is_not_emptied() {
         let folder = Scratch::new().unwrap();
         files::write(folder.join("mine"), "x").unwrap();
         assert!(clear(folder.path()).is_err());

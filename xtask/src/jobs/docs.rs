@@ -30,7 +30,7 @@ const PROGRAMS: [&str; 5] = [
 const OF_PYTHON: &str = "for-python.md";
 
 /// Builds the API documents of the core alone and of all libraries without a warning. Runs every command in the shell blocks of the
-/// README and of the pages of docs/, each page in a separate folder with the sample files.
+/// README and of docs/, each page in a separate folder with the sample files.
 pub fn docs(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;

@@ -7,9 +7,9 @@ use crate::report::Report;
 use crate::shell::Result;
 
 /// Injects damaged tables, stale and wrapped stamps, faulty pins, garbage and flipped bits on the wire, also in the emulated
-/// controller, and flips single bits of the running firmware's code, registers and memory (N of each kind, with a seed). Counts trials
-/// and wrong permits.
-/// With fewer than 700 of a kind the controller's line also has its small counts: a quick check, not the stated figures.
+/// controller. Flips single bits of the running firmware's code, registers and memory (N of each kind, with a seed). Counts trials and
+/// wrong permits. With fewer than 700 of a kind the controller's line also has its small counts: a quick check, not the stated
+/// figures.
 pub fn faults(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;

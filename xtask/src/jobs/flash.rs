@@ -18,7 +18,7 @@ const PARTS: [(&str, &str); 5] = [
     ("facets in several pieces that turn", "headings,unions"),
     ("all parts", ALL_PARTS),
 ];
-/// What a gate of C calls, and what one with a tracker calls besides.
+/// The functions that a gate in C calls, and those that a gate with a tracker calls in addition.
 const GATE: [&str; 4] = [
     "posegate_gate_init",
     "posegate_gate_step",
@@ -31,7 +31,7 @@ const TRACKER: [&str; 4] = [
     "posegate_tracker_fix",
     "posegate_gate_step_on",
 ];
-/// Everything that takes flash, one behind the other.
+/// A linker script that places all sections one after the other.
 const LAYOUT: &str = "SECTIONS {
     . = 0;
     .flash : { *(.text .text.*) *(.rodata .rodata.* .srodata .srodata.*) *(.data .data.* .sdata .sdata.*) }
@@ -58,8 +58,8 @@ pub fn parts(_: &Arguments) -> Result {
     Ok(())
 }
 
-/// Prints the bytes of flash of a whole gate in C, without its table: by part, core and level of optimization; and on a Cortex-M4F
-/// the bytes of code of a decision: on facets, including the reason of a denial, and the walk of a grid.
+/// Prints the bytes of flash of a complete gate in C, without its table, by part, core and level of optimization. On a Cortex-M4F
+/// also prints the bytes of code of a decision: on facets, including the reason of a denial, and of the walk of a grid.
 pub fn flash(_: &Arguments) -> Result {
     let mut report = Report::default();
     of_gates(&mut report, &CEILINGS)?;
@@ -83,7 +83,7 @@ fn of_gates(report: &mut Report, ceilings: &[(&str, &str, u64, u64)]) -> Result 
     std::fs::write(&layout, LAYOUT)?;
     for &(target, level, alone, all) in ceilings {
         need::targets(&[target])?;
-        // One core tells what each part takes; the ends are enough for the others.
+        // One core shows what each part takes; for the others the smallest and the largest gate are enough.
         let shows_each = target.starts_with("thumbv7em") && level == "s";
         for (name, features) in PARTS {
             let is_end = features.is_empty() || features == ALL_PARTS;

@@ -17,8 +17,8 @@ const FLOORS: [(&str, u64); 4] = [
     ("report", 700),
 ];
 
-/// Runs every fuzz target (or those named) for a number of seconds each, from seeds of real tables and recorded estimates, and from earlier
-/// finds in tests/fuzz/corpus. Prints a line for each target. Fails on a finding, and if a target reached too few edges.
+/// Runs every fuzz target (or those named) for a number of seconds each. Seeds are real tables, recorded estimates, and earlier finds in
+/// tests/fuzz/corpus. Prints a line for each target. Fails on a finding, and if a target reached too few edges.
 pub fn fuzz(given: &Arguments) -> Result {
     let seconds = given.required(0, "seconds for each target")?;
     given.number(0, 0)?;
@@ -107,7 +107,7 @@ mod tests {
     use super::number_after;
 
     #[test]
-    fn last_number_counts() {
+    fn last_number_is_returned() {
         let log = "#2 INITED cov: 31 ft: 32\n#9 NEW    cov: 903 ft: 4 corp: 2\nstat::number_of_executed_units: 12345\n";
         assert_eq!(number_after(log, " cov: "), 903);
         assert_eq!(number_after(log, "stat::number_of_executed_units:"), 12_345);

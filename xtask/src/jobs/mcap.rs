@@ -82,7 +82,7 @@ mod tests {
     use super::with_truth;
 
     #[test]
-    fn every_other_row_has_a_truth() {
+    fn every_second_row_has_a_truth() {
         let text = with_truth("stamp_ms,x_m,y_m\n0,1,2\n1,3,4\n").unwrap();
         assert_eq!(
             text,

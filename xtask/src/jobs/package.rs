@@ -55,7 +55,7 @@ const NEEDED: [&str; 5] = [
     "crates/posegate-host/src/page/core.wasm",
 ];
 /// What packages have of the files at the top of the repository: a package, and files, or folders that end in `/`. They are copied
-/// when the packages are made: links would break where a repository is unpacked without them.
+/// when the packages are made: links would break if a repository is unpacked without them.
 const SHARED: [(&str, &[&str]); 3] = [
     ("posegate-host", &LICENCES),
     ("posegate-cli", &LICENCES),
@@ -223,10 +223,10 @@ fn unpacked(staged: &Path, folder: &Scratch, report: &mut Report) -> Result<Path
     let root = folder.join("posegate");
     let mut bytes = 0;
     for name in CRATES {
-        let is_this = |path: &&PathBuf| version_of(&files::name(path), name).is_some();
+        let is_package = |path: &&PathBuf| version_of(&files::name(path), name).is_some();
         let archive = packed
             .iter()
-            .find(is_this)
+            .find(is_package)
             .ok_or_else(|| format!("no package of {name}"))?;
         let size = files::size(archive)?;
         report.note(&format!("package {name}"), size, "B");
@@ -246,7 +246,7 @@ fn unpacked(staged: &Path, folder: &Scratch, report: &mut Report) -> Result<Path
         report.require(
             foreign.is_empty(),
             format_args!(
-                "in the package {name}, and of no use to a user:\n{}\n",
+                "the package {name} contains files that a user does not need:\n{}\n",
                 foreign.join("\n")
             ),
         );
@@ -414,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_no_use_are_found() {
+    fn unneeded_files_are_found() {
         assert!(is_allowed("src/gate/mod.rs", OTHERS) && is_allowed("Cargo.toml", OTHERS));
         assert!(!is_allowed("tests/cases.rs", OTHERS) && !is_allowed("srcs/a", OTHERS));
     }
@@ -434,7 +434,7 @@ mod tests {
 
     /// The package of the C boundary is built by itself with the profile of the workspace.
     #[test]
-    fn profile_of_the_boundary_is_the_workspaces() {
+    fn profile_of_the_boundary_equals_that_of_the_workspace() {
         let profile = |path: &str| -> String {
             let text = files::read(files::root().join(path)).unwrap();
             let (_, rest) = text.split_once("[profile.firmware]\n").unwrap();

@@ -8,8 +8,8 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd, program_at};
 
-/// Runs plans a million times by an independent judge; measures plans on sites of 10 to 1,000 tags, with a plot (if a file for it is
-/// named); counts instructions of a chain on both cores; runs a plan under emulation.
+/// Runs plans a million times by an independent judge. Measures plans on sites of 10 to 1,000 tags, with a plot if a file for it is
+/// named. Counts instructions of a chain on both cores, and runs a plan under emulation.
 pub fn planning(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;

@@ -1,5 +1,5 @@
-//! `recorded`: runs recorded estimates through the emulated controller and the host, and tests models learnt from recorded detections
-//! and from a recorded filter on rows that they were not learnt from.
+//! `recorded`: runs recorded estimates through the emulated controller and the host. Tests models learnt from recorded detections and
+//! from a recorded filter on held-out rows.
 
 mod moving;
 mod robots;
@@ -36,8 +36,8 @@ fn release_posegate() -> Cmd {
     program_at(&release("posegate"))
 }
 
-/// Prints what the gate, and the rules that are in use today, would have permitted: for AMCL's estimates of the Nav2 recording, which
-/// has no truth, and for those of a filter on real robots, whose truth is known.
+/// Prints what the gate, and the rules in use today, would have permitted. The estimates are AMCL's of the Nav2 recording, without a
+/// truth, and those of a filter on real robots with a known truth.
 fn rules(folder: &Path) -> Result {
     release_program()?;
     need::command("python3", "python3")?;

@@ -95,7 +95,7 @@ pub fn ros2(given: &Arguments) -> Result {
     Ok(())
 }
 
-/// Plays the recording of Nav2 with its odometry to the node, in real time and at 20 times, and compares each verdict with the row of
+/// Plays the recording of Nav2 with its odometry to the node, at 1 and 20 times real time. Compares each verdict with the row of
 /// `posegate replay`. The argument is the folder of the recordings.
 pub fn nav2(given: &Arguments) -> Result {
     let folder = given.folder(0, "the folder of the recordings")?;

@@ -14,10 +14,9 @@ use std::time::{Duration, Instant, SystemTime};
 /// Longest wait for anything.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Checks for the same bytes as from one process. Then again with one node killed in the middle, its task queued again, and a merge that
-/// waits for all tasks: the same bytes, and no finished piece made twice.
-/// The argument is the number of endpoints of the synthetic plant (120); with few of them
-/// most of the time is spent on starting processes.
+/// Checks for the same bytes as from one process. Repeats it with one node killed in the middle, its task queued again, and a merge that
+/// waits for all tasks. The bytes must be the same, and no finished piece is made twice. The argument is the number of endpoints of the
+/// synthetic plant (120); with few of them most of the time is spent on starting processes.
 pub fn slurm(given: &Arguments) -> Result {
     let endpoints = given.number(0, 120)?;
     let missing: Vec<&str> = ["slurmctld", "slurmd", "sbatch", "munged"]
@@ -94,14 +93,14 @@ impl Run {
         cmd(words).env("SLURM_CONF", self.path("slurm.conf"))
     }
 
-    fn wait(&self, what: &str, mut is_so: impl FnMut() -> Result<bool>) -> Result {
+    fn wait(&self, what: &str, mut is_done: impl FnMut() -> Result<bool>) -> Result {
         let start = Instant::now();
-        while !is_so()? {
+        while !is_done()? {
             if start.elapsed() > PATIENCE {
                 // Only for the log, because the wait has failed already.
                 let _ = self.slurm("squeue").code();
                 let _ = self.slurm("sinfo -N -l").code();
-                return Err(format!("slurm: waited in vain for {what}").into());
+                return Err(format!("slurm: timeout while waiting for {what}").into());
             }
             std::thread::sleep(Duration::from_millis(500));
         }
@@ -296,7 +295,10 @@ impl Run {
         let kept = kept(&files::read(&log)?)
             .ok_or("slurm: the log of the killed shard has no \"kept\"")?;
         report.note("slurm: of them of the killed shard", kept, "pieces");
-        report.require(kept > 0, "slurm: the killed shard had finished nothing, and so had nothing to lose: give it more endpoints");
+        report.require(
+            kept > 0,
+            "slurm: the killed shard had finished no piece: give more endpoints",
+        );
         Ok(())
     }
 }

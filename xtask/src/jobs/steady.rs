@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A line for each: a package, a test target of it and, if not all of it waits, a part of the names of the tests that do.
-/// `xtask/tests/steady.rs` compares the list with the sources.
+/// One line per test target: its package, its name and, if not all of its tests wait, a part of the names of those that
+/// do. `xtask/tests/steady.rs` compares the list with the sources.
 const LIST: &str = include_str!("../../steady.txt");
 
-/// Runs each of them RUNS times (20) on an idle machine, which the caller must provide, and RUNS times with two busy processors. No
+/// Runs each target RUNS times (20) on an idle machine, which the caller must provide, and RUNS times with two busy processors. No
 /// run may fail. Ends at the first failure, with its log.
 pub fn steady(given: &Arguments) -> Result {
     let runs = given.number(0, 20)?;
@@ -26,7 +26,7 @@ pub fn steady(given: &Arguments) -> Result {
     let programs = build(&entries)?;
     repeat(&entries, &programs, runs, "on an idle machine")?;
     let _busy = Busy::start(2);
-    repeat(&entries, &programs, runs, "beside two busy processes")
+    repeat(&entries, &programs, runs, "with two busy processes")
 }
 
 /// A line of the list.
@@ -93,10 +93,10 @@ fn build<'a>(entries: &[Entry<'a>]) -> Result<BTreeMap<(&'a str, &'a str), Progr
             let folder = Path::new(manifest).parent().unwrap_or(Path::new("."));
             // A package has the name of its folder; only tests of other crates than the root's are listed.
             let package = files::name(folder);
-            let is_it =
+            let is_entry =
                 |entry: &&&Entry| target["name"] == entry.target && package == entry.package;
             if target["kind"][0] == "test"
-                && let Some(entry) = built.iter().find(is_it)
+                && let Some(entry) = built.iter().find(is_entry)
             {
                 let program: Program = (executable.into(), folder.into());
                 programs.insert((entry.package, entry.target), program);
@@ -171,7 +171,7 @@ fn repeat(
     Ok(())
 }
 
-/// Threads that do nothing but take processor time, until this is dropped. They end with this process, however it ends.
+/// Threads that only take processor time, until this is dropped. They end with this process, however it ends.
 struct Busy(Arc<AtomicBool>);
 
 impl Busy {

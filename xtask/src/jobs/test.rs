@@ -116,7 +116,7 @@ pub fn cases(given: &Arguments) -> Result {
 /// an abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED,
 /// the folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.
 pub fn hostile(given: &Arguments) -> Result {
-    cmd("cargo test --release -p posegate-cli --test hostile_files -- --include-ignored --exact --nocapture hostile_files_are_answered")
+    cmd("cargo test --release -p posegate-cli --test hostile_files -- --include-ignored --exact --nocapture hostile_files_end_with_a_valid_exit_code")
         .env("POSEGATE_FLIPS", given.or(0, "2000"))
         .env("POSEGATE_MUTANTS", given.or(1, "20000"))
         .env("POSEGATE_SEED", given.or(2, "1"))

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn count_is_read_from_a_right_line() {
+    fn count_is_read_from_a_valid_line() {
         assert_eq!(count(&right("Cortex-M4", 10_272)), 10_272);
         assert_eq!(count(""), 0);
     }

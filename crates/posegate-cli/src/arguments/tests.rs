@@ -54,7 +54,7 @@ fn every_argument_that_names_a_file_is_listed() {
     let listed: Vec<&str> = LIST.lines().collect();
     assert_eq!(
         found, listed,
-        "tests/data/file_arguments.txt lists others than these; crates/posegate-testkit/src/commands.rs has a command for each: {found:#?}"
+        "tests/data/file_arguments.txt differs from these; add a command for each to crates/posegate-testkit/src/commands.rs: {found:#?}"
     );
 }
 

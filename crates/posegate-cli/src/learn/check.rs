@@ -1,6 +1,6 @@
-//! `posegate learn check`: does a learnt model still hold on new data?
+//! `posegate learn check`: tests whether a learnt model still holds on new data.
 
-use super::{cut, refused};
+use super::{refused, warn_of_cut_runs};
 use crate::door::{Failure, Outcome, answer, print, print_json};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{
@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 
 /// Tests whether a learnt error model still holds on new detections
 ///
-/// Exit code 1 if the model is contradicted. The test may be run after every detection: it contradicts a model that holds
-/// with a probability of at most 1 - confidence, however often it is run. It says which region is contradicted, after how
-/// many rows, since which row, and what the change looks like: `scale` (noise, blur, light), `offset` (a tag or camera that
-/// is displaced) or `calibration` (image centre, focal length, a camera or tag that is turned). Rows of one `run` are one
-/// observation. Without the column `run`, rows are independent of each other, in the order of `t_s` or of the file.
+/// Exit code 1 if the model is contradicted. The test may be run after every detection. The probability that it ever
+/// contradicts a valid model is at most 1 - confidence. It reports the contradicted region, after how many rows, and since
+/// which row. It also reports the kind of the change: `scale` (noise, blur, light), `offset` (a displaced tag or camera) or
+/// `calibration` (image centre, focal length, a turned camera or tag). Rows of one `run` are one observation. Without the
+/// column `run`, rows are independent of each other, in the order of `t_s` or of the file.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn check tags.toml today.csv --json\n\nColumns: those of `learn bounds`."
@@ -48,15 +48,15 @@ pub fn run(arguments: &Check, files: &Files) -> Outcome {
     };
     let (bytes, name) = files.read(&arguments.detections)?;
     let detections = Detections::read(&bytes, &name).map_err(refused)?;
-    cut(&detections.runs, &name);
+    warn_of_cut_runs(&detections.runs, &name);
     let settings = CheckSettings {
         confidence: arguments.confidence,
     };
     let found = check_bounds(&model, &detections, &settings).map_err(refused)?;
     if arguments.json {
-        print_json(&told(&found, arguments.confidence))?;
+        print_json(&report_json(&found, arguments.confidence))?;
     } else {
-        tell(&found, model.quantile())?;
+        print_report(&found, model.quantile())?;
     }
     Ok(answer(found.after_rows.is_none()))
 }
@@ -69,7 +69,7 @@ fn verdict(contradicted: bool) -> &'static str {
     }
 }
 
-fn told(found: &CheckReport, confidence: f64) -> Value {
+fn report_json(found: &CheckReport, confidence: f64) -> Value {
     let bound = |bound: &BoundCheck| {
         json!({
             "held": bound.held, "e_value": bound.e_value,
@@ -117,7 +117,7 @@ fn since(region: &RegionCheck) -> Option<u64> {
     stronger.since_row
 }
 
-fn tell(found: &CheckReport, quantile: f64) -> Result<(), Failure> {
+fn print_report(found: &CheckReport, quantile: f64) -> Result<(), Failure> {
     match found.after_rows {
         None => print(&format_args!(
             "holds: {} rows do not contradict the model",

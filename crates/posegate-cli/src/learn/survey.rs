@@ -1,4 +1,4 @@
-//! `posegate learn survey`: are docks and tags where the site file says?
+//! `posegate learn survey`: finds docks and tags that are not where the site file places them.
 
 use super::refused;
 use crate::door::{Outcome, answer, print, print_json, site};
@@ -6,12 +6,12 @@ use posegate_host::files::{Files, Input};
 use posegate_host::learn::{OffsetReport, Surveyed, SurveyedSite, looks, survey};
 use serde_json::{Value, json};
 
-/// Finds docks and tags that are not where the site file says, from logs of dockings
+/// Finds docks and tags that are not where the site file places them, from logs of dockings
 ///
-/// Each row is a look at a tag: the robot's pose at contact with the dock, as it follows from the surveyed place of the tag (looks on
-/// the way, carried along the odometry). Exit code 1 if something must be surveyed again. If everything is in its place, that happens
-/// with a probability of at most 1 - confidence. It assumes that dockings (`run`) are independent of each other and that neither the
-/// camera nor the contact has a bias: a camera that is turned makes every dock seem off.
+/// Each row is a look at a tag: the robot's pose at contact with the dock, computed from the surveyed place of the tag. (Earlier
+/// looks are carried along the odometry.) Exit code 1 if something must be surveyed again. If everything is in its place, that
+/// happens with a probability of at most 1 - confidence. It assumes that dockings (`run`) are independent of each other, and
+/// that neither the camera nor the contact has a bias. A turned camera makes every dock seem off.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate learn survey site.toml dockings.csv --json\n\nColumns: run (the docking at its dock), dock (the name of its task), tag, x_m, y_m, yaw_rad (world frame)."
@@ -21,7 +21,7 @@ pub struct Survey {
     site: Input,
     /// Looks at contact (CSV); `-` for standard input
     dockings: Input,
-    /// The probability with which nothing is called off if everything is in its place
+    /// The probability with which nothing is reported if everything is in its place
     #[arg(long, default_value_t = 0.99, allow_negative_numbers = true)]
     confidence: f64,
     /// Print JSON
@@ -49,7 +49,7 @@ pub fn run(arguments: &Survey, files: &Files) -> Outcome {
     if arguments.json {
         let of = |kind| {
             let reports = found.iter().filter(move |report| report.kind == kind);
-            reports.map(told).collect::<Vec<_>>()
+            reports.map(report_json).collect::<Vec<_>>()
         };
         let again = found.iter().filter(|report| report.stale).map(sentence);
         print_json(&json!({
@@ -57,12 +57,12 @@ pub fn run(arguments: &Survey, files: &Files) -> Outcome {
             "docks": of(Surveyed::Dock), "tags": of(Surveyed::Tag), "resurvey": again.collect::<Vec<_>>(),
         }))?;
     } else {
-        tell(&found)?;
+        print_reports(&found)?;
     }
     Ok(answer(!found.iter().any(|report| report.stale)))
 }
 
-fn told(report: &OffsetReport) -> Value {
+fn report_json(report: &OffsetReport) -> Value {
     let pose = |pose: Option<[f64; 3]>| {
         pose.map(|[x, y, yaw]| json!({"x_m": x, "y_m": y, "yaw_deg": yaw.to_degrees()}))
     };
@@ -96,7 +96,7 @@ fn sentence(report: &OffsetReport) -> String {
     )
 }
 
-fn tell(found: &[OffsetReport]) -> Result<(), crate::door::Failure> {
+fn print_reports(found: &[OffsetReport]) -> Result<(), crate::door::Failure> {
     for report in found {
         let name = named(report.kind, &report.name);
         let (Some(offset), Some(region)) = (report.offset, report.region) else {
@@ -123,7 +123,7 @@ fn tell(found: &[OffsetReport]) -> Result<(), crate::door::Failure> {
     }
     let mut stale = found.iter().filter(|report| report.stale).peekable();
     if stale.peek().is_none() {
-        return print(&"everything is where the site file says, as far as these dockings tell");
+        return print(&"no offset is significant: nothing to survey again");
     }
     for report in stale {
         print(&sentence(report))?;

@@ -11,7 +11,7 @@ pub struct Arguments {
     /// The camera of the site (--site) with which the detections were taken
     #[arg(long, requires = "site")]
     camera: Option<String>,
-    /// The site file that has the camera; the tags are those of the site if all are alike
+    /// The site file that has the camera; the tags are those of the site if all are equal
     #[arg(long, requires = "camera")]
     site: Option<Input>,
     /// Instead of a site: the focal length along a row, pixels
@@ -43,7 +43,7 @@ impl Arguments {
         taken.family = self.family.clone().or(taken.family);
         if self.camera.is_some() && (taken.tag_size.is_none() || taken.family.is_none()) {
             return Err(Failure::usage(
-                "the site's tags are not alike".to_owned(),
+                "the site's tags differ".to_owned(),
                 "state those of the data: --tag-size METRES --family NAME",
             ));
         }
@@ -51,7 +51,7 @@ impl Arguments {
     }
 }
 
-/// Returns what a site says about a camera, and about its tags where all are alike.
+/// Returns a site's camera, and its tags if all are equal.
 fn of_site(site: &Site, name: &str, file: &str) -> Result<TakenWith, Failure> {
     let camera = site.cameras.get(name).ok_or_else(|| {
         let known: Vec<&str> = site.cameras.keys().map(String::as_str).collect();

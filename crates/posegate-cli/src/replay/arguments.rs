@@ -8,7 +8,8 @@ use posegate_host::files::{Input, Output};
 use posegate_host::log::recording::FrameNames;
 use posegate_host::log::replay::{Clock, Thresholds};
 
-/// Replays a recording through the gate: what the gate would have permitted, and whether that was right
+/// Replays a recording through the gate: what the gate would have permitted, and which permits were
+/// false
 ///
 /// The recording is CSV (the columns of `posegate gate`, with t_s; true_x_m, true_y_m, true_yaw_rad if the truth is
 /// known), TUM, or MCAP with ROS 2 topics. It is read as a stream; its faults are counted and reported.
@@ -43,8 +44,8 @@ pub struct Arguments {
     /// Factor by which covariances are multiplied, at least 1
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub inflation: f64,
-    /// A model of `posegate learn inflation`: each covariance is multiplied by the factor for its time since the last fix (a CSV's
-    /// column), or by the largest factor if that is not known or beyond the data
+    /// A model of `posegate learn inflation`. Each covariance is multiplied by the factor for its time since the last fix (a
+    /// column of a CSV). If that time is unknown or beyond the data, the largest factor is used
     #[arg(long, value_name = "MODEL", conflicts_with = "inflation")]
     pub inflation_model: Option<Input>,
     /// Which terms of their covariance the sources fill (AMCL: yaw-unknown)
@@ -69,7 +70,7 @@ pub struct Arguments {
     #[arg(long)]
     pub base_frame: Option<String>,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
-    /// or log times unless nearly all of them are of another clock than the stamps
+    /// else log times, unless nearly all stamps are of another clock
     #[arg(long, value_enum, default_value = "auto")]
     pub clock: ClockName,
     /// Use only estimates stamped at this time or later, seconds
@@ -85,7 +86,7 @@ pub struct Arguments {
     /// Deviations of the odometry: m per root of a metre, rad per root of a radian, rad per root of a metre
     #[arg(long, default_value = "0.02,0.05,0.02", value_name = "M,RAD,RAD")]
     pub odom_noise: String,
-    /// The share of each movement that the odometry may be wrong by, in the worst direction
+    /// Largest error of the odometry in any direction, as a share of each movement
     #[arg(long, default_value_t = 0.02, allow_negative_numbers = true)]
     pub odom_slip: f64,
     /// Longest time between two poses of the odometry, milliseconds
@@ -282,10 +283,10 @@ impl Arguments {
         Ok(())
     }
 
-    /// Returns the gate's clock; `told` is the clock that the recording's format defines.
-    pub fn clock(&self, told: Option<Clock>) -> Option<Clock> {
+    /// Returns the gate's clock; `defined` is the clock that the recording's format defines.
+    pub fn clock(&self, defined: Option<Clock>) -> Option<Clock> {
         match self.clock {
-            ClockName::Auto => told,
+            ClockName::Auto => defined,
             ClockName::Logged => Some(Clock::Logged),
             ClockName::Stamps => Some(Clock::Stamps),
         }

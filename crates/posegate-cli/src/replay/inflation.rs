@@ -3,7 +3,7 @@
 use super::arguments::{Arguments, Kind};
 use super::parameter;
 use crate::door::{Failure, warn};
-use crate::learn::{begins_late, refused};
+use crate::learn::{refused, young_age_warning};
 use posegate::confidence::radius_squared;
 use posegate::gate::InvalidParameter;
 use posegate::set::{Aging, Inflation, RadiusSquared};
@@ -68,7 +68,7 @@ impl Inflated {
                 "learn it from more rows, or with a smaller --epsilon or --confidence",
             )
         })?;
-        if let Some(late) = begins_late(&model) {
+        if let Some(late) = young_age_warning(&model) {
             warn(&format_args!("{name}: {late}"));
         }
         let column = (factors.aging != Aging::NONE).then(|| model.condition().to_owned());
@@ -87,7 +87,7 @@ impl Inflated {
     }
 
     /// Returns the factors for the summary.
-    pub fn told(&self) -> Value {
+    pub fn to_json(&self) -> Value {
         json!({"largest": f64::from(self.factors.inflation.q16()) / 65536.0, "by_age": by_age_json(&self.factors)})
     }
 }

@@ -143,7 +143,7 @@ fn which_topic(input: impl Read, name: &str) -> Failure {
     while let Ok(Some(_)) = bag.next() {}
     Failure::list(
         &format!("{} has topics:{}", printable(name), topics(bag.told())),
-        "say which one has the estimates, as --topic /amcl_pose",
+        "name the topic with the estimates, such as --topic /amcl_pose",
     )
 }
 
@@ -173,7 +173,7 @@ fn truth(
         if arguments.topic.contains(&topic) {
             return Err(Failure::usage(
                 format!("--truth {topic} is a topic of estimates too"),
-                "an estimate is always right about itself: name another topic",
+                "estimates cannot be their own truth: name another topic",
             ));
         }
         let track = Trajectory::new(MOST_TRUE, arguments.truth_gap);
@@ -211,7 +211,7 @@ fn truth(
 }
 
 /// Returns the localizer for detections, with the camera and the tags. `None` if the site has no camera, or has several and
-/// --camera names none.
+/// --camera is missing.
 fn looks(
     arguments: &Arguments,
     site: &Site,

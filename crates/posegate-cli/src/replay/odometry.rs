@@ -55,7 +55,7 @@ fn of_file(from: &Input, files: &Files) -> Result<Vec<OdometryPose>, Failure> {
     }
 }
 
-/// Reads a topic of the recording, in a pass of its own.
+/// Reads a topic of the recording, in a separate pass.
 fn of_topic(
     arguments: &Arguments,
     topic: &str,
@@ -87,10 +87,10 @@ fn of_topic(
             poses.push((pose.t_s, pose.level()));
         }
     }
-    let told = bag.told();
-    if !told.read.contains_key(topic) {
-        let refused = told.skipped.get(topic);
-        let transforms = told
+    let diagnostics = bag.told();
+    if !diagnostics.read.contains_key(topic) {
+        let refused = diagnostics.skipped.get(topic);
+        let transforms = diagnostics
             .skipped
             .iter()
             .find(|(_, skipped)| skipped.schema == Kind::Transforms.name() && skipped.messages > 1);
@@ -108,7 +108,7 @@ fn of_topic(
         return Err(Failure::usage(
             match refused {
                 Some(skipped) => format!(
-                    "{name}: the topic {topic} is no odometry: {} ({})",
+                    "{name}: the topic {topic} is not an odometry: {} ({})",
                     skipped.why.name(),
                     printable(&skipped.schema)
                 ),
@@ -117,10 +117,10 @@ fn of_topic(
             &help,
         ));
     }
-    if poses.is_empty() && !told.transforms.is_empty() {
+    if poses.is_empty() && !diagnostics.transforms.is_empty() {
         return Err(no_edge(
             &format!("{}: {} has", opened.name, printable(topic)),
-            told,
+            diagnostics,
             arguments,
         ));
     }
@@ -128,8 +128,8 @@ fn of_topic(
 }
 
 /// Returns the failure for transforms that are not those of the robot.
-pub fn no_edge(of: &str, told: &ReaderDiagnostics, arguments: &Arguments) -> Failure {
-    let edges: String = told
+pub fn no_edge(of: &str, diagnostics: &ReaderDiagnostics, arguments: &Arguments) -> Failure {
+    let edges: String = diagnostics
         .transforms
         .iter()
         .map(|((parent, child), count)| {

@@ -12,7 +12,11 @@ use posegate_host::printable::printable;
 use serde_json::{Map, Value, json};
 
 /// Returns the failure for a recording without estimates, with the reasons.
-pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) -> Failure {
+pub fn no_estimates(
+    arguments: &Arguments,
+    diagnostics: &ReaderDiagnostics,
+    outside: u64,
+) -> Failure {
     let name = arguments.log.display();
     if outside > 0 {
         return Failure::usage(
@@ -20,10 +24,10 @@ pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) ->
             "times are those of the stamps, in seconds",
         );
     }
-    if !told.transforms.is_empty() {
-        return no_edge(&format!("{name}:"), told, arguments);
+    if !diagnostics.transforms.is_empty() {
+        return no_edge(&format!("{name}:"), diagnostics, arguments);
     }
-    let refused = told
+    let refused = diagnostics
         .skipped
         .iter()
         .filter(|(_, skipped)| skipped.why != SkipReason::NotWanted)
@@ -35,13 +39,13 @@ pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) ->
             )
         });
     let refused: String = refused.collect();
-    let damage = told
+    let damage = diagnostics
         .damage
         .as_deref()
         .map_or(String::new(), |damage| format!("; broken {damage}"));
-    let bytes = told.first_undecodable.as_deref();
+    let bytes = diagnostics.first_undecodable.as_deref();
     let bytes = bytes.map_or(String::new(), |first| format!("; {first}"));
-    let others = topics(told);
+    let others = topics(diagnostics);
     let others = if others.is_empty() {
         others
     } else {
@@ -54,25 +58,27 @@ pub fn nothing(arguments: &Arguments, told: &ReaderDiagnostics, outside: u64) ->
 }
 
 /// Checks that the named topics exist, and that a requested truth applies to at least one estimate.
-pub fn asked_for(
+pub fn check_requested(
     arguments: &Arguments,
-    told: &ReaderDiagnostics,
+    diagnostics: &ReaderDiagnostics,
     replay: &Replay<'_>,
 ) -> Result<(), Failure> {
     let name = arguments.log.display();
     let missing: String = arguments
         .topic
         .iter()
-        .filter(|topic| !told.read.contains_key(*topic) && !told.skipped.contains_key(*topic))
+        .filter(|topic| {
+            !diagnostics.read.contains_key(*topic) && !diagnostics.skipped.contains_key(*topic)
+        })
         .map(|topic| format!(" {topic}"))
         .collect();
     if !missing.is_empty() {
         return Err(Failure::usage(
             format!(
                 "{name} has no topic{missing}; its other topics:{}",
-                topics(told)
+                topics(diagnostics)
             ),
-            "leave it out, or name one that is there",
+            "leave it out, or name an existing topic",
         ));
     }
     let [(_, verdicts), ..] = replay.tallies();
@@ -84,13 +90,16 @@ pub fn asked_for(
     else {
         return Ok(());
     };
-    let skipped = told.skipped.get(&*truth).map_or(String::new(), |skipped| {
-        format!(
-            "; the topic is not read: {} ({})",
-            skipped.why.name(),
-            skipped.schema
-        )
-    });
+    let skipped = diagnostics
+        .skipped
+        .get(&*truth)
+        .map_or(String::new(), |skipped| {
+            format!(
+                "; the topic is not read: {} ({})",
+                skipped.why.name(),
+                skipped.schema
+            )
+        });
     let refused = replay.refused();
     let track = replay.track();
     Err(Failure::usage(
@@ -110,8 +119,8 @@ pub fn asked_for(
 
 /// Returns the reader's counts and faults as JSON.
 pub fn recording(input: &Recorded) -> Value {
-    let told = input.recording.told();
-    let skipped: Map<String, Value> = told
+    let diagnostics = input.recording.told();
+    let skipped: Map<String, Value> = diagnostics
         .skipped
         .iter()
         .map(|(topic, skipped)| {
@@ -127,15 +136,15 @@ pub fn recording(input: &Recorded) -> Value {
     json!({
         "file": input.name,
         "bytes": input.recording.bytes(),
-        "message_bytes": told.message_bytes,
-        "topics": told.read,
+        "message_bytes": diagnostics.message_bytes,
+        "topics": diagnostics.read,
         "skipped_topics": skipped,
-        "undecodable": told.undecodable,
-        "first_undecodable": told.first_undecodable,
-        "indexed": told.indexed,
-        "damage": told.damage,
-        "bad_chunks": told.bad_chunks,
-        "bad_records": told.bad_records,
+        "undecodable": diagnostics.undecodable,
+        "first_undecodable": diagnostics.first_undecodable,
+        "indexed": diagnostics.indexed,
+        "damage": diagnostics.damage,
+        "bad_chunks": diagnostics.bad_chunks,
+        "bad_records": diagnostics.bad_records,
         "outside_time_range": input.part.outside,
     })
 }
@@ -161,7 +170,7 @@ pub fn sentences(
     }
     interlock(&summary["interlock"])?;
     if let Some(odometry) = summary.get("odometry") {
-        print(&format_args!("{}", driven(arguments, odometry)))?;
+        print(&format_args!("{}", odometry_text(arguments, odometry)))?;
     }
     if replay.clock() == Some(Clock::Stamps) {
         print(&format_args!("freshness: {NOT_FRESH}"))?;
@@ -231,11 +240,11 @@ pub fn sentences(
 }
 
 /// Returns how fast the robot was by its odometry, and the bounds that the odometry exceeds.
-fn driven(arguments: &Arguments, odometry: &Value) -> String {
+fn odometry_text(arguments: &Arguments, odometry: &Value) -> String {
     let number = |name: &str| odometry[name].as_f64().unwrap_or(f64::NAN);
     let (speed, gap) = (number("most_m_s"), number("longest_gap_s"));
     let rate = number("most_rad_s").to_degrees();
-    // A step beyond, so that the number that is told is enough.
+    // Rounded up, so that the printed number is enough.
     let beyond = |value: f64| ((value * 1e3).floor() + 1.0) * 1e-3;
     let mut more = String::new();
     for (flag, given, found) in [
@@ -308,8 +317,8 @@ fn interlock(times: &Value) -> Result<(), Failure> {
 }
 
 /// Lists the topics that are not read, one line each.
-pub fn topics(told: &ReaderDiagnostics) -> String {
-    let lines = told.skipped.iter().map(|(topic, skipped)| {
+pub fn topics(diagnostics: &ReaderDiagnostics) -> String {
+    let lines = diagnostics.skipped.iter().map(|(topic, skipped)| {
         format!(
             "\n  {} ({}, {} messages)",
             printable(topic),

@@ -37,7 +37,7 @@ pub struct Run {
     pub mib: u64,
     pub seconds: f64,
     /// The beginning of stderr.
-    pub said: String,
+    pub stderr: String,
 }
 
 impl Run {
@@ -78,25 +78,25 @@ pub fn run(folder: &Path, arguments: &[String]) -> Run {
     #[expect(clippy::zombie_processes)]
     let child = command.spawn().expect("the program starts");
     let (status, mib, seconds) = ended(child.id().cast_signed());
-    let mut said = String::new();
+    let mut stderr = String::new();
     let mut bytes = Vec::new();
-    let mut stderr = File::open(&log).expect("a log");
+    let mut reader = File::open(&log).expect("a log");
     // The message of a panic is at the beginning of the log, or after a long report at its end.
-    stderr
+    reader
         .by_ref()
         .take(4096)
         .read_to_end(&mut bytes)
         .expect("a log");
-    let length = stderr.metadata().map_or(0, |data| data.len());
+    let length = reader.metadata().map_or(0, |data| data.len());
     if length > 8192 {
-        stderr.seek(SeekFrom::End(-4096)).expect("a log");
-        stderr.read_to_end(&mut bytes).expect("a log");
+        reader.seek(SeekFrom::End(-4096)).expect("a log");
+        reader.read_to_end(&mut bytes).expect("a log");
     }
-    said.push_str(&String::from_utf8_lossy(&bytes));
-    let panicked = said.contains("panicked at ");
+    stderr.push_str(&String::from_utf8_lossy(&bytes));
+    let panicked = stderr.contains("panicked at ");
     let end = match (status.code(), status.signal()) {
         (_, Some(signal)) => End::Killed(signal),
-        _ if panicked && said.contains("/miette-") => End::PanicOfRenderer,
+        _ if panicked && stderr.contains("/miette-") => End::PanicOfRenderer,
         _ if panicked => End::Panic,
         (Some(code @ 0..=3), _) => End::Exit(code),
         (code, _) => End::OtherExit(code.unwrap_or(-1)),
@@ -105,7 +105,7 @@ pub fn run(folder: &Path, arguments: &[String]) -> Run {
         end,
         mib,
         seconds,
-        said,
+        stderr,
     }
 }
 

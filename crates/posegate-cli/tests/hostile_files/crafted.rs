@@ -1,4 +1,4 @@
-//! Hand-made files, each for one weakness.
+//! Files with one crafted weakness each.
 
 use crate::Folder;
 use crate::bags::Compression;
@@ -9,8 +9,8 @@ use posegate_testkit::mcap::op;
 use std::fmt::Write as _;
 
 /// Returns the words of an error, without the frame around it.
-fn words(said: &str) -> String {
-    said.replace(['│', '×'], " ")
+fn words(text: &str) -> String {
+    text.replace(['│', '×'], " ")
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")
@@ -25,7 +25,7 @@ fn answered(folder: &Folder, arguments: &str) -> Run {
         run.end,
         run.mib,
         run.seconds,
-        run.said
+        run.stderr
     );
     run
 }
@@ -37,7 +37,7 @@ fn replayed(bytes: &[u8]) -> Result<serde_json::Value, String> {
     let rest = "--task dock --topic /amcl_pose --cross-terms yaw-unknown";
     let run = answered(&folder, &format!("replay dock.toml a.mcap {rest} --json"));
     if run.end == End::Exit(2) {
-        return Err(words(&run.said));
+        return Err(words(&run.stderr));
     }
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_posegate"))
         .args(format!("replay dock.toml a.mcap {rest} --json").split(' '))
@@ -59,10 +59,10 @@ fn records(bytes: &[u8]) -> Vec<(usize, u8, usize)> {
     all
 }
 
-/// Each length of a bag is made too large in turn, including those of records within chunks. The whole chunk is left out and
-/// reported; the other chunks are read.
+/// Each length of a bag is made too large in turn, including those of records within chunks. The damaged chunk is skipped
+/// and reported. The other chunks are read.
 #[test]
-fn lengths_beyond_the_bytes_leave_a_chunk_out() {
+fn chunk_with_a_length_beyond_its_end_is_skipped() {
     let whole = bag(None, 30);
     let estimates = replayed(&whole).unwrap()["estimates"].as_u64().unwrap();
     assert_eq!(estimates, 30);
@@ -112,7 +112,7 @@ fn lengths_beyond_the_bytes_leave_a_chunk_out() {
 
 /// Stated lengths in a schema or a channel reserve no memory.
 #[test]
-fn lengths_of_names_reserve_nothing() {
+fn stated_name_length_reserves_no_memory() {
     let whole = bag(None, 30);
     for (start, opcode, length) in records(&whole) {
         if !matches!(
@@ -134,7 +134,7 @@ fn lengths_of_names_reserve_nothing() {
 
 /// A chunk that the index names and that has another opcode is reported as missing.
 #[test]
-fn a_chunk_that_the_index_names_is_missed() {
+fn indexed_chunk_with_another_opcode_is_reported_missing() {
     let mut bytes = bag(Some(Compression::Zstd), 30);
     let chunks: Vec<_> = records(&bytes)
         .into_iter()
@@ -153,7 +153,7 @@ fn a_chunk_that_the_index_names_is_missed() {
 
 /// Small chunks with very large stated or decompressed sizes.
 #[test]
-fn chunks_that_swell_are_left_out() {
+fn chunk_with_a_huge_decompressed_size_is_skipped() {
     let record = |size: u64, compression: &str, data: &[u8]| {
         let mut body = vec![0; 16];
         body.extend(size.to_le_bytes());
@@ -197,7 +197,7 @@ fn chunks_that_swell_are_left_out() {
 
 /// Times whose difference is not a finite number are in no span of the timeline.
 #[test]
-fn times_that_lie_too_far_apart_are_counted() {
+fn infinite_time_differences_are_counted() {
     let folder = Folder::new(None);
     let rows = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n\
         -1.7e308,0,0,0,1e-4,0,0,1e-4,0,1e-4\n1.7e308,0,0,0,1e-4,0,0,1e-4,0,1e-4\n";
@@ -207,7 +207,7 @@ fn times_that_lie_too_far_apart_are_counted() {
 
 /// An attachment may be of any length: the mcap crate's parser subtracts 4 from it.
 #[test]
-fn records_of_no_use_are_passed_over() {
+fn attachment_of_any_length_is_skipped() {
     let good = bag(None, 30);
     for opcode in [op::ATTACHMENT, op::METADATA, op::STATISTICS, 0x80, 0xff] {
         for length in [0_u64, 1, 3, 30, 5 << 20] {
@@ -231,7 +231,7 @@ fn records_of_no_use_are_passed_over() {
 
 /// Inputs without an end are refused with exit code 2, before they fill the memory.
 #[test]
-fn inputs_without_an_end_are_refused() {
+fn endless_input_is_refused() {
     let folder = Folder::new(None);
     let mut tried = 0;
     for arguments in [
@@ -255,7 +255,7 @@ fn inputs_without_an_end_are_refused() {
         "plan docks.toml --to dock-1 --costs /dev/zero",
     ] {
         let run = answered(&folder, arguments);
-        assert_eq!(run.end, End::Exit(2), "{arguments}: {}", run.said);
+        assert_eq!(run.end, End::Exit(2), "{arguments}: {}", run.stderr);
         tried += 1;
     }
     assert_eq!(tried, 18);
@@ -276,11 +276,11 @@ fn inputs_without_an_end_are_refused() {
                 .replace("mutant.toml", name);
             std::fs::write(folder.path("endless.toml"), text).unwrap();
             let run = answered(&folder, "check endless.toml");
-            assert_eq!(run.end, End::Exit(2), "{site} {end}: {}", run.said);
+            assert_eq!(run.end, End::Exit(2), "{site} {end}: {}", run.stderr);
             assert!(
-                words(&run.said).contains("regular file"),
+                words(&run.stderr).contains("regular file"),
                 "{site} {end}: {}",
-                run.said
+                run.stderr
             );
         }
     }
@@ -289,7 +289,7 @@ fn inputs_without_an_end_are_refused() {
 /// The time for maps grows linearly with the number of tags. For this number an import that compares all pairs would
 /// take half a minute, and a run may take [`crate::child::MOST_SECONDS`].
 #[test]
-fn maps_of_many_tags_are_read_in_proportion() {
+fn map_is_read_in_linear_time() {
     let folder = Folder::new(None);
     let count = 65_000;
     let mut bundle = String::from("tag_bundles: [ { name: dock, layout: [");
@@ -331,14 +331,14 @@ fn maps_of_many_tags_are_read_in_proportion() {
         assert!(
             matches!(run.end, End::Exit(0 | 2)),
             "{arguments}: {}",
-            run.said
+            run.stderr
         );
     }
 }
 
 /// Polygons with thousands of corners are refused. Those with the largest allowed number are read and built.
 #[test]
-fn polygons_are_limited() {
+fn polygon_with_too_many_corners_is_refused() {
     let folder = Folder::new(None);
     let circle = |count: u32, radius: f64| {
         let corner = |k: u32| {
@@ -375,14 +375,14 @@ fn polygons_are_limited() {
     ] {
         std::fs::write(folder.path("polygons.toml"), site(&success)).unwrap();
         let run = answered(&folder, "check polygons.toml");
-        assert_eq!(run.end, End::Exit(code), "{}", run.said);
+        assert_eq!(run.end, End::Exit(code), "{}", run.stderr);
         if code == 2 {
-            assert!(words(&run.said).contains(" corners"), "{}", run.said);
+            assert!(words(&run.stderr).contains(" corners"), "{}", run.stderr);
         }
     }
     let run = answered(
         &folder,
         "table build polygons.toml --task dock -o out.posegate",
     );
-    assert_ne!(run.end, End::Exit(3), "{}", run.said);
+    assert_ne!(run.end, End::Exit(3), "{}", run.stderr);
 }

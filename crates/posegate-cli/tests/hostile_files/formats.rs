@@ -19,7 +19,7 @@ pub struct Format {
 }
 
 /// Files that commands need in addition to the mutant.
-pub const BESIDE: [(&str, &[u8]); 5] = [
+pub const COMPANIONS: [(&str, &[u8]); 5] = [
     (
         "dock.toml",
         include_bytes!("../../../../examples/sites/dock.toml"),
@@ -376,8 +376,8 @@ fn program(folder: &Path, arguments: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
         .stdin(Stdio::null())
         .output()
         .expect("the program starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments}: {said}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments}: {stderr}");
     output.stdout
 }
 
@@ -400,7 +400,7 @@ pub fn bag(compression: Option<Compression>, count: u32) -> Vec<u8> {
     bag.finish()
 }
 
-/// Returns a bag whose chunks have no checksums, so that the reader of the records meets the damage.
+/// Returns a bag whose chunks have no checksums, so that the reader of the records finds the damage.
 fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
     let mut at = MAGIC.len();
     while let Some(head) = bag.get(at..at + 9) {

@@ -1,5 +1,5 @@
-//! For any content of a file the program ends with 0, 1 or 2 (3 is an internal error), without a panic, within 512 MiB and
-//! 20 s of processor time.
+//! For any content of a file the program ends with 0, 1 or 2, without a panic, within 512 MiB and 20 s of processor time.
+//! (3 is an internal error.)
 //!
 //! Files are bags with one flipped bit, and mutants of good files of every format. Each gets its own process. A share of
 //! them is tried here; `./ci.sh hostile [FLIPS] [MUTANTS] [SEED]` tries thousands. Files that fail are kept in `target/tmp/hostile`.
@@ -15,7 +15,7 @@ mod mutate;
 
 use chance::Chance;
 use child::{End, MOST_MIB, MOST_SECONDS, Run, run};
-use formats::{BESIDE, Format, SITES};
+use formats::{COMPANIONS, Format, SITES};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -45,9 +45,9 @@ impl Tally {
         self.mib = self.mib.max(run.mib);
         self.seconds = self.seconds.max(run.seconds);
         if !run.is_good() {
-            let said: String = run.said.chars().take(300).collect();
+            let stderr: String = run.stderr.chars().take(300).collect();
             let line = format!(
-                "{:?}, {} MiB, {:.1} s: {}: {said}",
+                "{:?}, {} MiB, {:.1} s: {}: {stderr}",
                 run.end,
                 run.mib,
                 run.seconds,
@@ -101,9 +101,9 @@ struct Folder(tempfile::TempDir);
 impl Folder {
     fn new(from: Option<&Path>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let beside = BESIDE.iter().copied();
+        let companions = COMPANIONS.iter().copied();
         let sites = SITES.iter().map(|(name, text)| (*name, text.as_bytes()));
-        for (name, bytes) in beside.chain(sites) {
+        for (name, bytes) in companions.chain(sites) {
             std::fs::write(folder.path().join(name), bytes).expect("a file");
         }
         std::fs::write(folder.path().join("trajectory.txt"), formats::tum()).expect("a file");
@@ -187,7 +187,7 @@ fn trial(
         .collect();
     let run = run(own.0.path(), &arguments);
     tally.lock().expect("a tally").note(&run, || {
-        let kept = kept(
+        let kept = keep(
             &format!("{}-{index}", format.name.replace(' ', "-")),
             &file,
             &mutant,
@@ -197,7 +197,7 @@ fn trial(
 }
 
 /// Keeps a file that failed. Returns its path.
-fn kept(name: &str, file: &str, bytes: &[u8]) -> String {
+fn keep(name: &str, file: &str, bytes: &[u8]) -> String {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hostile");
     std::fs::create_dir_all(&folder).expect("a folder");
     let end = Path::new(file)
@@ -208,7 +208,7 @@ fn kept(name: &str, file: &str, bytes: &[u8]) -> String {
     path.display().to_string()
 }
 
-/// Does `count` trials on two threads, each with a folder of its own.
+/// Runs `count` trials on two threads, each in a separate folder.
 fn shared(count: usize, made: &Folder, trial: impl Fn(&Folder, usize) + Sync) {
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
@@ -242,7 +242,7 @@ fn flips(bag: &[u8], count: usize, seed: u64, made: &Folder) -> Tally {
         tally.lock().expect("a tally").note(&run, || {
             format!(
                 "bit {bit}, {}",
-                kept(&format!("bit-{bit}"), "f.mcap", &flipped)
+                keep(&format!("bit-{bit}"), "f.mcap", &flipped)
             )
         });
     });
@@ -278,9 +278,9 @@ fn tried(
     failures
 }
 
-/// A share of what `./ci.sh hostile` tries.
+/// A share of the cases of `./ci.sh hostile`.
 #[test]
-fn a_share_of_hostile_files_is_answered() {
+fn some_hostile_files_end_with_a_valid_exit_code() {
     let failures = tried(100, 540, 1, None);
     assert!(
         failures.is_empty(),
@@ -290,10 +290,10 @@ fn a_share_of_hostile_files_is_answered() {
     );
 }
 
-/// The job `hostile`.
+/// The test of the job `hostile`.
 #[test]
 #[ignore = "./ci.sh hostile"]
-fn hostile_files_are_answered() {
+fn hostile_files_end_with_a_valid_exit_code() {
     let number = |name: &str, otherwise: usize| {
         std::env::var(name).map_or(otherwise, |text| text.parse().expect("a whole number"))
     };

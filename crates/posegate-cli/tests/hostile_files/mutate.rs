@@ -29,7 +29,7 @@ const NUMBERS: [&str; 24] = [
     "1000000",
     "65536",
 ];
-/// Openings of nested structures, with what closes them.
+/// The openings of nested structures with their ends.
 const NESTS: [(&str, &str); 8] = [
     ("[", "]"),
     ("{a=", "}"),
@@ -41,7 +41,7 @@ const NESTS: [(&str, &str); 8] = [
     ("&a [", "]"),
 ];
 
-/// Whether a format is text.
+/// The kind of a format: text or binary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Text,

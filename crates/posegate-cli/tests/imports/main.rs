@@ -4,7 +4,7 @@
 use posegate::shape::Pose3Deg;
 use posegate_host::site::{Convention, Format, Import, SiteTag};
 
-mod doors;
+mod entry_points;
 
 type Vector = [f64; 3];
 
@@ -94,7 +94,7 @@ fn placed(pose: Pose3Deg, v: Vector) -> Vector {
 }
 
 /// The corners (left or right, lower or upper for a viewer) in AprilTag's order, and a point before the face.
-const LOOKS: [Vector; 5] = [
+const POINTS: [Vector; 5] = [
     [-1.0, -1.0, 0.0],
     [1.0, -1.0, 0.0],
     [1.0, 1.0, 0.0],
@@ -102,10 +102,10 @@ const LOOKS: [Vector; 5] = [
     [0.0, 0.0, 1.0],
 ];
 
-/// Returns these points of an imported tag in the world: frame t has x out of the face, y right, z up.
-fn hung(tag: &SiteTag) -> [Vector; 5] {
+/// Returns the points of [`POINTS`] on an imported tag in the world: frame t has x out of the face, y right, z up.
+fn tag_points(tag: &SiteTag) -> [Vector; 5] {
     let half = 0.5 * tag.tag.size;
-    LOOKS.map(|[right, up, out]| placed(tag.tag.pose, times(half, [out, right, up])))
+    POINTS.map(|[right, up, out]| placed(tag.tag.pose, times(half, [out, right, up])))
 }
 
 fn assert_near(found: [Vector; 5], wanted: [Vector; 5], what: &str) {
@@ -141,11 +141,11 @@ fn field_file(offset: Vector, turn: [f64; 4]) -> String {
 /// A bundle with different angles and lengths, in every convention, compared with points that are transformed
 /// one by one.
 #[test]
-fn every_convention_hangs_bundles_where_they_are() {
+fn bundle_has_the_same_world_points_in_every_convention() {
     let size = 0.2;
     for (name, [right, up, out]) in SIDES {
         // In the bundle, in the convention's coordinates.
-        let in_bundle = LOOKS.map(|[r, u, o]| {
+        let in_bundle = POINTS.map(|[r, u, o]| {
             let of_tag = add(add(times(r, right), times(u, up)), times(o, out));
             add(turned(TURN, times(0.5 * size, of_tag)), OFFSET)
         });
@@ -153,14 +153,14 @@ fn every_convention_hangs_bundles_where_they_are() {
         let wanted = in_bundle.map(|v| placed(POSE, [dot(v, out), dot(v, right), dot(v, up)]));
         let text = bundle_file(OFFSET, TURN, size);
         let imported = bundle(name, POSE).parse(&text, "tags.yaml").unwrap();
-        assert_near(hung(&imported.tags["t7"]), wanted, name);
+        assert_near(tag_points(&imported.tags["t7"]), wanted, name);
     }
 }
 
-/// The same tag in every convention, with simple numbers: 20 cm to a viewer's right, 10 cm
-/// up, 5 cm out of the bundle's face, turned by 90 degrees about the vertical, counter-clockwise from above.
+/// The same tag in every convention, with simple numbers: 20 cm to a viewer's right, 10 cm up, 5 cm out of
+/// the bundle's face. It is turned by 90 degrees about the vertical, counter-clockwise from above.
 #[test]
-fn one_tag_is_the_same_in_every_convention() {
+fn tag_has_the_same_pose_in_every_convention() {
     let c = std::f64::consts::FRAC_1_SQRT_2;
     let rows = [
         ("posegate", [0.05, 0.2, 0.1], [c, 0.0, 0.0, c]),
@@ -191,9 +191,9 @@ fn one_tag_is_the_same_in_every_convention() {
     }
 }
 
-/// A field layout at the world's origin and moved: its axes are those of a map, its tags' x is out of the face.
+/// A field layout at the world's origin, and moved. Its axes are those of a map. The x axis of its tags is out of the face.
 #[test]
-fn fields_stand_where_they_are_put() {
+fn field_tags_follow_the_pose_of_the_field() {
     let size = 0.1651;
     for pose in [None, Some(POSE)] {
         let order = Import {
@@ -203,17 +203,21 @@ fn fields_stand_where_they_are_put() {
             ..Import::of(Format::Wpilib)
         };
         let imported = order.parse(&field_file(OFFSET, TURN), "f.json").unwrap();
-        let wanted = LOOKS.map(|[right, up, out]| {
+        let wanted = POINTS.map(|[right, up, out]| {
             let in_field = add(turned(TURN, times(0.5 * size, [out, right, up])), OFFSET);
             pose.map_or(in_field, |pose| placed(pose, in_field))
         });
-        assert_near(hung(&imported.tags["t7"]), wanted, &format!("{pose:?}"));
+        assert_near(
+            tag_points(&imported.tags["t7"]),
+            wanted,
+            &format!("{pose:?}"),
+        );
     }
 }
 
 /// Docks in a frame that is not at the world's origin.
 #[test]
-fn docks_stand_where_they_are_put() {
+fn dock_goals_follow_the_pose_of_the_frame() {
     let pose = Pose3Deg {
         z: 0.0,
         roll_deg: 0.0,

@@ -1,8 +1,8 @@
-//! The assumptions of what is learnt: where one holds, the result holds; where it does not, the result visibly fails. The tests of
-//! dependence, fleets, drift and surveys have the same for theirs.
+//! The assumptions of learning. If an assumption holds, the result holds. If not, the result visibly fails. The tests of
+//! dependence, fleets, drift and surveys test their own assumptions in the same way.
 
+use crate::distribution::{Distribution, Random, SQUARES};
 use crate::inflation::estimates;
-use crate::law::{Law, Random, SQUARES};
 use crate::{Share, in_regions};
 use posegate::confidence::radius_squared;
 use posegate_host::learn::{
@@ -36,16 +36,16 @@ fn shares(model: &ErrorModel, later: &Detections) -> Vec<Share> {
     shares
 }
 
-/// Bounds are for later views like those of the data: not for a camera whose noise is half as large again.
+/// Bounds are for later views like those of the data: not for a camera with 1.5 times the noise.
 #[test]
 fn bounds_are_too_low_if_later_errors_are_larger() {
-    let noisier = Law {
+    let noisier = Distribution {
         sigma: |at| 1.5 * (SQUARES.sigma)(at),
         ..SQUARES
     };
     let model = learnt(&SQUARES.views(12_000, 301, |_| true));
-    let alike = shares(&model, &SQUARES.views(12_000, 302, |_| true));
-    assert!(alike.iter().all(|share| share.holds(QUANTILE)), "{alike:?}");
+    let same = shares(&model, &SQUARES.views(12_000, 302, |_| true));
+    assert!(same.iter().all(|share| share.holds(QUANTILE)), "{same:?}");
     let larger = shares(&model, &noisier.views(12_000, 302, |_| true));
     assert!(
         !larger.iter().any(|share| share.holds(QUANTILE)),
@@ -53,12 +53,12 @@ fn bounds_are_too_low_if_later_errors_are_larger() {
     );
 }
 
-/// A bound holds for the mixture of places in its region: not for views that are all at one place of it, where errors are larger.
+/// A bound holds for the mixture of places in its region, but not for one place with larger errors alone.
 #[test]
-fn bounds_are_for_the_places_of_the_data() {
+fn bounds_are_too_low_at_one_place_with_larger_errors() {
     const SPOT: fn([f64; 3]) -> bool =
         |[d, _, psi]| (3.0..3.3).contains(&d) && (30.0..33.0).contains(&psi);
-    let glare = Law {
+    let glare = Distribution {
         sigma: |at| (SQUARES.sigma)(at) * if SPOT(at) { 4.0 } else { 1.0 },
         ..SQUARES
     };
@@ -78,7 +78,7 @@ fn both_bounds_hold_for_less_than_each() {
     let views = |seed: u64| {
         let mut random = Random(seed);
         let rows = (0..12_000).map(|_| {
-            let at = Law::place(&mut random);
+            let at = Distribution::place(&mut random);
             let (sigma, u) = ((SQUARES.sigma)(at), random.even());
             // Exponential errors; the larger the one, the smaller the other.
             let errors = [-sigma * (1.0 - u).ln(), -0.2 * sigma * u.max(1e-300).ln()];
@@ -134,8 +134,8 @@ fn covered(model: &InflationModel, later: &ScoredEstimates, stated: impl Fn(f64)
 fn inflation_is_too_small_if_later_estimates_are_worse() {
     let model = learn_inflation(&estimates(60, 331), &settings()).unwrap();
     let mut later = estimates(60, 332);
-    let alike = covered(&model, &later, |condition| condition);
-    assert!(alike.holds(QUANTILE), "{alike:?}");
+    let same = covered(&model, &later, |condition| condition);
+    assert!(same.holds(QUANTILE), "{same:?}");
     for row in &mut later.rows {
         row.squared_distance *= 2.0;
     }
@@ -217,13 +217,15 @@ fn inflation_is_too_small_if_an_error_lasts_for_the_whole_log() {
     assert!(lasting.trials == 40 && lasting.value() < 0.4, "{lasting:?}");
 }
 
-/// Limits of the share of detected views are for later views like those of the data: not for views of which each sixth is dark.
+/// Limits of the share of detected views are for later views like those of the data: not if every sixth view is dark.
 #[test]
-fn shares_of_detected_views_are_for_the_light_of_the_data() {
+fn detected_share_is_too_high_if_later_views_are_dark() {
     let mut random = Random(501);
-    let places: Vec<[f64; 3]> = (0..20_000).map(|_| Law::place(&mut random)).collect();
+    let places: Vec<[f64; 3]> = (0..20_000)
+        .map(|_| Distribution::place(&mut random))
+        .collect();
     // Cells whose limits contain the share: in the light of the data, and in the dark.
-    let (mut cells, mut alike, mut dark) = (0, 0, 0);
+    let (mut cells, mut same, mut dark) = (0, 0, 0);
     for seed in 0..6 {
         let model = learnt(&SQUARES.views(6_000, 511 + seed, |_| true));
         // Places of one cell have the same limits.
@@ -231,7 +233,7 @@ fn shares_of_detected_views_are_for_the_light_of_the_data() {
         for at in &places {
             if let Some(found) = model.detectability_deg(*at) {
                 let [sum, count] = shares.entry(found.limits.map(f64::to_bits)).or_default();
-                *sum += Law::detected(*at);
+                *sum += Distribution::detected(*at);
                 *count += 1.0;
             }
         }
@@ -239,11 +241,11 @@ fn shares_of_detected_views_are_for_the_light_of_the_data() {
             let [low, high] = limits.map(f64::from_bits);
             let within = |share: f64| usize::from((low..=high).contains(&share));
             cells += 1;
-            alike += within(sum / count);
+            same += within(sum / count);
             dark += within(sum / count * 5.0 / 6.0);
         }
     }
     assert!(cells > 60, "{cells}");
-    assert!(alike * 100 >= cells * 93, "{alike} of {cells}");
+    assert!(same * 100 >= cells * 93, "{same} of {cells}");
     assert!(dark * 4 < cells, "{dark} of {cells}");
 }

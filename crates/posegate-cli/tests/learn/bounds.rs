@@ -1,7 +1,7 @@
 //! Tests of error bounds, and of the share of views that are detected.
 
 use crate::Share;
-use crate::law::{FACE_ON, Law, Random, SQUARES};
+use crate::distribution::{Distribution, HEAD_ON, Random, SQUARES};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, LearnError, clopper_pearson, learn_bounds,
 };
@@ -17,14 +17,16 @@ fn learnt(detections: &Detections, quantile: f64) -> ErrorModel {
 /// Both bounds have their coverage on new detections, overall and in each region.
 #[test]
 fn bounds_hold_overall_and_in_each_region() {
-    for (law, quantile, seed) in [(FACE_ON, 0.95, 1), (SQUARES, 0.95, 3), (SQUARES, 0.99, 4)] {
-        let model = learnt(&law.views(12_000, seed, |_| true), quantile);
+    for (distribution, quantile, seed) in
+        [(HEAD_ON, 0.95, 1), (SQUARES, 0.95, 3), (SQUARES, 0.99, 4)]
+    {
+        let model = learnt(&distribution.views(12_000, seed, |_| true), quantile);
         let regions = model.regions().count();
         assert!(regions >= 3, "{regions}");
         let mut overall = [Share::default(); 2];
         let mut each = vec![[Share::default(); 2]; regions];
         let mut accepted = Share::default();
-        for row in law.views(12_000, seed + 100, |_| true).rows {
+        for row in distribution.views(12_000, seed + 100, |_| true).rows {
             let Some(errors) = row.errors else { continue };
             let bounds = model.bounds_deg(row.at);
             accepted.count(bounds.is_some());
@@ -50,14 +52,14 @@ fn bounds_hold_overall_and_in_each_region() {
 /// Bounds are compared with the true quantile, place by place.
 #[test]
 fn bounds_are_tight() {
-    let law = SQUARES;
-    let model = learnt(&law.views(12_000, 11, |_| true), 0.95);
+    let distribution = SQUARES;
+    let model = learnt(&distribution.views(12_000, 11, |_| true), 0.95);
     let mut random = Random(12);
     let mut ratios = Vec::new();
     for _ in 0..4000 {
-        let at = Law::place(&mut random);
+        let at = Distribution::place(&mut random);
         if let Some((translation, _)) = model.bounds_deg(at) {
-            ratios.push(translation / law.quantile(at, 0.95));
+            ratios.push(translation / distribution.quantile(at, 0.95));
         }
     }
     ratios.sort_by(f64::total_cmp);
@@ -76,8 +78,8 @@ fn bounds_are_tight() {
 
 /// For any data, a bound never decreases with the distance.
 #[test]
-fn bounds_grow_with_the_distance() {
-    let model = learnt(&FACE_ON.views(4000, 21, |_| true), 0.9);
+fn bounds_never_decrease_with_the_distance() {
+    let model = learnt(&HEAD_ON.views(4000, 21, |_| true), 0.9);
     for psi in [3.0, 20.0, 41.0, 66.0] {
         for phi in [1.0, 13.0, 24.0] {
             let mut last = (0.0, 0.0);
@@ -99,16 +101,16 @@ fn bounds_grow_with_the_distance() {
 }
 
 #[test]
-fn detection_is_told_with_limits() {
+fn detected_share_is_reported_with_limits() {
     let model = learnt(&SQUARES.views(12_000, 31, |_| true), 0.9);
     let mut random = Random(32);
     let (mut off, mut count, mut outside) = (0.0, 0.0, Share::default());
     for _ in 0..4000 {
-        let at = Law::place(&mut random);
+        let at = Distribution::place(&mut random);
         let Some(found) = model.detectability_deg(at) else {
             continue;
         };
-        off += (found.share - Law::detected(at)).abs();
+        off += (found.share - Distribution::detected(at)).abs();
         count += 1.0;
         let [low, high] = found.limits;
         outside.count(!(low - 0.02..=high + 0.02).contains(&found.share));
@@ -119,8 +121,8 @@ fn detection_is_told_with_limits() {
 
 /// The result does not depend on the order of the rows.
 #[test]
-fn rows_may_come_in_any_order() {
-    let detections = FACE_ON.views(3000, 41, |_| true);
+fn model_is_independent_of_the_row_order() {
+    let detections = HEAD_ON.views(3000, 41, |_| true);
     let mut turned = detections.clone();
     turned.rows.reverse();
     assert_eq!(
@@ -142,7 +144,7 @@ fn rows_may_come_in_any_order() {
 
 /// There are no bounds beyond the data, in a hole of the data, or where there are few data.
 #[test]
-fn too_few_data_are_refused() {
+fn region_with_too_few_data_is_refused() {
     let hole = |[d, _, psi]: [f64; 3]| !(psi > 40.0 && d > 3.0);
     let model = learnt(&SQUARES.views(6000, 51, hole), 0.95);
     assert!(model.bounds_deg([2.0, 10.0, 30.0]).is_some());
@@ -181,7 +183,7 @@ fn too_few_data_are_refused() {
 
 /// There are no bounds in a gap of the data, although there are many rows on both sides.
 #[test]
-fn gaps_are_refused() {
+fn gap_of_the_data_is_refused() {
     const MARGIN: [f64; 3] = [0.05, 0.5, 0.5];
     for (axis, low, high, quantile) in [
         (0, 2.3, 4.7, 0.9),
@@ -197,7 +199,7 @@ fn gaps_are_refused() {
         let mut random = Random(55);
         let mut accepted = Share::default();
         for _ in 0..4000 {
-            let at = Law::place(&mut random);
+            let at = Distribution::place(&mut random);
             let near = at[axis] > low - MARGIN[axis] && at[axis] < high + MARGIN[axis];
             if at[axis] > low + MARGIN[axis] && at[axis] < high - MARGIN[axis] {
                 assert_eq!(model.bounds_deg(at), None, "{at:?}");
@@ -214,20 +216,20 @@ fn gaps_are_refused() {
     let model = learnt(&SQUARES.views(6000, 56, |at| !hole(at, 0.0)), 0.9);
     let mut random = Random(57);
     for _ in 0..8000 {
-        let at = Law::place(&mut random);
+        let at = Distribution::place(&mut random);
         assert!(!hole(at, 0.3) || model.bounds_deg(at).is_none(), "{at:?}");
     }
 }
 
 /// Bounds from few rows hold overall, and are nowhere far below the errors that were observed nearby.
 #[test]
-fn few_rows_are_not_stretched() {
+fn bounds_of_few_rows_are_not_extrapolated() {
     for seed in 0..30 {
         let model = learnt(&SQUARES.views(120, seed, |_| true), 0.9);
         let mut random = Random(seed + 9);
         let (mut least, mut sum, mut count) = (1.0f64, 0.0, 0.0);
         for _ in 0..1000 {
-            let at = Law::place(&mut random);
+            let at = Distribution::place(&mut random);
             if let Some((translation, _)) = model.bounds_deg(at) {
                 let share = SQUARES.share_within(at, translation);
                 least = least.min(share);
@@ -245,8 +247,8 @@ fn few_rows_are_not_stretched() {
 
 /// Head-on views differ from others and are not extrapolated from views nearby.
 #[test]
-fn psi_is_not_stretched_to_0() {
-    let model = learnt(&FACE_ON.views(400, 58, |at| at[2] > 6.0), 0.9);
+fn bounds_are_not_extrapolated_to_head_on_views() {
+    let model = learnt(&HEAD_ON.views(400, 58, |at| at[2] > 6.0), 0.9);
     for psi in [0.0, 2.0, 5.0] {
         assert_eq!(model.bounds_deg([2.0, 10.0, psi]), None);
     }
@@ -255,7 +257,7 @@ fn psi_is_not_stretched_to_0() {
 
 /// Distances and angles that are all the same, or one of a few values, have their own cells.
 #[test]
-fn places_may_be_few() {
+fn repeated_distances_and_angles_have_their_own_cells() {
     let of = |place: fn([f64; 3]) -> [f64; 3]| {
         let mut detections = SQUARES.views(4000, 59, |_| true);
         for row in &mut detections.rows {
@@ -277,7 +279,7 @@ fn places_may_be_few() {
 
 /// Equal rows are split like other rows.
 #[test]
-fn rows_that_repeat_are_parted() {
+fn equal_rows_are_split() {
     let mut detections = SQUARES.views(400, 60, |_| true);
     for row in &mut detections.rows {
         row.at = [2.0, 10.0, 30.0];
@@ -291,7 +293,7 @@ fn rows_that_repeat_are_parted() {
 
 /// Refused regions are reported with the reason.
 #[test]
-fn reasons_are_told() {
+fn refused_regions_are_reported_with_the_reason() {
     let mut detections = SQUARES.views(4000, 62, |_| true);
     for (k, row) in detections.rows.iter_mut().enumerate() {
         row.at = [0, 1, 2].map(|axis| 1.0 + 0.5 * ((k >> (4 * axis)) % 16) as f64);
@@ -306,14 +308,14 @@ fn reasons_are_told() {
     assert!(error.to_string().contains("cells: "), "{error}");
 }
 
-/// Flips stay in the data: where they are frequent, the bound is as large as their error.
+/// Flips stay in the data: if they are frequent, the bound is as large as their error.
 #[test]
-fn flips_count() {
-    let law = Law {
+fn bounds_include_frequent_flips() {
+    let distribution = Distribution {
         flips: |_| 0.2,
         ..SQUARES
     };
-    let model = learnt(&law.views(6000, 61, |_| true), 0.9);
+    let model = learnt(&distribution.views(6000, 61, |_| true), 0.9);
     let (translation, yaw) = model.bounds_deg([2.0, 10.0, 30.0]).unwrap();
     assert!(translation > 1.0 && yaw > 1.0, "{translation} {yaw}");
     let (_, detections, flip_share) = model.counts();
@@ -324,8 +326,8 @@ fn flips_count() {
 
 /// In each box both bounds are within the limit, and little is left out.
 #[test]
-fn views_are_good_everywhere() {
-    let model = learnt(&FACE_ON.views(12_000, 71, |_| true), 0.9);
+fn bounds_are_within_the_limit_in_every_box() {
+    let model = learnt(&HEAD_ON.views(12_000, 71, |_| true), 0.9);
     for (translation, yaw_deg) in [(0.03, 1.0), (0.06, 1.0), (0.2, 30.0)] {
         let views = model.views(translation, yaw_deg);
         assert!((1..=8).contains(&views.len()), "{views:?}");
@@ -339,7 +341,7 @@ fn views_are_good_everywhere() {
         let mut random = Random(72);
         let mut found = Share::default();
         for _ in 0..20_000 {
-            let at = Law::place(&mut random);
+            let at = Distribution::place(&mut random);
             let good = model
                 .bounds_deg(at)
                 .is_some_and(|b| b.0 <= translation && b.1.to_degrees() <= yaw_deg);
@@ -365,7 +367,7 @@ fn views_are_good_everywhere() {
 
 /// A written model reads back as the same model, and an inconsistent file is refused.
 #[test]
-fn files_are_read_strictly() {
+fn inconsistent_model_file_is_refused() {
     let model = learnt(&SQUARES.views(2000, 81, |_| true), 0.9);
     let text = model.write().unwrap();
     assert_eq!(ErrorModel::parse(&text, "m.toml").unwrap(), model);
@@ -410,7 +412,7 @@ fn files_are_read_strictly() {
 
 /// With few rows a model has one shape and factors, which is also how files of earlier versions are written.
 #[test]
-fn few_rows_have_one_shape() {
+fn model_of_few_rows_has_one_shape() {
     let model = learnt(&SQUARES.views(400, 82, |_| true), 0.9);
     let text = model.write().unwrap();
     assert!(

@@ -1,7 +1,7 @@
 //! Factors by the time since the last fix, from rows to the gate.
 
 use crate::command::{lines, run, write};
-use crate::law::Random;
+use crate::distribution::Random;
 use std::fmt::Write;
 
 const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad,since_fix_s";
@@ -32,7 +32,7 @@ fn estimates_from(youngest: f64, count: u32, seed: u64) -> String {
 }
 
 #[test]
-fn replay_uses_the_factor_of_the_age() {
+fn replay_uses_the_factor_of_the_age_of_each_estimate() {
     let folder = tempfile::tempdir().unwrap();
     let site = concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -58,14 +58,14 @@ fn replay_uses_the_factor_of_the_age() {
         let line = format!("replay {site} {file} --task dock --json --fast {options}");
         let (code, out, err) = run(&folder, &line);
         assert!(code < 2, "{err}");
-        let told = lines(&out).pop().unwrap();
-        let gate = &told["rules"]["gate"];
+        let summary = lines(&out).pop().unwrap();
+        let gate = &summary["rules"]["gate"];
         let [permits, falsely] =
             ["permits", "false_permits"].map(|key| gate[key].as_u64().unwrap());
         (
             permits,
             falsely,
-            told["truth"]["coverage"].as_f64().unwrap(),
+            summary["truth"]["coverage"].as_f64().unwrap(),
             err,
         )
     };
@@ -103,9 +103,9 @@ fn replay_uses_the_factor_of_the_age() {
     }
 }
 
-/// Rows from 2 s after a fix say nothing about fresh estimates.
+/// Rows from 2 s after a fix contain no information about fresh estimates.
 #[test]
-fn ages_younger_than_the_data_have_the_largest_factor() {
+fn age_below_the_data_has_the_largest_factor() {
     let folder = tempfile::tempdir().unwrap();
     let site = concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -133,8 +133,8 @@ fn ages_younger_than_the_data_have_the_largest_factor() {
         &format!("replay {site} fresh.csv --task dock --json --fast --inflation-model m.toml"),
     );
     assert!(code < 2, "{err}");
-    let told = lines(&out).pop().unwrap();
-    assert_eq!(told["rules"]["gate"]["permits"], 0, "{told}");
+    let summary = lines(&out).pop().unwrap();
+    assert_eq!(summary["rules"]["gate"]["permits"], 0, "{summary}");
     assert!(err.contains("the data begin 2 s after a fix"), "{err}");
     const COVARIANCE: &str = "cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw";
     let numbers = "1.6e-5,0,0,1.6e-5,0,1.6e-5";
@@ -145,10 +145,10 @@ fn ages_younger_than_the_data_have_the_largest_factor() {
         &format!("{COVARIANCE},since_fix_s\n{numbers},1.9\n{numbers},2.1\n"),
     );
     let (_, out, err) = run(&folder, "predict m.toml --at at.csv --json");
-    let told = lines(&out);
-    assert_eq!(told.len(), 2, "{out} {err}");
+    let predicted = lines(&out);
+    assert_eq!(predicted.len(), 2, "{out} {err}");
     assert!(
-        told[0]["inflation"].is_null() && told[1]["inflation"].is_f64(),
+        predicted[0]["inflation"].is_null() && predicted[1]["inflation"].is_f64(),
         "{out} {err}"
     );
 }

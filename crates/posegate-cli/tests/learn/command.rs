@@ -1,6 +1,6 @@
 //! The command line: `learn` and `predict`.
 
-use crate::law::{Random, SQUARES};
+use crate::distribution::{Random, SQUARES};
 use serde_json::Value;
 use std::fmt::Write;
 use std::process::Command;
@@ -30,7 +30,7 @@ pub fn lines(text: &str) -> Vec<Value> {
 }
 
 #[test]
-fn bounds_from_rows_to_predictions() {
+fn learn_bounds_gives_a_model_that_predict_evaluates() {
     let folder = tempfile::tempdir().unwrap();
     let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n";
     let mut text = header.to_owned();
@@ -78,7 +78,7 @@ fn bounds_from_rows_to_predictions() {
         let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
         assert!(code == 2 && err.contains(place), "{row}: {err}");
     }
-    // An unclosed quote hides no rows, and no row is a comment.
+    // An unclosed quote hides no rows, and rows are never comments.
     for row in ["1,1,1,1,0.1,\"0.1", "#1,1,1,1,0.1,0.1"] {
         write(
             &folder,
@@ -110,7 +110,7 @@ fn bounds_from_rows_to_predictions() {
 
 /// Frames of approaches: named in `run`, or cut at gaps with a warning. One long video is refused.
 #[test]
-fn frames_count_as_fewer_rows() {
+fn dependent_frames_count_as_fewer_rows() {
     let folder = tempfile::tempdir().unwrap();
     let detections = SQUARES.approaches(60, 0.9, 0.0, 4);
     let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad";
@@ -138,11 +138,14 @@ fn frames_count_as_fewer_rows() {
     };
     let (code, out, err) = learn("named.csv");
     assert!(code == 0 && err.is_empty(), "{err}");
-    let told = &lines(&out)[0];
-    assert_eq!((&told["rows"], &told["runs"]), (&6000.into(), &60.into()));
-    let independent = told["independent_rows"].as_u64().unwrap();
+    let report = &lines(&out)[0];
+    assert_eq!(
+        (&report["rows"], &report["runs"]),
+        (&6000.into(), &60.into())
+    );
+    let independent = report["independent_rows"].as_u64().unwrap();
     assert!((200..2000).contains(&independent), "{independent}");
-    let region = &told["regions"][0];
+    let region = &report["regions"][0];
     assert!(region["independent_rows"].as_u64() < region["rows"].as_u64());
 
     let (code, out, err) = learn("timed.csv");
@@ -162,11 +165,11 @@ fn frames_count_as_fewer_rows() {
 }
 
 #[test]
-fn inflation_from_rows_to_predictions() {
+fn learn_inflation_gives_a_model_that_predict_evaluates() {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random(9);
     let mut text = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n".to_owned();
-    // Deviations of 2 cm and 0.02 rad that are stated as half of that: a factor of 4.
+    // Deviations of 2 cm and 0.02 rad, stated as half of them: a factor of 4.
     for t in 0..3000 {
         let [x, y, yaw] = [0; 3].map(|_| 0.02 * random.normal());
         let p = 1e-4 * (1.0 + 0.001 * random.even());
@@ -179,9 +182,9 @@ fn inflation_from_rows_to_predictions() {
         "learn inflation e.csv --epsilon 0.95 -o m.toml --json",
     );
     assert!(code == 0 && err.contains("e.csv:3002"), "{err}");
-    let told = &lines(&out)[0];
-    assert_eq!(told["impossible_lines"][0], 3002);
-    let factor = told["overall"]["inflation"].as_f64().unwrap();
+    let report = &lines(&out)[0];
+    assert_eq!(report["impossible_lines"][0], 3002);
+    let factor = report["overall"]["inflation"].as_f64().unwrap();
     assert!((3.9..5.0).contains(&factor), "{factor}");
     let (code, out, _) = run(&folder, "predict m.toml --at e.csv --json");
     let rows = lines(&out);
@@ -198,7 +201,7 @@ fn inflation_from_rows_to_predictions() {
 }
 
 #[test]
-fn outcomes_answer_with_the_exit_code() {
+fn learn_outcomes_returns_1_if_the_claim_is_contradicted() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = |bad: usize| {
         let rows = (0..1000).map(|k| if k % 1000 < bad { "0\n" } else { "1\n" });
@@ -207,10 +210,10 @@ fn outcomes_answer_with_the_exit_code() {
     write(&folder, "good.csv", &fleet(8));
     write(&folder, "bad.csv", &fleet(40));
     let (code, out, err) = run(&folder, "learn outcomes bad.csv --epsilon 0.99 --json");
-    let told = &lines(&out)[0];
-    assert!(code == 1 && told["contradicted"] == true, "{out}{err}");
-    assert!(told["upper"].as_f64().unwrap() < 0.99);
-    // In another order: the fleet fails from time to time.
+    let report = &lines(&out)[0];
+    assert!(code == 1 && report["contradicted"] == true, "{out}{err}");
+    assert!(report["upper"].as_f64().unwrap() < 0.99);
+    // In another order: failures at regular distances.
     let mut mixed = "t_s,success\n".to_owned();
     for k in 0..1000u32 {
         writeln!(mixed, "{},{}", 1000 - k, u8::from(k % 125 != 0)).unwrap();

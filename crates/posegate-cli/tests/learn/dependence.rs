@@ -1,6 +1,6 @@
 //! Bounds from rows that depend on each other: approaches whose successive errors are similar.
 
-use crate::law::{Law, SQUARES};
+use crate::distribution::{Distribution, SQUARES};
 use posegate_host::learn::{
     BoundsSettings, Detection, Detections, ErrorModel, LearnError, RunSource, Runs, learn_bounds,
 };
@@ -12,8 +12,8 @@ fn places() -> &'static [Detection] {
     PLACES.get_or_init(|| SQUARES.approaches(400, 0.0, 0.0, 1001).rows)
 }
 
-/// Returns the share of regions for which a bound holds for less than `q` of its detections, over both bounds of models
-/// of 60 approaches, and the number of such shares.
+/// Returns the share of bounds that hold for less than `q` of their detections, and the number of bounds. Counts both
+/// bounds of each region of models of 60 approaches.
 fn low(models: impl Iterator<Item = ErrorModel>, scale: f64, q: f64) -> (f64, u32) {
     let (mut low, mut count) = (0, 0);
     for model in models {
@@ -114,7 +114,7 @@ fn regions_are_too_low_if_dependent_frames_are_taken_as_independent() {
 
 /// The split, and so the model, does not depend on the order of the rows or on the names of the runs.
 #[test]
-fn runs_may_come_in_any_order() {
+fn model_is_independent_of_the_order_of_runs() {
     let detections = SQUARES.approaches(60, 0.9, 0.0, 3);
     let mut turned = detections.clone();
     turned.rows.reverse();
@@ -133,7 +133,7 @@ fn runs_may_come_in_any_order() {
     );
 }
 
-/// If every row is a run of its own, hardly any information is lost.
+/// If every row is a separate run, hardly any information is lost.
 #[test]
 fn runs_of_one_row_are_independent_rows() {
     let mut detections = SQUARES.views(4000, 5, |_| true);
@@ -167,8 +167,8 @@ fn too_few_runs_are_refused() {
 #[test]
 fn detection_limits_are_wider_for_dependent_views() {
     let mut detections = SQUARES.approaches(60, 0.9, 0.0, 8);
-    let mut random = crate::law::Random(9);
-    // The tag is hidden from a third of the approaches in one stretch of 40 frames.
+    let mut random = crate::distribution::Random(9);
+    // The tag is hidden for 40 consecutive frames in a third of the approaches.
     for run in 0..60 {
         let hidden = random.even() < 0.33;
         for frame in 30..70 {
@@ -179,9 +179,11 @@ fn detection_limits_are_wider_for_dependent_views() {
     }
     let width = |detections: &Detections| {
         let model = learnt(detections, 0.8).unwrap();
-        let mut random = crate::law::Random(10);
+        let mut random = crate::distribution::Random(10);
         let widths = (0..500).filter_map(|_| {
-            let [low, high] = model.detectability_deg(Law::place(&mut random))?.limits;
+            let [low, high] = model
+                .detectability_deg(Distribution::place(&mut random))?
+                .limits;
             Some(high - low)
         });
         let widths: Vec<f64> = widths.collect();

@@ -1,6 +1,6 @@
-//! `learn check`: models that hold are not contradicted, however often one looks; changes are found, dated and named.
+//! `learn check`: valid models are not contradicted, however often they are tested. Changes are found, dated and named.
 
-use crate::law::{Law, Random, SQUARES};
+use crate::distribution::{Distribution, Random, SQUARES};
 use posegate_host::learn::{
     BoundsSettings, Change, CheckReport, CheckSettings, Detection, Detections, ErrorModel, Runs,
     acceptance, check_bounds, learn_bounds,
@@ -18,7 +18,7 @@ fn checked(model: &ErrorModel, new: &Detections) -> CheckReport {
     check_bounds(model, new, &CheckSettings::default()).unwrap()
 }
 
-/// Models of 1,500 rows, each looked at after every one of 10,000 new rows of the same distribution.
+/// Models of 1,500 rows, each tested after every one of 10,000 new rows of the same distribution.
 fn false_alarms(seeds: u64) {
     for quantile in [0.5, 0.9] {
         let alarms = (0..seeds).filter(|seed| {
@@ -33,19 +33,19 @@ fn false_alarms(seeds: u64) {
 }
 
 #[test]
-fn a_model_that_holds_is_not_contradicted() {
+fn valid_model_is_not_contradicted() {
     false_alarms(10);
 }
 
 #[test]
 #[ignore = "takes minutes: ./ci.sh deep"]
-fn many_models_that_hold_are_not_contradicted() {
+fn many_valid_models_are_not_contradicted() {
     false_alarms(200);
 }
 
 /// Approaches that differ as a whole contradict a model that holds, if their rows are taken as independent.
 #[test]
-fn runs_are_one_observation() {
+fn rows_of_one_run_count_as_one_observation() {
     let (mut alarms, mut alone) = (0, 0);
     for seed in 0..10 {
         let model = learnt(&SQUARES.approaches(60, 0.9, 0.3, 50 + seed), 0.9);
@@ -56,7 +56,7 @@ fn runs_are_one_observation() {
         new.runs = Runs::default();
         alone += u32::from(checked(&model, &new).after_rows.is_some());
     }
-    // The rows of an approach that differs as a whole are no evidence that all differ.
+    // One approach that differs as a whole is no evidence that all differ.
     assert!(alarms <= 2 && alone >= 4, "{alarms} {alone}");
 }
 
@@ -73,7 +73,7 @@ fn drifted(row: &Detection, random: &mut Random) -> Option<[f64; 2]> {
 }
 
 #[test]
-fn a_drifted_calibration_is_found_within_60_detections() {
+fn drifted_calibration_is_found_within_60_detections() {
     let model = learnt(&SQUARES.views(6000, 71, |_| true), 0.9);
     for seed in 0..20 {
         for good in [0, 1000] {
@@ -99,7 +99,7 @@ fn a_drifted_calibration_is_found_within_60_detections() {
 }
 
 #[test]
-fn changes_are_named() {
+fn kind_of_change_is_reported() {
     let model = learnt(&SQUARES.views(6000, 72, |_| true), 0.9);
     let changed = |seed: u64, change: &dyn Fn([f64; 2], &mut Random) -> [f64; 2]| {
         let mut new = SQUARES.views(600, seed, |_| true);
@@ -118,7 +118,7 @@ fn changes_are_named() {
         });
         assert_eq!(found.overall.looks_like, Some(Change::Offset), "{seed}");
         assert_eq!(found.overall.yaw.after_rows, None);
-        // Errors that become smaller contradict nothing.
+        // Smaller errors do not contradict the model.
         let found = changed(seed, &|[t, yaw], _| [0.5 * t, 0.5 * yaw]);
         assert_eq!(found.after_rows, None);
     }
@@ -126,7 +126,7 @@ fn changes_are_named() {
 
 /// Errors that grow in one region only are found there.
 #[test]
-fn the_region_is_named() {
+fn contradicted_region_is_reported() {
     let model = learnt(&SQUARES.views(12_000, 73, |_| true), 0.9);
     let target = model.region_deg([5.5, 10.0, 60.0]).unwrap();
     let mut new = SQUARES.views(4000, 74, |_| true);
@@ -167,15 +167,15 @@ fn lost_detections_are_found() {
         at,
         errors: Some([9.0, 3.0]),
     };
-    let mut new = SQUARES.views(100, 78, |at| Law::detected(at) > 0.99);
+    let mut new = SQUARES.views(100, 78, |at| Distribution::detected(at) > 0.99);
     new.rows.push(far([9.0, 10.0, 30.0]));
     let found = checked(&model, &new);
     assert_eq!((found.after_rows, found.without_bounds), (None, 1));
 }
 
-/// Frames of one video without names of runs: those are used that are 2 s apart.
+/// Of one video without names of runs, only frames 2 s apart are used.
 #[test]
-fn video_is_thinned() {
+fn video_without_runs_is_thinned() {
     let model = learnt(&SQUARES.views(3000, 79, |_| true), 0.9);
     let mut new = SQUARES.views(1000, 80, |_| true);
     new.times = (0..1000).map(|k| 0.1 * f64::from(k)).collect();

@@ -1,6 +1,6 @@
 //! Inflation for a new robot, learnt from robots that differ as a whole.
 
-use crate::law::Random;
+use crate::distribution::Random;
 use posegate::confidence::radius_squared;
 use posegate_host::learn::{
     InflationModel, InflationSettings, LearnError, Scored, ScoredEstimates, acceptance,
@@ -95,19 +95,19 @@ fn new_robots(fleets: u64) {
 }
 
 #[test]
-fn a_new_robot_is_covered() {
+fn new_robot_is_covered() {
     new_robots(200);
 }
 
 #[test]
 #[ignore = "takes minutes: ./ci.sh deep"]
-fn a_new_robot_is_covered_in_many_fleets() {
+fn new_robot_is_covered_in_many_fleets() {
     new_robots(1000);
 }
 
 /// Robots that do not differ cost little.
 #[test]
-fn equal_robots_need_hardly_more() {
+fn equal_robots_need_hardly_larger_factors() {
     let fleet = fleet(20, 400, 0.0, 7);
     let model = learn_inflation(&fleet, &settings(0.9, 0.8)).unwrap();
     assert_eq!(model.new_group(), Some("robot"));

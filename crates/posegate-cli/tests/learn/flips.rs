@@ -1,14 +1,14 @@
-//! Bounds where tags flip: the quantile of the errors jumps from the size of noise to that of a mirrored solution.
+//! Bounds for tags that flip: the quantile of the errors jumps from the size of noise to that of a mirrored solution.
 
 use crate::command::{lines, run, write};
+use crate::distribution::{Distribution, Random};
 use crate::in_regions;
-use crate::law::{Law, Random};
 use posegate_host::learn::{BoundsSettings, ErrorModel, learn_bounds};
 use posegate_host::site::SAMPLE;
 use std::fmt::Write;
 
 /// Errors are a few centimetres, and a metre more with a probability that falls with psi and rises with the distance.
-const FLIPPING: Law = Law {
+const FLIPPING: Distribution = Distribution {
     sigma: |[d, _, psi]| 0.002 + 0.002 * d * d / (0.3 + psi / 30.0),
     flips: |[d, _, psi]| {
         let away = psi - 22.0 - 4.0 * (d - 6.5);
@@ -27,7 +27,7 @@ fn learnt(quantile: f64, seed: u64) -> ErrorModel {
 /// Returns the ratios of the bounds to the true quantile, ascending.
 fn ratios(model: &ErrorModel, quantile: f64, takes: impl Fn([f64; 3]) -> bool) -> Vec<f64> {
     let mut random = Random(977);
-    let places = (0..20_000).map(|_| Law::place(&mut random));
+    let places = (0..20_000).map(|_| Distribution::place(&mut random));
     let mut ratios: Vec<f64> = places
         .filter(|at| takes(*at))
         .filter_map(|at| Some(model.bounds_deg(at)?.0 / FLIPPING.quantile(at, quantile)))
@@ -59,7 +59,7 @@ fn bounds_are_tight_where_tags_flip() {
             nth(&all, 0.5),
             nth(&all, 0.95)
         );
-        // Where flips are frequent, a bound is not much larger than a flip.
+        // If flips are frequent, a bound is not much larger than a flip.
         let flipped = ratios(&model, quantile, |at| (FLIPPING.flips)(at) > 0.025);
         assert!(
             flipped.len() > 1000 && nth(&flipped, 0.5) < 1.4 && nth(&flipped, 0.95) < 2.2,
@@ -77,13 +77,13 @@ fn bounds_are_tight_where_tags_flip() {
 
 /// Rows with the errors of both poses that fit a tag's image: the detector's own, which may be the flipped one, and the other one.
 fn of_both_poses(seed: u64, rows: u32) -> Vec<([f64; 3], [[f64; 2]; 2])> {
-    let noise = Law {
+    let noise = Distribution {
         flips: |_| 0.0,
         ..FLIPPING
     };
     let mut random = Random(seed);
     let row = |_| {
-        let at = Law::place(&mut random);
+        let at = Distribution::place(&mut random);
         let good = noise.errors(at, &mut random);
         let flipped = [good[0] + 1.0, good[1] + 1.0];
         let is_flipped = random.even() < (FLIPPING.flips)(at);
@@ -99,7 +99,7 @@ fn of_both_poses(seed: u64, rows: u32) -> Vec<([f64; 3], [[f64; 2]; 2])> {
 
 /// With both poses as hypotheses a bound is as tight as if no tag flipped, and one of the two is within it.
 #[test]
-fn bounds_for_both_poses_know_no_flips() {
+fn bounds_for_both_poses_ignore_flips() {
     let folder = tempfile::tempdir().unwrap();
     let mut both =
         "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad,second_err_translation_m,second_err_yaw_rad\n"
@@ -124,7 +124,7 @@ fn bounds_for_both_poses_know_no_flips() {
         ErrorModel::parse(&text, name).unwrap()
     };
     let (of_both, of_one) = (model("both"), model("one"));
-    // Where a tenth of the tags flip.
+    // A view at which a tenth of the tags flip.
     let flipping = [6.0, 5.0, 20.0];
     let ratio = of_one.bounds_deg(flipping).unwrap().0 / of_both.bounds_deg(flipping).unwrap().0;
     assert!(ratio > 5.0, "{ratio}");
@@ -143,13 +143,13 @@ fn bounds_for_both_poses_know_no_flips() {
         tried > 15_000 && f64::from(held) >= 0.98 * f64::from(tried),
         "{held} of {tried}"
     );
-    // `predict` says for which pose its bounds hold.
+    // `predict` reports for which pose its bounds hold.
     write(&folder, "at.csv", "d_m,phi_deg,psi_deg\n3,5,30\n");
     for (name, warns) in [("both", true), ("one", false)] {
         let (code, _, err) = run(&folder, &format!("predict {name}.toml --at at.csv --json"));
         assert_eq!((code, err.contains("better one")), (0, warns), "{err}");
     }
-    // A look promises the one pose that it gives; rows of one pose are no test of such a model.
+    // A look gives one pose, so a site cannot use such a model. Rows of one pose cannot test it.
     let (code, _, err) = run(&folder, "check site.toml");
     assert!(code == 2 && err.contains("better one"), "{code}: {err}");
     for (name, data) in [("both", "one"), ("one", "both")] {

@@ -1,14 +1,14 @@
 //! Tests of the inflation of covariances.
 
 use crate::Share;
-use crate::law::Random;
+use crate::distribution::Random;
 use posegate::confidence::radius_squared;
 use posegate_host::learn::{
     InflationModel, InflationSettings, LearnError, Scored, ScoredEstimates, learn_inflation,
 };
 
-/// Returns estimates of a filter with correlated errors, whose covariance is too small by a factor that depends on
-/// the time since the last fix: 2 below half a second, 6 from there on.
+/// Returns estimates of a filter with correlated errors and too small covariances. The factor depends on the time
+/// since the last fix: 2 below half a second, 6 from there on.
 pub fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
     let mut random = Random(seed);
     let mut rows = Vec::new();
@@ -80,7 +80,7 @@ fn inflated_sets_hold_under_each_condition() {
 }
 
 #[test]
-fn what_is_not_known_is_refused_or_the_worst() {
+fn unknown_condition_has_the_largest_factor_or_is_refused() {
     let settings = InflationSettings {
         epsilon: 0.9,
         ..InflationSettings::default()
@@ -96,7 +96,7 @@ fn what_is_not_known_is_refused_or_the_worst() {
     let ends = model.parts()[0].to;
     let [a, b] = [0, 1].map(|k| model.parts()[k].inflation);
     assert_eq!(model.inflation(Some(ends)), Some(a.max(b)));
-    // The covariance of a filter that is too careful is not reduced.
+    // The covariance of a conservative filter is not reduced.
     let mut careful = estimates(60, 6);
     for row in &mut careful.rows {
         row.squared_distance *= 0.01;
@@ -150,7 +150,7 @@ fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
 
 /// Each value of a condition with few values has its own factor.
 #[test]
-fn conditions_that_repeat_are_told_apart() {
+fn repeated_conditions_have_their_own_factors() {
     let settings = InflationSettings {
         epsilon: 0.9,
         ..InflationSettings::default()
@@ -195,7 +195,7 @@ fn conditions_that_repeat_are_told_apart() {
 
 /// An error that persists for a thousand rows counts as one error.
 #[test]
-fn long_errors_are_few() {
+fn persistent_error_counts_as_one_error() {
     let mut estimates = under(&[(0.0, 1.0, 60_000)], "since_fix_s");
     for k in 0..estimates.rows.len() {
         estimates.rows[k].squared_distance = estimates.rows[k - k % 1000].squared_distance;
@@ -213,9 +213,9 @@ fn long_errors_are_few() {
     );
 }
 
-/// The smallest allowed number of rows is that of which, with the confidence, at least one would exceed the quantile.
+/// The smallest allowed number of rows contains, with the stated confidence, at least one error above the quantile.
 #[test]
-fn near_certainty_many_rows_are_needed() {
+fn high_epsilon_needs_many_rows() {
     let settings = InflationSettings::default();
     let of = |count| learn_inflation(&under(&[(0.0, 1.0, count)], "since_fix_s"), &settings);
     assert!(matches!(
@@ -226,7 +226,7 @@ fn near_certainty_many_rows_are_needed() {
 }
 
 #[test]
-fn files_are_read_strictly() {
+fn inconsistent_model_file_is_refused() {
     let settings = InflationSettings {
         epsilon: 0.9,
         ..InflationSettings::default()

@@ -1,16 +1,16 @@
-//! Learnt models hold on rows that they were not learnt from: bounds for their share of the detections, overall and
-//! in every accepted region; inflated sets for their share of the estimates. They are not looser than necessary.
+//! Learnt models hold on rows that they were not learnt from. Bounds hold for their share of the detections, overall and
+//! in every accepted region. Inflated sets hold for their share of the estimates. They are not looser than necessary.
 
 mod assumptions;
 mod bounds;
 mod by_age;
 mod command;
 mod dependence;
+mod distribution;
 mod drift;
 mod fleets;
 mod flips;
 mod inflation;
-mod law;
 mod provenance;
 mod recorded;
 mod site;

@@ -1,7 +1,7 @@
 //! A learnt model records what its detections were taken with, and a site with another camera or tag refuses it by name.
 
 use crate::command::{lines, run, write};
-use crate::law::SQUARES;
+use crate::distribution::SQUARES;
 use posegate_host::site::SAMPLE;
 use std::fmt::Write;
 
@@ -44,7 +44,7 @@ fn changed(key: &str, from: &str, to: &str) -> String {
 }
 
 #[test]
-fn a_site_with_another_camera_or_tag_is_refused() {
+fn site_with_another_camera_or_tag_is_refused() {
     let folder = folder();
     let (code, out, err) = run(
         &folder,
@@ -114,7 +114,7 @@ fn a_site_with_another_camera_or_tag_is_refused() {
 }
 
 #[test]
-fn what_data_were_taken_with_is_stated_without_a_site() {
+fn options_state_camera_and_tag_without_a_site() {
     let folder = folder();
     let (code, out, err) = run(
         &folder,
@@ -128,7 +128,7 @@ fn what_data_were_taken_with_is_stated_without_a_site() {
     let (code, _, err) = run(&folder, "check here.toml");
     assert_eq!(code, 2);
     assert!(joined(&err).contains("fx 1234.5 px"), "{err}");
-    // Nothing stated is nothing compared.
+    // If nothing is stated, nothing is compared.
     let (code, out, err) = run(
         &folder,
         "learn bounds d.csv --quantile 0.9 -o m.toml --json",

@@ -1,7 +1,7 @@
 //! Real detections and a real filter: learnt on one part, tested on the other. Run by `./ci.sh recorded DIR`.
 
 use crate::Share;
-use crate::law::Random;
+use crate::distribution::Random;
 use posegate::confidence::radius_squared;
 use posegate_host::learn::{
     BoundsSettings, Detections, InflationReport, InflationSettings, LearnError, Scored,
@@ -18,7 +18,7 @@ fn read(name: &str) -> Vec<u8> {
 
 /// Prints a share, with the lower end of the binomial 99 % interval around the expected share `q`. `independent` is the
 /// number of independent rows per row. Returns `true` if the share is not below that end.
-fn told(name: &str, share: Share, q: f64, independent: f64) -> bool {
+fn printed_share_holds(name: &str, share: Share, q: f64, independent: f64) -> bool {
     let rows = ((share.trials as f64 * independent) as u64).max(1);
     let least = acceptance(rows, q, 0.99)[0] as f64 / rows as f64;
     let line = json!({"name": name, "value": share.value(), "unit": "share", "goal": least, "rows": share.trials});
@@ -87,7 +87,7 @@ fn recorded_bounds_hold_on_held_out_detections() {
             );
             let mut check = |what: &str, shares: [Share; 2]| {
                 for (bound, share) in ["translation", "yaw"].into_iter().zip(shares) {
-                    missed += u32::from(!told(
+                    missed += u32::from(!printed_share_holds(
                         &format!("{name}, {what}: {bound} held"),
                         share,
                         quantile,
@@ -136,8 +136,8 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                         .collect(),
                     ..all.clone()
                 };
-                // Rows drawn one by one are similar to the rest. Blocks are from another time, for which the data
-                // tell less than the default confidence requires. Each half has too few rows for 99 % with 0.8.
+                // Rows drawn one by one are similar to the rest. Blocks are from another time, so the default confidence
+                // is too low for them. Each half has too few rows for 99 % with 0.8.
                 let settings = InflationSettings {
                     epsilon,
                     confidence: if length == 1 { 0.7 } else { 0.95 },
@@ -182,7 +182,7 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                     1 => 1.0,
                     _ => part.independent_rows as f64 / part.rows as f64,
                 };
-                missed += u32::from(!told(
+                missed += u32::from(!printed_share_holds(
                     &format!("{name}, inflated, overall"),
                     overall,
                     epsilon,
@@ -197,7 +197,12 @@ fn recorded_inflation_holds_on_held_out_estimates() {
                         part.from,
                         part.to
                     );
-                    missed += u32::from(!told(&what, share, epsilon, independent(part)));
+                    missed += u32::from(!printed_share_holds(
+                        &what,
+                        share,
+                        epsilon,
+                        independent(part),
+                    ));
                 }
             }
         }
@@ -206,8 +211,8 @@ fn recorded_inflation_holds_on_held_out_estimates() {
     assert_eq!(missed, 0, "shares below the binomial 99 % interval");
 }
 
-/// Every split of the recorded robots into those that are learnt from and a new one, at the default confidence. The worst is printed first.
-/// Four robots are enough for 0.8, so it is claimed that four of five new robots are covered as stated; fewer are refused.
+/// Every split of the recorded robots into those to learn from and a new one, at the default confidence. The worst is printed first. Four
+/// robots are enough for 0.8, so it is claimed that four of five new robots are covered as stated; fewer are refused.
 #[test]
 #[ignore = "run by ci.sh recorded DIR"]
 fn recorded_robots_are_covered_by_factors_of_the_others() {

@@ -1,6 +1,6 @@
 //! Learnt error models in site files.
 
-use crate::law::{Law, Random, SQUARES};
+use crate::distribution::{Distribution, Random, SQUARES};
 use posegate_host::learn::{BoundsSettings, ErrorModel, learn_bounds};
 use posegate_host::site::{SAMPLE, Site};
 
@@ -30,7 +30,7 @@ fn site(folder: &tempfile::TempDir, text: &str) -> Result<Site, String> {
 
 /// Every pose of the set has both bounds within r; nearly all poses with both bounds within r are in the set.
 #[test]
-fn a_learnt_model_makes_a_success_set() {
+fn learnt_model_defines_a_success_set() {
     let folder = tempfile::tempdir().unwrap();
     let model = model();
     let text = model.write().unwrap();
@@ -48,7 +48,7 @@ fn a_learnt_model_makes_a_success_set() {
     let mut random = Random(92);
     let (mut inside, mut good) = (0, 0);
     for _ in 0..20_000 {
-        let at = Law::place(&mut random);
+        let at = Distribution::place(&mut random);
         // The camera is at the tag's height, at distance d and angle psi to its normal.
         let (d, psi) = (at[0], at[2].to_radians());
         let camera = [x + d * (out + psi).cos(), y + d * (out + psi).sin()];
@@ -84,7 +84,7 @@ fn a_learnt_model_makes_a_success_set() {
 }
 
 #[test]
-fn contradictions_are_refused() {
+fn contradicting_error_bound_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("model.toml"), model().write().unwrap()).unwrap();
     let with = |line: &str| site(&folder, &format!("{SAMPLE}{LOOK}{line}\n"));

@@ -1,11 +1,11 @@
-//! Docks and tags that are not where the site file says: found, named, and not called off if they are in their places.
+//! Docks and tags that are not where the site file places them are found and named. Others are not reported.
 
 use crate::command::{lines, run, write};
-use crate::law::Random;
+use crate::distribution::Random;
 use posegate_host::learn::{Look, OffsetReport, Surveyed, SurveyedSite, acceptance, survey};
 use std::fmt::Write;
 
-/// Four docks along a wall, each with a tag of its own in the wall and tags that its neighbours see too.
+/// Four docks along a wall, each with its own tag in the wall. Neighbouring docks see the tags too.
 fn hall() -> SurveyedSite {
     let docks = (0..4).map(|k| {
         let dock = [2.0 * f64::from(k), 0.0, 0.5 * f64::from(k)];
@@ -18,11 +18,11 @@ fn hall() -> SurveyedSite {
     }
 }
 
-/// The displacements of what is off: x, y (m), yaw (rad).
+/// The displaced docks and tags, with x, y (m), yaw (rad).
 type Off<'a> = &'a [(Surveyed, &'a str, [f64; 3])];
 
-/// Returns the looks of dockings at all docks, each by its two neighbouring tags. The robot stands in a dock to within 3 mm and 0.3 deg; a
-/// look errs by 5 mm and 0.5 deg, and by `bias`. Poses are those of rigid bodies in the plane, not linearised.
+/// Returns the looks of dockings at all docks, each by its two neighbouring tags. The robot is in a dock to within 3 mm and 0.3 deg. A
+/// look has errors of 5 mm and 0.5 deg, and `bias`. Poses are those of rigid bodies in the plane, not linearised.
 fn dockings(site: &SurveyedSite, each: u32, off: Off<'_>, bias: [f64; 3], seed: u64) -> Vec<Look> {
     let mut random = Random(seed);
     let mut rows = Vec::new();
@@ -85,7 +85,7 @@ fn false_alarms_are_as_rare_as_stated() {
         stale(&survey(&rows, &site, confidence).unwrap()).is_empty()
     };
     assert!((0..50).filter(biased).count() < 5);
-    // So do rows of one docking that are given as several dockings.
+    // Rows of one docking that are given as several dockings break it too.
     let repeated = |seed: &u64| {
         let once = dockings(&site, 8, &[], [0.0; 3], 7000 + seed);
         let again = |copy: u32| {
@@ -104,7 +104,7 @@ fn false_alarms_are_as_rare_as_stated() {
 
 /// A dock that was knocked, a tag that was moved, and both: named, and each true offset in its region.
 #[test]
-fn what_is_off_is_named_with_its_offset() {
+fn displaced_dock_or_tag_is_named_with_its_offset() {
     let site = hall();
     let dock = (Surveyed::Dock, "dock-3", [0.02, 0.015, 0.0628]);
     let tag = (Surveyed::Tag, "t1", [-0.03, 0.01, 0.05]);
@@ -133,9 +133,9 @@ fn what_is_off_is_named_with_its_offset() {
     }
 }
 
-/// A dock and a tag that are only seen together cannot be told apart, and both are named.
+/// A dock and a tag that are only seen together cannot be distinguished, and both are named.
 #[test]
-fn what_is_only_seen_together_is_named_together() {
+fn dock_and_tag_seen_only_together_are_both_named() {
     let site = hall();
     let off = [(Surveyed::Tag, "t0", [0.03, 0.0, 0.04])];
     let rows: Vec<Look> = dockings(&site, 12, &off, [0.0; 3], 5)
@@ -150,7 +150,7 @@ fn what_is_only_seen_together_is_named_together() {
         "{report:?}"
     );
     assert_eq!(stale(&found).len(), 1);
-    // Too few dockings tell nothing.
+    // Too few dockings give no result.
     let few = survey(&rows[..4], &site, 0.99).unwrap();
     assert!(
         few.iter()
@@ -160,7 +160,7 @@ fn what_is_only_seen_together_is_named_together() {
 }
 
 #[test]
-fn survey_from_the_command_line() {
+fn survey_command_names_a_displaced_dock() {
     let folder = tempfile::tempdir().unwrap();
     let site = concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -183,16 +183,16 @@ fn survey_from_the_command_line() {
         "{out}"
     );
     let (code, out, _) = run(&folder, &format!("learn survey {site} off.csv --json"));
-    let told = &lines(&out)[0];
-    assert_eq!((code, &told["docks"][0]["resurvey"]), (1, &true.into()));
-    let offset = &told["docks"][0]["offset"];
+    let report = &lines(&out)[0];
+    assert_eq!((code, &report["docks"][0]["resurvey"]), (1, &true.into()));
+    let offset = &report["docks"][0]["offset"];
     let near =
         |key: &str, value: f64, off: f64| (offset[key].as_f64().unwrap() - value).abs() < off;
     assert!(
         near("y_m", 0.025, 0.004) && near("yaw_deg", 3.6, 0.3),
         "{offset}"
     );
-    // A column that is the same in all dockings is no measurement.
+    // A column with equal values in all dockings is not a measurement.
     let mut constant = "run,dock,tag,x_m,y_m,yaw_rad\n".to_owned();
     for docking in 0..6 {
         let off = 0.001 * f64::from(docking * docking % 5);
@@ -210,10 +210,10 @@ fn survey_from_the_command_line() {
         "{out} {err}"
     );
     let (_, out, _) = run(&folder, &format!("learn survey {site} constant.csv --json"));
-    let told = &lines(&out)[0]["docks"][0];
+    let report = &lines(&out)[0]["docks"][0];
     assert!(
-        told["region"].is_null() && told["resurvey"] == false,
-        "{told}"
+        report["region"].is_null() && report["resurvey"] == false,
+        "{report}"
     );
     let good = rows(0.0);
     for (from, to, place) in [

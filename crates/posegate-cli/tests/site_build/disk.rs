@@ -1,18 +1,18 @@
-//! A shard that is killed, or has a full disk, loses no finished piece; a merge that is, is completed by the next one.
+//! A shard that is killed or has a full disk loses no finished piece. The next merge completes an interrupted merge.
 
-use super::{Folder, PLANT, flip, plant, told};
+use super::{Folder, PLANT, checked, flip, plant};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// What a process gets that writes beyond its limit.
+/// The signal for a write beyond the size limit.
 const SIGXFSZ: i32 = 25;
 
 fn length(path: &Path) -> u64 {
     std::fs::metadata(path).unwrap().len()
 }
 
-/// Runs the program where no file may be longer than so many blocks of 512 bytes.
+/// Runs the program with files limited to a number of blocks of 512 bytes.
 fn limited(folder: &Folder, before: &str, blocks: u64, line: &str) -> Output {
     let limited = format!("{before} ulimit -c 0; ulimit -f {blocks}; exec \"$0\" {line}");
     let mut command = Command::new("sh");
@@ -21,7 +21,7 @@ fn limited(folder: &Folder, before: &str, blocks: u64, line: &str) -> Output {
 }
 
 #[test]
-fn a_killed_shard_loses_no_finished_piece() {
+fn killed_shard_loses_no_finished_piece() {
     let folder = Folder::with(&plant::plant(1, 6));
     folder.expect(0, "site build site.toml -o whole");
     folder.expect(0, "site merge whole");
@@ -40,7 +40,7 @@ fn a_killed_shard_loses_no_finished_piece() {
         err.contains("pieces that are missing or damaged: ") && err.contains(": shard 0/1, parts/"),
         "{err}"
     );
-    // What a kill in the middle of a file leaves, which may as well be what another process writes, and what a bad disk does.
+    // The rest of a killed write, which looks like the file of another process, and the damage of a bad disk.
     folder.write("out/parts/.posegate-1-1.tmp", "half");
     folder.write("out/parts/.posegate-1-2.tmp", "half");
     let old = std::fs::File::options()
@@ -62,7 +62,7 @@ fn a_killed_shard_loses_no_finished_piece() {
     assert_eq!(kept, pieces.len() - 2, "all but the damaged ones are kept");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == folder.results("whole"));
-    // That of the child that was killed is young too.
+    // The temporary file of the killed child is also young.
     let drafts = folder.parts("out");
     let drafts: Vec<&str> = drafts
         .iter()
@@ -71,18 +71,18 @@ fn a_killed_shard_loses_no_finished_piece() {
         .collect();
     assert!(drafts.contains(&".posegate-1-2.tmp"), "{drafts:?}");
     assert!(!drafts.contains(&".posegate-1-1.tmp"), "{drafts:?}");
-    // Then nothing is left to be done.
+    // The second run has nothing to build.
     let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
     let built: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(built["kept"], 18);
 }
 
 #[test]
-fn a_full_disk_leaves_nothing_half() {
+fn full_disk_leaves_no_partial_file() {
     let folder = Folder::with(&PLANT);
     folder.expect(0, "site build site.toml -o whole");
     folder.expect(0, "site merge whole");
-    // As much as the inventory takes, and a plan takes more: in blocks of 512 bytes.
+    // The size of the inventory in blocks of 512 bytes; a plan is larger.
     let parts = folder.parts("whole");
     let inventory = parts
         .iter()
@@ -96,11 +96,11 @@ fn a_full_disk_leaves_nothing_half() {
         .max()
         .unwrap();
     assert!(most > blocks * 512, "{most} against {blocks} blocks");
-    // A limit in place of a full disk: where its signal is ignored, the write fails in the same way.
+    // A size limit instead of a full disk: if its signal is ignored, the write fails in the same way.
     let line = "site build site.toml -o out";
     let limited = || limited(&folder, "trap '' XFSZ;", blocks, line);
     let output = limited();
-    let (_, err) = told(2, line, output);
+    let (_, err) = checked(2, line, output);
     let squeezed = err.replace(' ', "");
     assert!(
         squeezed.contains("out/parts/")
@@ -120,9 +120,9 @@ fn a_full_disk_leaves_nothing_half() {
     folder.expect(0, "site build site.toml --resume -o out");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == folder.results("whole"));
-    // What is whole is not given up for what does not fit.
+    // A failed write does not remove finished pieces.
     let output = limited();
-    told(2, line, output);
+    checked(2, line, output);
     let same = folder.pieces("out");
     assert_eq!(same.len(), folder.pieces("whole").len());
     for piece in same {
@@ -134,9 +134,9 @@ fn a_full_disk_leaves_nothing_half() {
     }
 }
 
-/// A merge that is killed, or has a full disk, while it writes leaves no manifest. The next one completes it.
+/// A merge that is killed or has a full disk leaves no manifest. The next merge completes it.
 #[test]
-fn a_merge_that_is_killed_or_has_a_full_disk_is_completed_by_the_next() {
+fn interrupted_merge_is_completed_by_the_next_merge() {
     let folder = Folder::with(&PLANT);
     folder.expect(0, "site build site.toml -o out");
     folder.copied("out", "whole");
@@ -144,7 +144,7 @@ fn a_merge_that_is_killed_or_has_a_full_disk_is_completed_by_the_next() {
     let whole = folder.results("whole");
     let manifest = whole["manifest.json"].len() as u64;
     let longest = whole.values().map(|bytes| bytes.len() as u64).max();
-    // The longest result cannot be written; nor can several, and the manifest.
+    // First the longest result cannot be written, then several results and the manifest.
     for (number, length) in [longest.unwrap(), manifest].into_iter().enumerate() {
         let blocks = (length - 1) / 512;
         for (before, ends) in [("", None), ("trap '' XFSZ;", Some(2))] {

@@ -1,4 +1,4 @@
-//! What somebody else has written among the parts is not kept and not merged; what can be believed and what must be proven.
+//! Forged parts are not kept and not merged. A forgery with a matching proof file is found only by a new proof.
 
 use super::{Folder, boxes, rewrite, sha256, two_shards};
 use posegate::bake::BakeInput;
@@ -8,7 +8,7 @@ use posegate_host::site::Site;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The finished piece of the table of a task.
+/// Returns the finished piece of the table of a task.
 fn piece_of(folder: &Folder, output: &str, task: &str) -> PathBuf {
     let wanted = format!("\"task\":\"{task}\"");
     let is_wanted = |piece: &PathBuf| {
@@ -20,7 +20,7 @@ fn piece_of(folder: &Folder, output: &str, task: &str) -> PathBuf {
     pieces.into_iter().find(is_wanted).unwrap()
 }
 
-/// A table that says that it is of the first box of the site, and is of a wider one.
+/// Returns a table of a wider box that claims to be of the first box of the site.
 fn wider() -> Vec<u8> {
     let own = Site::parse(&boxes(), "site.toml").unwrap();
     let text = boxes().replace("x = [-0.1, 0.1]", "x = [-0.5, 0.5]");
@@ -36,16 +36,16 @@ fn wider() -> Vec<u8> {
     build(&order, &|| ()).unwrap().0
 }
 
-/// A proof file that is of another table.
-fn retold(proof: &[u8], table: &[u8]) -> Vec<u8> {
-    let mut told: Value = serde_json::from_slice(proof).unwrap();
-    told["bytes"] = table.len().into();
-    told["sha256"] = sha256(table).into();
-    told["crc32c"] = format!("{:08x}", Table::parse(table).unwrap().crc()).into();
-    format!("{told}\n").into_bytes()
+/// Returns a proof file with the size and checksums of another table.
+fn proof_for(original: &[u8], table: &[u8]) -> Vec<u8> {
+    let mut proof: Value = serde_json::from_slice(original).unwrap();
+    proof["bytes"] = table.len().into();
+    proof["sha256"] = sha256(table).into();
+    proof["crc32c"] = format!("{:08x}", Table::parse(table).unwrap().crc()).into();
+    format!("{proof}\n").into_bytes()
 }
 
-/// Ways to change the files of a piece so that they do not belong together.
+/// Changes the files of a piece so that they do not belong together.
 fn mismatched(piece: &Path, how: &str) {
     rewrite(piece, |files| match how {
         "table" => files[0].1 = wider(),
@@ -54,25 +54,25 @@ fn mismatched(piece: &Path, how: &str) {
         "twice" => files.push(files[1].clone()),
         "turned" => files.swap(0, 1),
         member => {
-            let mut told: Value = serde_json::from_slice(&files[1].1).unwrap();
-            assert!(!told[member].is_null(), "{member}");
-            told[member] = match &told[member] {
+            let mut proof: Value = serde_json::from_slice(&files[1].1).unwrap();
+            assert!(!proof[member].is_null(), "{member}");
+            proof[member] = match &proof[member] {
                 Value::String(_) => "other".into(),
                 _ => 7.into(),
             };
-            files[1].1 = format!("{told}\n").into_bytes();
+            files[1].1 = format!("{proof}\n").into_bytes();
         }
     });
 }
 
-/// A piece whose files are not those of its own table and proof is made again by a shard that resumes, and not merged.
+/// A piece whose table and proof do not match is not merged. A resumed shard builds it again.
 #[test]
-fn what_does_not_belong_together_is_not_kept_and_not_merged() {
+fn mismatched_table_and_proof_are_neither_kept_nor_merged() {
     let folder = two_shards();
     folder.copied("out", "untouched");
     folder.expect(0, "site merge untouched");
     let untouched = folder.results("untouched");
-    let ways = [
+    let changes = [
         "table",
         "proof alone",
         "table alone",
@@ -87,7 +87,7 @@ fn what_does_not_belong_together_is_not_kept_and_not_merged() {
         "layout",
         "table",
     ];
-    for (number, how) in ways.into_iter().enumerate() {
+    for (number, how) in changes.into_iter().enumerate() {
         let copy = format!("copy-{number}");
         folder.copied("out", &copy);
         mismatched(&piece_of(&folder, &copy, "dock-0"), how);
@@ -109,9 +109,9 @@ fn what_does_not_belong_together_is_not_kept_and_not_merged() {
     }
 }
 
-/// A forgery with a proof file that fits is believed; with `--prove` it is found.
+/// A forgery with a matching proof file is accepted, but not with `--prove`.
 #[test]
-fn a_merge_that_proves_finds_a_forgery_that_fits() {
+fn proving_merge_finds_a_forgery_with_a_matching_proof_file() {
     let folder = two_shards();
     folder.copied("out", "honest");
     folder.expect(0, "site merge honest");
@@ -127,7 +127,7 @@ fn a_merge_that_proves_finds_a_forgery_that_fits() {
     let piece = piece_of(&folder, "honest", "dock-0");
     rewrite(&piece, |files| {
         files[0].1 = wider();
-        files[1].1 = retold(&files[1].1, &files[0].1);
+        files[1].1 = proof_for(&files[1].1, &files[0].1);
     });
     for json in ["", " --json"] {
         let line = format!("site merge honest --site site.toml --prove{json}");
@@ -141,13 +141,13 @@ fn a_merge_that_proves_finds_a_forgery_that_fits() {
     folder.expect(0, "site merge honest --site site.toml");
     assert!(folder.results("honest") != honest);
 
-    // A table that is right, and counts that are not.
+    // A valid table with wrong counts in its proof.
     folder.copied("out", "counts");
     let piece = piece_of(&folder, "counts", "dock-1");
     rewrite(&piece, |files| {
-        let mut told: Value = serde_json::from_slice(&files[1].1).unwrap();
-        told["proven"]["runs"] = 7.into();
-        files[1].1 = format!("{told}\n").into_bytes();
+        let mut proof: Value = serde_json::from_slice(&files[1].1).unwrap();
+        proof["proven"]["runs"] = 7.into();
+        files[1].1 = format!("{proof}\n").into_bytes();
     });
     let (out, _) = folder.expect(1, "site merge counts --site site.toml --prove");
     assert!(
@@ -158,9 +158,9 @@ fn a_merge_that_proves_finds_a_forgery_that_fits() {
     assert!(!folder.path().join("counts/tables").exists());
 }
 
-/// An inventory that lists less than the site has is found where the site is named.
+/// An incomplete inventory is found if the site is given.
 #[test]
-fn an_inventory_of_less_than_the_site_is_refused() {
+fn incomplete_inventory_is_refused_if_the_site_is_given() {
     let folder = two_shards();
     let parts = folder.path().join("out/parts");
     let read = |name: &str| -> Value {
@@ -191,13 +191,13 @@ fn an_inventory_of_less_than_the_site_is_refused() {
     assert!(out.contains("4 proven tables"), "{out}");
 }
 
-/// Another build of the program is another program: its pieces are not kept, not mixed, and merged only where that is asked for.
+/// Another build of the program is another program: its pieces are not kept, not mixed, and merged only with `--any-program`.
 #[test]
 fn parts_of_another_program_are_neither_kept_nor_mixed() {
     let folder = two_shards();
     let other = folder.path().join("other-posegate");
     std::fs::copy(env!("CARGO_BIN_EXE_posegate"), &other).unwrap();
-    // What follows the end of a program is not run.
+    // Bytes after the end of a program are not run.
     let mut file = std::fs::File::options().append(true).open(&other).unwrap();
     std::io::Write::write_all(&mut file, b"\n").unwrap();
     drop(file);
@@ -206,7 +206,7 @@ fn parts_of_another_program_are_neither_kept_nor_mixed() {
         command
             .args(line.split_whitespace())
             .current_dir(folder.path());
-        super::told(code, line, command.output().unwrap())
+        super::checked(code, line, command.output().unwrap())
     };
     let (out, _) = by_other(0, "site build site.toml --shard 1/2 --resume --json -o out");
     let built: Value = serde_json::from_str(&out).unwrap();
@@ -226,7 +226,7 @@ fn parts_of_another_program_are_neither_kept_nor_mixed() {
     );
     folder.expect(0, "site merge out --site site.toml --prove --any-program");
     assert!(folder.results("out") == theirs);
-    // Nothing but the manifest tells which program it was.
+    // Only the manifest depends on the program.
     folder.expect(0, "site build site.toml -o own");
     folder.expect(0, "site merge own");
     let own = folder.results("own");

@@ -1,10 +1,10 @@
-//! A merge keeps what somebody else put among its results, and runs alone.
+//! A merge keeps foreign files among its results, and only one merge runs at a time.
 
 use super::{Folder, boxes, two_shards};
 use std::path::Path;
 
 #[test]
-fn one_merge_at_a_time() {
+fn second_merge_at_the_same_time_is_refused() {
     let folder = two_shards();
     folder.expect(0, "site merge out");
     let before = folder.results("out");
@@ -15,7 +15,7 @@ fn one_merge_at_a_time() {
         err.contains("out/parts: another merge is at work here"),
         "{err}"
     );
-    // A process that ends, however it ends, gives its locks back.
+    // The end of a process releases its locks.
     drop(parts);
     super::flip(&folder.pieces("out")[0]);
     folder.expect(2, "site merge out");
@@ -28,7 +28,7 @@ fn one_merge_at_a_time() {
 }
 
 #[test]
-fn parts_may_be_gone_when_all_is_merged() {
+fn merged_results_survive_the_removal_of_parts() {
     let folder = two_shards();
     folder.expect(0, "site merge out");
     let before = folder.results("out");
@@ -38,7 +38,7 @@ fn parts_may_be_gone_when_all_is_merged() {
     folder.expect(0, "site build site.toml -o out");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == before);
-    // Nor need they be of this version: one of an older format is replaced, and one of a newer one left alone.
+    // A manifest of an older format is replaced, and one of a newer format is kept.
     for (format, code) in [(1, 0), (99, 2)] {
         std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
         let manifest = String::from_utf8(before["manifest.json"].clone()).unwrap();
@@ -54,7 +54,7 @@ fn parts_may_be_gone_when_all_is_merged() {
             folder.expect(0, "site build site.toml -o out");
         }
     }
-    // A manifest of something else is no reason to take the folder.
+    // A folder with a manifest of another kind is refused.
     std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
     folder.write("out/manifest.json", "{\"name\": \"a page\"}");
     let (_, err) = folder.expect(2, "site build site.toml -o out");
@@ -62,16 +62,16 @@ fn parts_may_be_gone_when_all_is_merged() {
 }
 
 #[test]
-fn what_somebody_put_among_the_results_is_not_removed() {
+fn foreign_file_among_the_results_is_not_removed() {
     let folder = two_shards();
     folder.expect(0, "site merge out");
     let before = folder.results("out");
-    let mine = [
+    let foreign = [
         "out/tables/mine.posegate",
         "out/proofs/mine",
         "out/plans/a/b/mine.json",
     ];
-    for name in mine {
+    for name in foreign {
         let path = folder.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         folder.write(name, "mine");
@@ -95,10 +95,10 @@ fn what_somebody_put_among_the_results_is_not_removed() {
     assert!(folder.results("out") == before);
 }
 
-/// Parts on another disk. (Where there is none, the parts are elsewhere at least.)
+/// Parts on another disk, or at least in another folder.
 #[cfg(unix)]
 #[test]
-fn parts_may_be_elsewhere() {
+fn parts_on_another_disk_are_merged() {
     let folder = two_shards();
     folder.copied("out", "same");
     folder.expect(0, "site merge same");
@@ -125,7 +125,7 @@ fn parts_may_be_elsewhere() {
 
 /// After a change of the site, records of earlier shards stay. They are named, and left out if the site is given.
 #[test]
-fn stale_records_are_named_and_left_out_if_the_site_is_given() {
+fn stale_records_are_left_out_if_the_site_is_given() {
     let folder = two_shards();
     folder.copied("out", "first");
     folder.expect(0, "site merge first");
@@ -134,26 +134,29 @@ fn stale_records_are_named_and_left_out_if_the_site_is_given() {
     folder.expect(0, "site merge second");
     folder.expect(0, "site build other.toml -o out");
     let (_, err) = folder.expect(2, "site merge out");
-    // Lines may be broken within a name.
+    // Errors are wrapped within names.
     let squeezed = err.replace(' ', "");
-    for says in [
+    for expected in [
         "shards are of different sites, programs or options",
         ": shard-0-of-1.json site ",
         ": shard-0-of-2.json, shard-1-of-2.json",
         "remove stale shard files from `parts`",
         "into a fresh folder",
     ] {
-        assert!(squeezed.contains(&says.replace(' ', "")), "{says}: {err}");
+        assert!(
+            squeezed.contains(&expected.replace(' ', "")),
+            "{expected}: {err}"
+        );
     }
     folder.expect(0, "site merge out --site other.toml");
     assert!(folder.results("out") == folder.results("second"));
     folder.expect(0, "site merge out --site site.toml");
     assert!(folder.results("out") == folder.results("first"));
-    // What is left of another split of the same site.
+    // Remains of another split of the same site.
     folder.expect(0, "site build site.toml --shard 1/3 -o out");
     folder.expect(0, "site merge out --site site.toml");
     assert!(folder.results("out") == folder.results("first"));
-    // Plans or none: the site does not say which.
+    // Builds with and without plans: the site does not define which.
     folder.expect(0, "site build site.toml -o out");
     folder.expect(0, "site merge out --site site.toml");
     assert!(folder.results("out") == folder.results("first"));
@@ -170,9 +173,9 @@ fn stale_records_are_named_and_left_out_if_the_site_is_given() {
     );
 }
 
-/// A million shards is the most: a record of more is refused.
+/// The largest number of shards is a million: a record of more is refused.
 #[test]
-fn a_record_of_more_than_a_million_shards_is_refused() {
+fn record_of_more_than_a_million_shards_is_refused() {
     let folder = Folder::with(&boxes());
     folder.expect(0, "site build site.toml --shard 3/1000000 -o out");
     let (_, err) = folder.expect(2, "site merge out");

@@ -3,7 +3,7 @@
 use super::{boxes, flip, rewrite, two_shards};
 use std::path::Path;
 
-/// Makes the proof in a finished piece longer: blanks are nothing to JSON.
+/// Appends a blank to the proof in a finished piece: the JSON is the same.
 fn forge(piece: &Path) {
     rewrite(piece, |files| files.last_mut().unwrap().1.push(b' '));
 }
@@ -19,7 +19,7 @@ fn missing_shards_are_named() {
         "{err}"
     );
     assert!(!folder.path().join("one/manifest.json").exists());
-    // Pieces count, however many shards the site was cut into.
+    // Pieces of any number of shards are merged.
     folder.expect(0, "site build site.toml --shard 0/3 -o one");
     folder.expect(0, "site build site.toml --resume --shard 0/2 -o one");
     folder.expect(0, "site merge one");
@@ -30,7 +30,7 @@ fn missing_shards_are_named() {
 }
 
 #[test]
-fn a_piece_that_is_missing_or_changed_is_named() {
+fn missing_or_changed_piece_is_named() {
     let folder = two_shards();
     folder.copied("out", "untouched");
     folder.expect(0, "site merge untouched");
@@ -58,7 +58,7 @@ fn a_piece_that_is_missing_or_changed_is_named() {
         );
         assert!(!folder.path().join(change).join("manifest.json").exists());
         assert!(!folder.path().join(change).join("tables").exists());
-        // The shard that is named makes it again.
+        // The named shard builds it again.
         for shard in ["0/2", "1/2"] {
             folder.expect(
                 0,
@@ -70,15 +70,15 @@ fn a_piece_that_is_missing_or_changed_is_named() {
     }
 }
 
-/// A record or an inventory that is no longer what a shard wrote is refused.
+/// A changed record or inventory is refused.
 #[test]
-fn a_changed_record_or_inventory_is_refused() {
+fn changed_record_or_inventory_is_refused() {
     let folder = two_shards();
     folder.copied("out", "torn");
     folder.write("torn/parts/shard-0-of-2.json", "{");
     let (_, err) = folder.expect(2, "site merge torn");
     assert!(err.contains("torn/parts/shard-0-of-2.json: EOF"), "{err}");
-    for (name, change, says) in [
+    for (name, change, expected) in [
         ("changed", Some("{}"), "was changed"),
         ("gone", None, "is missing: every shard writes it"),
     ] {
@@ -91,7 +91,7 @@ fn a_changed_record_or_inventory_is_refused() {
             None => std::fs::remove_file(folder.path().join(&inventory)).unwrap(),
         }
         let (_, err) = folder.expect(2, &format!("site merge {name}"));
-        assert!(err.contains(says), "{err}");
+        assert!(err.contains(expected), "{err}");
         folder.expect(
             0,
             &format!("site build site.toml --shard 1/2 --resume -o {name}"),
@@ -101,7 +101,7 @@ fn a_changed_record_or_inventory_is_refused() {
 }
 
 #[test]
-fn shards_that_do_not_belong_together_are_refused() {
+fn shards_of_different_builds_are_refused() {
     let folder = two_shards();
     let digest = |site: &str| {
         let (out, _) = folder.expect(0, &format!("site build {site} --json -o digest"));
@@ -115,14 +115,14 @@ fn shards_that_do_not_belong_together_are_refused() {
     folder.expect(0, "site build other.toml --shard 1/2 --resume -o changed");
     let (_, err) = folder.expect(2, "site merge changed");
     let squeezed = err.replace(' ', "");
-    let said = |digest: &str, shard: &str| {
+    let lists = |digest: &str, shard: &str| {
         squeezed.contains(&format!("site{},", &digest[..12]))
             && squeezed.contains(&format!(":{shard}"))
     };
     assert!(
         err.contains("shards are of different sites, programs or options")
-            && said(&one, "shard-0-of-2.json")
-            && said(&other, "shard-1-of-2.json"),
+            && lists(&one, "shard-0-of-2.json")
+            && lists(&other, "shard-1-of-2.json"),
         "{err}"
     );
     // Other plans.
@@ -138,7 +138,7 @@ fn shards_that_do_not_belong_together_are_refused() {
             && err.contains("shard-1-of-2.json"),
         "{err}"
     );
-    // The shard is asked for the same again.
+    // The shard builds with the same options again.
     folder.expect(0, "site build site.toml --shard 1/2 --resume -o options");
     folder.expect(0, "site merge options");
 }

@@ -1,9 +1,9 @@
 //! The error bound of a look holds for all true places of tag and camera within their tolerances.
 //!
-//! `nature.rs` displaces both to the ends of the tolerances, gives the detector the largest errors of its error model, and
-//! computes the robot's pose from the places in the site file. It shares no code with the crate. At no pose of a success
-//! set S_l(r), and in no look of a chain or a plan, may the error exceed the bound. The bound is not much larger than
-//! the largest error that is found.
+//! `nature.rs` displaces both to the ends of the tolerances, with the largest errors of the detector's error model. It
+//! computes the robot's pose from the places in the site file. It shares no code with the crate. The error must not
+//! exceed the bound at any pose of a success set S_l(r), nor in any look of a chain or a plan. The bound is not much
+//! larger than the largest error that is found.
 
 mod nature;
 
@@ -188,9 +188,9 @@ fn random_world(random: &mut Random) -> World {
     }
 }
 
-/// At no pose of S_l(r) does the error exceed r, for stated and learnt error models.
+/// The error is at most r at every pose of S_l(r), for stated and learnt error models.
 #[test]
-fn no_pose_of_a_success_set_errs_by_more_than_allowed() {
+fn error_is_within_r_at_every_pose_of_the_success_set() {
     let folder = folder();
     let mut random = Random(1 + counts::first_seed());
     let (mut sets, mut inside, mut refused) = (0, 0, 0);
@@ -244,7 +244,7 @@ fn no_pose_of_a_success_set_errs_by_more_than_allowed() {
 
 /// At the border of S_l(r) the largest error that is found is not much less than r.
 #[test]
-fn no_success_set_is_much_smaller_than_it_must_be() {
+fn success_set_is_tight() {
     let folder = folder();
     let mut random = Random(2);
     let wall = [[4.0, 0.0, 0.5], [0.0, 0.0, 180.0]];
@@ -309,7 +309,7 @@ fn no_success_set_is_much_smaller_than_it_must_be() {
 
 /// If a search for a tag's place moves the tag and increases its tolerance, still no error exceeds r.
 #[test]
-fn a_tag_that_is_moved_keeps_the_promise() {
+fn error_is_within_r_after_the_tag_is_moved() {
     let folder = folder();
     let mut random = Random(6);
     let mut inside = 0;
@@ -363,7 +363,7 @@ fn a_tag_that_is_moved_keeps_the_promise() {
 
 /// The cost of a view in a search for a tag's place is the bound plus the error from the tolerances.
 #[test]
-fn the_cost_of_a_view_has_the_tolerances_in_it() {
+fn cost_of_a_view_includes_the_tolerances() {
     let folder = folder();
     let mut random = Random(7);
     for (tag_off, mount_off) in [
@@ -387,10 +387,10 @@ fn the_cost_of_a_view_has_the_tolerances_in_it() {
             let pose = looking_from(&world, d, 0.0, 0.0);
             let worst = world.worst(pose, &|_| bounds, &mut random, 0).unwrap();
             let worst = 100.0 * worst[0] + worst[1].to_degrees();
-            let told = cost.of_view(at);
+            let stated_cost = cost.of_view(at);
             assert!(
-                told >= worst - 1e-6 && told <= 1.1 * worst,
-                "{told} {worst}: {world:?} from {d} m"
+                stated_cost >= worst - 1e-6 && stated_cost <= 1.1 * worst,
+                "{stated_cost} {worst}: {world:?} from {d} m"
             );
         }
     }
@@ -443,9 +443,9 @@ fn two_metres(tag_off: [f64; 2], mount_off: [f64; 2]) -> World {
 
 /// Checks every look of a successful chain or plan, from poses where the robot may be: the largest error is within its
 /// bound.
-fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
+fn holds(world: &World, site: &Site, report: &Value, random: &mut Random) {
     let mut looks = 0;
-    for step in told["steps"].as_array().unwrap() {
+    for step in report["steps"].as_array().unwrap() {
         if step["type"] != "localization" {
             continue;
         }
@@ -486,7 +486,7 @@ fn holds(world: &World, site: &Site, told: &Value, random: &mut Random) {
 /// A tag that may be turned by 2 degrees and displaced by 3 cm, seen from 2.3 m. A look with errors within 5 cm and 1
 /// degree for an exact survey is impossible with this one. A look with larger allowed errors stays within its bound.
 #[test]
-fn two_sites_that_differ_in_a_tolerance_promise_different_things() {
+fn larger_tolerance_makes_a_small_error_impossible() {
     let folder = folder();
     let mut random = Random(3);
     let loose = ([0.03, 2.0], [0.0, 0.0]);
@@ -511,10 +511,10 @@ fn two_sites_that_differ_in_a_tolerance_promise_different_things() {
             "{tag_off:?} {mount_off:?} {r:?}\n{out}\n{err}"
         );
         if serves {
-            let told: Value = serde_json::from_str(&out).unwrap();
-            assert_eq!(told["success"], true);
+            let report: Value = serde_json::from_str(&out).unwrap();
+            assert_eq!(report["success"], true);
             let site = site(folder.path(), &text).unwrap();
-            holds(&world, &site, &told, &mut random);
+            holds(&world, &site, &report, &mut random);
         } else {
             // The cause is named.
             assert!(code == 2 && err.contains("toleranc"), "{out}\n{err}");
@@ -522,9 +522,9 @@ fn two_sites_that_differ_in_a_tolerance_promise_different_things() {
     }
 }
 
-/// The planner makes looks only of tags whose survey is good enough.
+/// The planner generates looks only of tags with a small enough tolerance.
 #[test]
-fn a_plan_looks_where_the_survey_is_good_enough() {
+fn planner_looks_only_at_tags_with_a_good_survey() {
     let folder = folder();
     let mut random = Random(5);
     let planner = format!(
@@ -552,9 +552,9 @@ r = [[0.04, 1.0], [0.16, 3.0]]
         for mount_off in [[0.0, 0.0], [0.01, 0.4]] {
             let (world, text, code, out, err) = plan(off, mount_off, &planner);
             assert_eq!(code, 0, "{off:?} {mount_off:?}\n{out}\n{err}");
-            let told: Value = serde_json::from_str(&out).unwrap();
+            let report: Value = serde_json::from_str(&out).unwrap();
             let site = site(folder.path(), &text).unwrap();
-            holds(&world, &site, &told, &mut random);
+            holds(&world, &site, &report, &mut random);
             // A look with the small error exists only if the survey is exact.
             assert_eq!(
                 site.planner.looks.contains_key("t7@0.04"),
@@ -563,7 +563,7 @@ r = [[0.04, 1.0], [0.16, 3.0]]
             assert!(site.planner.looks.contains_key("t7@0.16"));
         }
     }
-    // A tag that is too inexact for every error is an error of the file.
+    // A tag whose tolerance exceeds every error is an error of the file.
     let (_, _, code, out, err) = plan(
         [0.03, 2.0],
         [0.0, 0.0],

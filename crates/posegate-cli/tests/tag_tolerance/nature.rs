@@ -227,12 +227,15 @@ impl World {
         let (sin, cos) = angle.sin_cos();
         let away = [x - self.tag[0][0], y - self.tag[0][1]];
         // The inverse of the tag's rotation moves the robot by a chord, at a right angle to the radius.
-        let beside = [turn * away[1], -turn * away[0]];
+        let across = [turn * away[1], -turn * away[0]];
         let lever = away[0].hypot(away[1]).max(1e-9);
-        let chord = beside.map(|c| c / lever);
+        let chord = across.map(|c| c / lever);
         // A direction between the wanted one and that of the chord, weighted by the rotation.
-        let weigh = self.tag_off[1].to_radians() * lever;
-        let to = [cos + 10.0 * weigh * chord[0], sin + 10.0 * weigh * chord[1]];
+        let rotation_m = self.tag_off[1].to_radians() * lever;
+        let to = [
+            cos + 10.0 * rotation_m * chord[0],
+            sin + 10.0 * rotation_m * chord[1],
+        ];
         let length = to[0].hypot(to[1]).max(1e-9);
         let to = to.map(|c| c / length);
         // In the robot's frame.
@@ -287,8 +290,8 @@ impl World {
             off.mount.map(|c| c * self.mount_off[0]),
         );
         let at = view(&robot.then(&mount), &tag);
-        let (metres, radians) =
-            detector(at).ok_or_else(|| format!("nothing is said of the view {at:?}"))?;
+        let (metres, radians) = detector(at)
+            .ok_or_else(|| format!("the error model has no bound for the view {at:?}"))?;
         // The detector's pose if tag and camera were known exactly. Its error on the floor is at its bounds, and it leans,
         // which the bounds do not limit. The bounds were measured with a camera that is not rotated; a rotated camera
         // turns the error in height.

@@ -21,7 +21,7 @@ class PosegateError(ValueError):
 
 @final
 class Verdict:
-    """What the gate says about one estimate. True if it permits."""
+    """The gate's decision on one estimate. True if it permits."""
 
     @property
     def permit(self) -> bool:
@@ -29,11 +29,11 @@ class Verdict:
 
     @property
     def reason(self) -> Optional[str]:
-        """The name of the reason of a denial. `posegate explain REASON` says what to do about it."""
+        """The name of the reason of a denial. `posegate explain REASON` describes what to do about it."""
 
     @property
     def margin(self) -> Optional[float]:
-        """By which factor the pose-set could be scaled: at least 1 with a permit."""
+        """The largest factor by which the pose-set could be scaled: at least 1 with a permit."""
 
     @property
     def worst_pose(self) -> Optional[tuple[float, float, float]]:
@@ -68,7 +68,7 @@ class Table:
     ) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
         """Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3).
 
-        Returns whether each is permitted, and the codes of the reasons, indices of `REASONS`. Uses all cores and does not hold
+        Returns `True` for each that is permitted, and the codes of the reasons, indices of `REASONS`. Uses all cores and does not hold
         the interpreter's lock: do not write into the arrays until it returns.
         """
 
@@ -87,7 +87,7 @@ class Site:
         """The names of the tasks."""
 
     def contains(self, task: str, poses: ArrayLike) -> NDArray[np.bool_]:
-        """Returns for each pose, an array of shape (n, 3), whether it is in the success set of a task."""
+        """Returns `True` for each pose (an array of shape (n, 3)) that is in the success set of a task."""
 
     def build(self, task: str) -> Table:
         """Builds the table of a task and proves it."""

@@ -15,8 +15,8 @@ pub const WHEEL: &str = "x86_64-unknown-linux-gnu";
 /// The oldest systems on which the wheel must run: glibc 2.17.
 const WHEEL_TAG: &str = "manylinux2014";
 
-/// Where every build finds the sources. Cargo puts the path of a package outside of its workspace into the names of symbols, and the
-/// node and the wheel are such workspaces: so each build sees the sources at this path, by a mount of its own.
+/// Where every build finds the sources. Cargo puts the path of a package outside of its workspace into the names of symbols. The
+/// node and the wheel are such workspaces. So each build sees the sources at this path, by a separate mount.
 const PLACE: &str = "/tmp/posegate-dist";
 /// Runs a command where the folder that is the first argument is mounted at [`PLACE`]. No administrator is needed.
 const MOUNTED: &str =
@@ -56,7 +56,7 @@ impl Sources {
     /// Returns a command of cargo or of maturin whose output does not depend on the folders. Its words follow.
     fn reproducible(&self, program: &Path) -> Result<Cmd> {
         let home = cargo_home()?;
-        // The last one that matches counts.
+        // The last match counts.
         let mut flags = vec![
             format!("--remap-path-prefix={}=cargo", home.display()),
             format!("--remap-path-prefix={}=target", self.target.display()),
@@ -122,7 +122,7 @@ fn contains(bytes: &[u8], word: &[u8]) -> bool {
     bytes.windows(word.len()).any(|part| part == word)
 }
 
-/// Returns the crate that a line of cargo's messages says is compiled.
+/// Returns the crate that a line of cargo's messages reports as compiled.
 fn compiled(line: &str) -> Result<Option<Crate>> {
     let message: Value = serde_json::from_str(line)?;
     if message["reason"] != "compiler-artifact" {
@@ -242,7 +242,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_in_a_file_is_found() {
+    fn path_in_a_file_is_found() {
         assert!(contains(
             b"\0/home/x/.cargo/registry/src/host/a.rs",
             b"registry/src/"

@@ -155,9 +155,9 @@ fn within(root: &Path, program: &str) -> Cmd {
 /// Makes tables and decides in a root, and starts the node there.
 fn run_programs(root: &Path, folder: &str, version: &str) -> Result {
     let program = format!("{folder}posegate");
-    let said = within(root, &program).arg("--version").read()?;
-    if said.trim() != format!("posegate {version}") {
-        return Err(format!("the program says that it is `{}`", said.trim()).into());
+    let output = within(root, &program).arg("--version").read()?;
+    if output.trim() != format!("posegate {version}") {
+        return Err(format!("the program prints the version `{}`", output.trim()).into());
     }
     within(root, &program).words("demo -o /demo").run()?;
     within(root, &program)
@@ -197,15 +197,15 @@ fn remove_package(root: &Path) -> Result {
 
 /// Links the smallest gate with the archive of a core, without Rust, and runs it in an emulator.
 fn run_gate(folder: &Path, core: &str) -> Result {
-    let said = cmd("make --no-print-directory -s -C")
+    let output = cmd("make --no-print-directory -s -C")
         .arg(folder.join("examples/c"))
         .arg("run_gate")
         .arg(format!("TARGET={core}"))
         .arg("CARGO=false")
         .limit(120)
         .read()?;
-    if said != GATE {
-        return Err(format!("{core}: the gate in C says\n{said}and not\n{GATE}").into());
+    if output != GATE {
+        return Err(format!("{core}: the gate in C prints\n{output}and not\n{GATE}").into());
     }
     Ok(())
 }
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_a_sum_is_found() {
+    fn file_without_a_sum_is_found() {
         let folder = Scratch::new().unwrap();
         files::write(folder.join("a.deb"), "x").unwrap();
         files::write(folder.join(SUMS), "00  b.deb\n").unwrap();

@@ -1,5 +1,5 @@
 //! The bill of materials (CycloneDX 1.5): every package of Rust in each file of a release, with its licence, checksum and what it
-//! needs. `cargo metadata` describes the packages; `cargo tree` says which of them a file has, since the former also lists optional
+//! needs. `cargo metadata` describes the packages; `cargo tree` lists which of them a file has, since the former also lists optional
 //! packages that are not used.
 
 use super::archives::CORES;
@@ -334,7 +334,7 @@ fn checksums(lock: &str) -> BTreeMap<Crate, String> {
     found
 }
 
-/// Finds the version in musl's library: a string of its own, between zeros.
+/// Finds the version in musl's library: a separate string, between zeros.
 fn musl_version(library: &[u8]) -> Option<String> {
     let is_version = |text: &&[u8]| {
         text.starts_with(b"1.")
@@ -389,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn version_of_musl_is_a_text_of_its_own() {
+    fn version_of_musl_is_a_separate_string() {
         assert_eq!(
             musl_version(b"x\x001.2\x001.2.5\0y").as_deref(),
             Some("1.2.5")

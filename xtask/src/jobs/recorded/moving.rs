@@ -8,11 +8,11 @@ use crate::shell::Result;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// AMCL's fixes come up to 0.7 s apart: a permit has to be held for that long where nothing carries them.
+/// AMCL's fixes come up to 0.7 s apart: a permit has to be held for that long if nothing carries them.
 const HELD: &str = "--max-age-ms 900 --permit-hold-ms 800";
 /// The largest speeds that the odometry of the recording shows: 0.500 m/s and 56.2 deg/s.
 const DRIVES: &str = "--max-speed 0.5 --max-yaw-rate 60";
-/// The robots of the arena: at most 0.086 m/s and 33 deg/s. Their odometry differs from the truth by a tenth of the way.
+/// The robots of the arena: at most 0.086 m/s and 33 deg/s. Their odometry differs from the truth by a tenth of the path.
 const ROBOTS: &str = "--max-speed 0.1 --max-yaw-rate 35 --fast";
 const ODOMETRY: &str = "--odom-gap-ms 200 --fix-age-ms 20000 --odom-noise 0.05,0.2,0.1 --odom-slip 0.1 --max-age-ms 400 --permit-hold-ms 250";
 /// Longest time between two poses of the odometry that is made of the filter's steps, seconds.
@@ -82,7 +82,7 @@ impl Interlock {
 }
 
 /// Prints for how long the interlock is open on the recorded hall and in the robots' arena. Fails if it is ever open with the true pose
-/// outside, if the odometry is of no use, or if the interlock is open for longer than one with exact sets.
+/// outside, if the odometry has no effect, or if it is open longer than with exact sets.
 pub fn moving(folder: &Path) -> Result {
     let mut report = Report::default();
     hall(folder, &mut report)?;
@@ -148,7 +148,7 @@ fn hall(folder: &Path, report: &mut Report) -> Result {
 }
 
 /// The arena: a filter on five robots, with the truth. A fix is an estimate with a landmark since the one before. The recording has no
-/// odometry of its own: the filter's steps stand for it, divided into equal parts. A step with a landmark in it also has that
+/// odometry of its own: the filter's steps replace it, divided into equal parts. A step with a landmark in it also has that
 /// landmark's correction; the fix at its end replaces it.
 fn arena(folder: &Path, report: &mut Report) -> Result {
     let text = files::read(folder.join("mrclam/ekf_estimates.csv"))?;
@@ -196,7 +196,7 @@ struct Drive {
 }
 
 impl Drive {
-    /// Takes the rows of a robot. `None` if a column is missing or a number is none.
+    /// Takes the rows of a robot. `None` if a column is missing or a number is missing.
     fn of(text: &str, robot: u32) -> Option<Self> {
         let mut lines = text.lines();
         let header = lines.next()?;
@@ -259,7 +259,7 @@ mod tests {
     use super::Drive;
 
     #[test]
-    fn a_drive_has_fixes_where_a_landmark_was_seen_and_odometry_in_equal_parts() {
+    fn drive_has_fixes_at_landmarks_and_odometry_in_equal_parts() {
         let text = "robot,t_s,x_m,y_m,yaw_rad,true_x_m,true_y_m,true_yaw_rad,since_landmark_s\n\
                     1,1.0,0,0,3.1,0,0,3,0.5\n2,1.0,9,9,9,9,9,9,0\n1,1.2,0.1,0,-3.1,0.2,0,-3,0.7\n1,1.25,0.1,0,-3.1,0.2,0,-3,0.01\n";
         let drive = Drive::of(text, 1).unwrap();

@@ -8,11 +8,12 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The share of the pose-sets that shall contain the truth: that of the site file.
+/// The required share of pose-sets that contain the truth, as in the site file.
 const EPSILON: f64 = 0.99;
-/// The default of `learn inflation --confidence`: the share of new robots for which the factor shall be large enough.
+/// The default of `learn inflation --confidence`: the required share of new robots for which the factor is large
+/// enough.
 const CONFIDENCE: f64 = 0.8;
-/// The robots from which a factor for a new one follows with this confidence.
+/// The number of robots from which a factor for a new one follows with this confidence.
 const ENOUGH: usize = 4;
 /// What the replays of the robots have in common.
 const BAY: &str = "--task bay --max-age-ms 3000 --permit-hold-ms 3000 --json";
@@ -57,16 +58,16 @@ pub fn robots(folder: &Path) -> Result {
             .arg(&held)
             .words(&format!("{BAY} --inflation {factor}"))
             .outcome()?;
-        let told: Value = serde_json::from_str(&replay.text)?;
-        let coverage = told["truth"]["coverage"].as_f64().unwrap_or(0.0);
+        let summary: Value = serde_json::from_str(&replay.text)?;
+        let coverage = summary["truth"]["coverage"].as_f64().unwrap_or(0.0);
         found.push((coverage, robot.clone(), factor, replay.text));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (coverage, robot, factor, replay) in &found {
         let name = format!("mrclam, bay, robot {robot}, inflation {factor} learnt of the others");
         table(&name, replay)?;
-        let told: Value = serde_json::from_str(replay)?;
-        let gate = &told["rules"]["gate"];
+        let summary: Value = serde_json::from_str(replay)?;
+        let gate = &summary["rules"]["gate"];
         report.require(
             gate["false_permits"].as_u64() == Some(0),
             format!("no false permit of the gate on robot {robot}"),
@@ -91,7 +92,7 @@ pub fn robots(folder: &Path) -> Result {
     report.finish()
 }
 
-/// Returns every set of robots that can be left out so that several are left to learn from, the small sets first. (One robot's factors
+/// Returns every set of robots that can be left out if several must remain to learn from, the small sets first. (One robot's factors
 /// are for itself.)
 fn subsets(robots: &[String]) -> Vec<Vec<String>> {
     let mut subsets: Vec<Vec<String>> = (1..(1usize << robots.len()) - 1)
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_factor_counts_and_a_missing_one_is_none() {
+    fn largest_factor_is_returned_and_missing_factors_give_none() {
         let of = |overall: Value, part: Value| {
             largest(
                 &json!({"overall": {"inflation": overall}, "conditions": [{"inflation": 2.0}, {"inflation": part}]}),

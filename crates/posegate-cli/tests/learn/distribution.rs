@@ -28,7 +28,7 @@ impl Random {
 
 /// The distribution of errors and detections.
 #[derive(Clone, Copy)]
-pub struct Law {
+pub struct Distribution {
     /// The standard deviation of the position error, metres, by d, phi and psi (degrees); the yaw's is a fifth of
     /// it, in radians.
     pub sigma: fn([f64; 3]) -> f64,
@@ -37,7 +37,7 @@ pub struct Law {
 }
 
 /// Head-on views have large errors, and flips whose probability grows with the distance.
-pub const FACE_ON: Law = Law {
+pub const HEAD_ON: Distribution = Distribution {
     sigma: |[d, phi, psi]| 0.002 + 0.003 * d * d / (0.25 + psi / 30.0) * (1.0 + phi / 60.0),
     flips: |[d, _, psi]| {
         if psi < 25.0 {
@@ -49,7 +49,7 @@ pub const FACE_ON: Law = Law {
 };
 
 /// The paper's form: errors grow with the squares.
-pub const SQUARES: Law = Law {
+pub const SQUARES: Distribution = Distribution {
     sigma: |[d, phi, psi]| {
         let [phi, psi] = [phi.to_radians(), psi.to_radians()];
         0.002 + 0.0015 * d * d + 0.02 * phi * phi + 0.03 * psi * psi
@@ -57,7 +57,7 @@ pub const SQUARES: Law = Law {
     flips: |_| 0.0,
 };
 
-impl Law {
+impl Distribution {
     /// Returns the probability that a view is detected.
     pub fn detected([d, _, psi]: [f64; 3]) -> f64 {
         1.0 / (1.0 + (-(8.0 - 0.08 * psi - 0.5 * d)).exp())

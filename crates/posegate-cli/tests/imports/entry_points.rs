@@ -61,7 +61,7 @@ const DOCKS: &str = "docks:
   \"at the window\": {type: charger, pose: [-1.0, 0.5, -3.0]}
 ";
 
-const ROADS: [(&str, &str); 3] = [
+const IMPORTS: [(&str, &str); 3] = [
     (
         "field.json --format wpilib --size 0.1651 --family tag36h11 --pose x=4.25,y=-1.5,z=0.875,roll_deg=12,pitch_deg=-35,yaw_deg=110 --prefix w",
         "file = 'field.json'\nformat = 'wpilib'\nsize = 0.1651\nfamily = 'tag36h11'\nprefix = 'w'\n\
@@ -80,8 +80,8 @@ const ROADS: [(&str, &str); 3] = [
 
 /// The printed tables, pasted into the site or named in it, equal the import to the last bit.
 #[test]
-fn what_is_printed_is_what_is_imported() {
-    for (arguments, table) in ROADS {
+fn printed_tables_equal_the_import() {
+    for (arguments, table) in IMPORTS {
         let folder = Folder::new();
         let direct = folder.site(&format!("[import.a]\n{table}"));
         assert_eq!(
@@ -90,8 +90,8 @@ fn what_is_printed_is_what_is_imported() {
         );
 
         let (printed, _) = folder.expect(0, &format!("import {arguments}"));
-        let (said, _) = folder.expect(0, &format!("import {arguments} -o out.toml"));
-        assert!(said.starts_with("wrote out.toml"), "{said}");
+        let (message, _) = folder.expect(0, &format!("import {arguments} -o out.toml"));
+        assert!(message.starts_with("wrote out.toml"), "{message}");
         assert_eq!(
             printed,
             std::fs::read_to_string(folder.path().join("out.toml")).unwrap()
@@ -110,18 +110,18 @@ fn what_is_printed_is_what_is_imported() {
         let (out, _) = folder.expect(0, &format!("import {arguments} --json"));
         let json: serde_json::Value = serde_json::from_str(&out).unwrap();
         for (name, tag) in &direct.tags {
-            let told = &json["tags"][0];
+            let printed_tag = &json["tags"][0];
             assert_eq!(
-                (&told["name"], &told["id"]),
+                (&printed_tag["name"], &printed_tag["id"]),
                 (&name.as_str().into(), &7.into())
             );
-            assert_eq!(told["pose"]["pitch_deg"], tag.tag.pose.pitch_deg);
-            assert_eq!(told["size"], tag.tag.size);
+            assert_eq!(printed_tag["pose"]["pitch_deg"], tag.tag.pose.pitch_deg);
+            assert_eq!(printed_tag["size"], tag.tag.size);
         }
         for (index, (name, goal)) in direct.goals.iter().enumerate() {
-            let told = &json["goals"][index];
+            let printed_goal = &json["goals"][index];
             assert_eq!(
-                (&told["name"], &told["yaw_deg"]),
+                (&printed_goal["name"], &printed_goal["yaw_deg"]),
                 (&name.as_str().into(), &goal.yaw_deg.into())
             );
         }
@@ -131,7 +131,7 @@ fn what_is_printed_is_what_is_imported() {
 /// An imported tag is seen exactly like the same tag in the site file. A table that was made from an import is refused
 /// after any change of the imported file, even of a space.
 #[test]
-fn tasks_are_built_on_what_is_imported() {
+fn table_of_imported_tags_covers_the_imported_files() {
     let folder = Folder::new();
     let c = std::f64::consts::FRAC_1_SQRT_2;
     folder.write(
@@ -147,19 +147,19 @@ fn tasks_are_built_on_what_is_imported() {
         "docks.yaml",
         "docks:\n  front: {type: charger, pose: [0.0, 0.0, 0.0]}\n",
     );
-    let by_hand = posegate_host::site::SAMPLE;
-    let begin = by_hand.find("[tag.t7]").unwrap();
-    let end = begin + by_hand[begin..].find("\n\n").unwrap();
+    let manual = posegate_host::site::SAMPLE;
+    let begin = manual.find("[tag.t7]").unwrap();
+    let end = begin + manual[begin..].find("\n\n").unwrap();
     let imported = |file: &str, pose: &str| {
         format!(
             "{}[import.wall]\nfile = '{file}'\nformat = 'wpilib'\nsize = 0.3\nfamily = 'tag36h11'\n{pose}\n\
              [import.docks]\nfile = 'docks.yaml'\nformat = 'nav2_docks'{}",
-            &by_hand[..begin],
-            &by_hand[end..]
+            &manual[..begin],
+            &manual[end..]
         )
         .replace("goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }", "goal = 'front'")
     };
-    let wanted = Site::parse(by_hand, "by hand").unwrap();
+    let wanted = Site::parse(manual, "by hand").unwrap();
     for (file, pose) in [
         ("wall.json", ""),
         (
@@ -200,7 +200,7 @@ fn tasks_are_built_on_what_is_imported() {
 
 /// The imports shown in the page of the host and in the sample are valid.
 #[test]
-fn what_the_documents_show_is_sound() {
+fn documented_imports_are_valid() {
     let folder = Folder::new();
     folder.write(
         "tags.yaml",
@@ -222,8 +222,8 @@ fn what_the_documents_show_is_sound() {
 
 /// Site files and `posegate import` both refuse bad input, with the file, the line and what to do. Nothing is written.
 #[test]
-fn bad_input_is_refused_at_both_doors() {
-    let (wpilib, bundle, docks) = (ROADS[0], ROADS[1], ROADS[2]);
+fn bad_input_is_refused_by_site_files_and_the_command() {
+    let (wpilib, bundle, docks) = (IMPORTS[0], IMPORTS[1], IMPORTS[2]);
     let rows = [
         (
             wpilib,
@@ -330,7 +330,7 @@ fn bad_input_is_refused_at_both_doors() {
             "has 2 numbers",
         ),
     ];
-    for ((arguments, table), file, from, to, place, told) in rows {
+    for ((arguments, table), file, from, to, place, expected) in rows {
         let folder = Folder::new();
         let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
         assert!(text.contains(from), "{from}");
@@ -343,7 +343,7 @@ fn bad_input_is_refused_at_both_doors() {
         ] {
             let (_, err) = folder.expect(2, &line);
             assert!(
-                err.contains(place) && err.contains(told),
+                err.contains(place) && err.contains(expected),
                 "{line}, {to}: {err}"
             );
         }
@@ -395,13 +395,13 @@ fn bad_input_is_refused_at_both_doors() {
             "docks are no tags",
         ),
     ];
-    for (arguments, from, to, told) in settings {
+    for (arguments, from, to, expected) in settings {
         let folder = Folder::new();
         let before = folder.names();
         assert!(arguments.contains(from), "{from}");
         let arguments = arguments.replacen(from, to, 1);
         let (_, err) = folder.expect(2, &format!("import {arguments} -o out.toml"));
-        assert!(err.contains(told), "{arguments}: {err}");
+        assert!(err.contains(expected), "{arguments}: {err}");
         assert_eq!(folder.names(), before);
     }
 }
