@@ -383,6 +383,10 @@ fn page_begins_with_a_summary() {
         .find_map(|word| word.strip_suffix(',')?.parse().ok())
         .expect("a margin");
     assert!(shown <= least && least < shown + 0.01, "{shown} {least}");
+    // A margin near 1 leaves nothing for errors that are larger than stated.
+    let warned = all.contains("This plan holds for the stated errors and none larger");
+    assert_eq!(warned, shown < 1.05, "{shown}");
+    assert!(warned);
     let (header, _) = all.split_once("<main>").expect("a header");
     assert!(header.contains("id=\"summary\""));
     // Without the first tag the first dock is not served, and the summary reports it.

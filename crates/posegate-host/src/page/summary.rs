@@ -101,6 +101,9 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
     )
 }
 
+/// Below this margin, errors that are a little larger than stated break a plan.
+const LITTLE_SLACK: f64 = 1.05;
+
 /// The first line, and whether it is good news.
 struct Line {
     text: String,
@@ -157,8 +160,13 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
     if let Some(((margin, step), name)) = all.min_by_key(|((margin, _), _)| margin.q16()) {
         text += &format!(", worst margin {}, proven", self::text(margin));
         notes.push(format!(
-            "the worst margin is that of step {} to {name}: a margin is how many times as large the uncertainty could be before the step is no longer certain",
-            step + 1
+            "the worst margin is that of step {} to {name}: a margin is how many times as large the uncertainty could be before the step is no longer certain{}",
+            step + 1,
+            if factor(margin) < LITTLE_SLACK {
+                ". This plan holds for the stated errors and none larger: state them with slack, or let the tasks allow more"
+            } else {
+                ""
+            }
         ));
     }
     let unused = site.tags.len() - tags.len();
