@@ -121,7 +121,7 @@ fn refused(error: &clap::Error) -> Failure {
         // There is nowhere to report an error of stderr to.
         let _ = error.print();
     } else {
-        crate::terminal::to_stderr(escaped.trim_end());
+        crate::failure::to_stderr(escaped.trim_end());
     }
     Failure::printed()
 }

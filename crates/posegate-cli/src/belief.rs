@@ -1,6 +1,6 @@
 //! Arguments for the uncertainty of a pose and for the cost of views.
 
-use crate::door::Failure;
+use crate::site_input::Failure;
 use posegate_host::files::{Files, Input};
 use posegate_host::log::covariance;
 use posegate_host::place::{Cost, Gaussian, GaussianError};

@@ -2,8 +2,8 @@
 //!
 //! The package `posegate-python` calls these functions.
 
-use crate::door;
 use crate::failure::Failure;
+use crate::site_input;
 use crate::{gate, table};
 use posegate::bake::BakeInput;
 use posegate::set::RadiusSquared;
@@ -87,7 +87,7 @@ pub fn radius(table: &Table<'_>, epsilon: Option<f64>) -> Result<RadiusSquared, 
 /// # Errors
 /// The file, or one that it names, cannot be read or has a fault.
 pub fn read_site(path: OsString) -> Result<Site, Refusal> {
-    Ok(door::site(&Files::new(), &Input::from(path))?)
+    Ok(site_input::site(&Files::new(), &Input::from(path))?)
 }
 
 /// Returns a task of a site by name.
@@ -95,7 +95,7 @@ pub fn read_site(path: OsString) -> Result<Site, Refusal> {
 /// # Errors
 /// The site has no such task.
 pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Refusal> {
-    Ok(door::task(site, name)?)
+    Ok(site_input::task(site, name)?)
 }
 
 /// Builds and proves the table of a task; `path` is the site's name in messages.
@@ -103,7 +103,7 @@ pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Refusal> {
 /// # Errors
 /// The task does not exist, or its set gives no table that can be proven.
 pub fn build_table(site: &Site, path: OsString, name: &str) -> Result<Vec<u8>, Refusal> {
-    let task = door::task(site, name)?;
+    let task = site_input::task(site, name)?;
     let input = Input::from(path);
     let spec = table::spec(site, task, &input, name)?;
     let order = BakeInput {

@@ -1,6 +1,6 @@
 //! `posegate chain`: evaluates a manual chain of the site file, step by step.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, relied_on};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate::chain::StartAssumption;
 use posegate_host::draw::chain_picture;
 use posegate_host::files::{Files, Input, Output};

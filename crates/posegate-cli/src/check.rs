@@ -1,6 +1,6 @@
 //! `posegate check`: validates a site file and builds nothing.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, site_and_text};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, site_and_text};
 use posegate::bake::{BakeInput, check};
 use posegate_host::doctor::{Warning, decision_costs, examine};
 use posegate_host::files::{Files, Input};

@@ -1,6 +1,6 @@
 //! `posegate completions`: writes the file with which a shell completes commands.
 
-use crate::door::{Outcome, answer};
+use crate::site_input::{Outcome, answer};
 use posegate_host::files::{Files, Output};
 
 /// Writes completions of this command line for a shell

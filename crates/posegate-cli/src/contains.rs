@@ -1,6 +1,6 @@
 //! `posegate contains`: exact membership of poses.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use posegate::shape::Sight;
 use posegate_host::files::{Files, Input};
 use posegate_host::log::{Columns, estimates};

@@ -1,7 +1,7 @@
 //! `posegate cost`: the expected cost of seeing a task's tag.
 
 use crate::belief::{UncertaintyArgs, Weights};
-use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use posegate_host::files::{Files, Input};
 use posegate_host::log::covariance;

@@ -1,9 +1,9 @@
 //! `posegate cover`: chooses the cheapest tags with which every work task of a site has a plan.
 
-use crate::door::{
+use crate::sheet;
+use crate::site_input::{
     Failure, Outcome, answer, check_stated_errors, print, print_json, progress, warn,
 };
-use crate::sheet;
 use indicatif::ProgressBar;
 use posegate_host::cover::{
     ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch,
@@ -78,7 +78,7 @@ pub enum Choice {
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.site)?;
-    let site = crate::door::parsed(files, bytes.clone(), &name)?;
+    let site = crate::site_input::parsed(files, bytes.clone(), &name)?;
     check_stated_errors(&site)?;
     if let Some(from) = &arguments.from {
         site.chain(from).map_err(Failure::input)?;

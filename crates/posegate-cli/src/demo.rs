@@ -1,6 +1,6 @@
 //! `posegate demo`: the paper's case study.
 
-use crate::door::{Failure, Outcome, answer, print, progress};
+use crate::site_input::{Failure, Outcome, answer, print, progress};
 use posegate_host::draw::report::{numbers, summary};
 use posegate_host::draw::study::{CaseStudy, SITE, StudyError};
 use posegate_host::draw::{fig1_parking, fig2_chain, fig3_plan, fig3_sections, fig4_placement};

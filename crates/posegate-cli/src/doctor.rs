@@ -1,6 +1,6 @@
 //! `posegate doctor`: draws what a site's cameras see, and reports likely mistakes.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, site};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, site};
 use posegate_host::doctor::{Findings, Look, TagFinding, Warning, examine};
 use posegate_host::draw::{MinSlack, site_pictures};
 use posegate_host::files::{Files, Input, OutputFolder};

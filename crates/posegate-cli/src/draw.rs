@@ -1,6 +1,6 @@
 //! `posegate draw`: draws pictures of a task.
 
-use crate::door::{Failure, Outcome, answer, site};
+use crate::site_input::{Failure, Outcome, answer, site};
 use posegate_host::draw::{DrawError, Subject, task_image, task_plan, task_sections};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::log::{Columns, estimates};

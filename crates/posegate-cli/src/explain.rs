@@ -1,6 +1,6 @@
 //! `posegate explain`: explains what a reason means and what to do about it.
 
-use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Reason;
 use posegate_host::site::similar;
 use serde_json::json;

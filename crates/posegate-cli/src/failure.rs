@@ -8,6 +8,7 @@ use posegate_host::files::{FileError, Input};
 use posegate_host::printable::{printable, printable_lines};
 use posegate_host::site::SiteError;
 use std::fmt;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Bytes of a message that are printed.
@@ -27,6 +28,12 @@ pub type Outcome = Result<ExitCode, Failure>;
 /// Returns the exit code of an answer: 0 for yes, 1 for no.
 pub fn answer(yes: bool) -> ExitCode {
     ExitCode::from(u8::from(!yes))
+}
+
+/// Prints text and a line end on stderr. The caller must escape text from files. A failed write is ignored: there is nowhere
+/// to report it.
+pub fn to_stderr(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 impl Failure {
@@ -138,7 +145,7 @@ impl Failure {
     /// Prints the failure and returns its exit code.
     pub fn report(self) -> ExitCode {
         if let Some(shown) = self.shown {
-            crate::terminal::to_stderr(&format!("{:?}", miette::Report::new(*shown)));
+            to_stderr(&format!("{:?}", miette::Report::new(*shown)));
         }
         ExitCode::from(self.code)
     }

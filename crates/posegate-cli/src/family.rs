@@ -1,6 +1,6 @@
 //! `posegate family`: shows how S_l(r) grows with r.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, progress, site};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site};
 use posegate::bake::{self, BakeInput};
 use posegate::verify::family;
 use posegate_host::files::{Files, Input};

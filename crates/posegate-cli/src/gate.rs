@@ -1,6 +1,6 @@
 //! `posegate gate`: decides on recorded estimates with the code that runs on the controller.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, progress};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
 use posegate::gate::{Reason, Verdict};
 use posegate::motion::MotionBounds;

@@ -1,6 +1,6 @@
 //! `posegate import`: converts a map of tags or docks to tables of a site file.
 
-use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use clap::builder::PossibleValuesParser;
 use posegate::shape::Pose3Deg;
 use posegate_host::files::{Files, Input, Output};

@@ -1,6 +1,6 @@
 //! `posegate init`: writes a sample site file.
 
-use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate_host::files::{Files, Output};
 use posegate_host::site::SAMPLE;
 

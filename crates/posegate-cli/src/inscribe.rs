@@ -1,6 +1,6 @@
 //! `posegate inscribe`: a box inside a success set.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, site, task, warn};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task, warn};
 use posegate_host::files::{Files, Input};
 use posegate_host::inscribe::inscribed_box;
 use serde_json::json;

@@ -1,6 +1,6 @@
 //! `posegate learn`: learns error bounds and inflation factors, and tests outcomes against a claim.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, warn};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, GroupReport, InflationModel, InflationReport,

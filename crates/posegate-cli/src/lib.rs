@@ -21,7 +21,6 @@ mod cost;
 mod cover;
 mod demo;
 mod doctor;
-mod door;
 mod draw;
 mod explain;
 mod failure;
@@ -41,6 +40,7 @@ mod report;
 mod seal;
 mod sheet;
 mod site;
+mod site_input;
 mod table;
 mod terminal;
 

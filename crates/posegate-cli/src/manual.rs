@@ -1,6 +1,6 @@
 //! `posegate man`: writes manual pages.
 
-use crate::door::{Failure, Outcome, answer, print};
+use crate::site_input::{Failure, Outcome, answer, print};
 use posegate_host::files::{Files, OutputFolder};
 
 /// Writes manual pages, one for each command

@@ -1,6 +1,6 @@
 //! `posegate metrics`: compares an estimated trajectory with a reference.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, site, task};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
 use posegate_host::files::{Files, Input};
 use posegate_host::log::metrics::{
     self, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,

@@ -1,8 +1,8 @@
 //! `posegate place`: finds the best place of a task's tag.
 
 use crate::belief::{UncertaintyArgs, Weights};
-use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use crate::sheet;
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use posegate::shape::{Family, Tag, Tolerance};
 use posegate_host::doctor::stated_error;
 use posegate_host::draw::{Column, Mounted, MountingSheet, placement_picture};

@@ -1,7 +1,7 @@
 //! `posegate plan`: finds the chain of looks and drives after which a work task is certain to succeed.
 
 use crate::chain::{failure, sentences};
-use crate::door::{Failure, Outcome, answer, print, print_json, relied_on, warn};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on, warn};
 use posegate_host::draw::{chain_picture, success_of};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::{Options, PlanError, Status, crossing_notes, plan_near};
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         ));
     }
     let site = relied_on(files, &arguments.site)?;
-    let task = crate::door::task(&site, &arguments.to)?;
+    let task = crate::site_input::task(&site, &arguments.to)?;
     let from = arguments.from.as_ref().or(task.from.as_ref());
     let from = from.ok_or_else(|| {
         Failure::usage(

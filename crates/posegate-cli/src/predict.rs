@@ -1,7 +1,7 @@
 //! `posegate predict`: evaluates a learnt model.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, warn};
 use crate::learn::refused;
+use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{ErrorModel, InflationModel, Model, conditions, places};
 use serde_json::{Value, json};

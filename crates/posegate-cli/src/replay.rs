@@ -13,7 +13,7 @@ use self::inflation::Inflated;
 use self::input::Recorded;
 use self::outputs::Outputs;
 use self::words::{check_requested, no_estimates, recording, sentences};
-use crate::door::{Failure, Outcome, answer, print_json, progress, site, task, warn};
+use crate::site_input::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::set::CrossTerms;
@@ -26,17 +26,7 @@ use posegate_host::site::{Site, Task};
 use serde_json::{Map, Value, json};
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
-    let on_stdout = [&arguments.rows, &arguments.output]
-        .into_iter()
-        .filter(|output| output.as_ref().is_some_and(Output::is_standard));
-    if on_stdout.count() + usize::from(arguments.json) > 1
-        || arguments.mcap.as_ref().is_some_and(Output::is_standard)
-    {
-        return Err(Failure::usage(
-            "standard output cannot hold more than one result, and no MCAP".into(),
-            "write the others to files",
-        ));
-    }
+    check_outputs(arguments)?;
     let site = site(files, &arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
     let table = table(arguments, files, &site, chosen)?;
@@ -50,32 +40,19 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let trust = arguments.trust(inflated.factors.inflation);
     // A fix that is carried along an odometry has the trust applied already.
     let carried = odometry.is_some();
-    let source = Source::new(
+    let mut source = Source::new(
         &arguments.frame,
         1.0,
         CrossTerms::Filled,
         arguments.motion()?,
-    );
-    let mut source = source.map_err(parameter)?;
+    )
+    .map_err(parameter)?;
     if !carried {
         source.trust = trust;
         source.aging = inflated.factors.aging;
     }
     let sources = vec![source; arguments.topic.len().max(1)];
-    let settings = Settings {
-        task: &arguments.task,
-        site_digest: site.digest,
-        sources: &sources,
-        maximum_age_ms: arguments.max_age_ms,
-        response_ms: arguments.response_ms,
-        report_period_ms: 1,
-        permit_hold_ms: arguments.permit_hold_ms,
-        inhibit_hold_ms: arguments.inhibit_hold_ms,
-        permits_in_a_row: arguments.permits_in_a_row,
-        restart: Restart::Automatic,
-        most_runs: 1_000,
-        look_at: None,
-    };
+    let settings = settings(arguments, &site, &sources);
     let setup = ReplayConfig {
         table: &table,
         settings: &settings,
@@ -119,22 +96,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             input.name
         ));
     }
-    let mut summary = replay.summary();
-    summary["task"] = json!(arguments.task);
-    if arguments.inflation_model.is_some() {
-        summary["inflation"] = inflated.to_json();
-    }
-    summary["recording"] = recording(&input);
-    if let Some(looks) = &input.part.looks
-        && has_detections(&input)
-    {
-        let counts = looks.counts().into_iter();
-        let counts: Map<String, Value> = counts
-            .map(|(name, count)| (name.into(), json!(count)))
-            .collect();
-        summary["looks"] = Value::Object(counts);
-        summary["looks"]["frame"] = json!(looks.frame());
-    }
+    let summary = summary(arguments, &input, &inflated, &replay);
     outputs.finish(&summary)?;
     if let Some(output) = &arguments.output {
         let title = format!(
@@ -146,10 +108,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     if arguments.json {
         print_json(&summary)?;
-    } else if ![&arguments.rows, &arguments.output]
-        .into_iter()
-        .any(|output| output.as_ref().is_some_and(Output::is_standard))
-    {
+    } else if results_on_stdout(arguments) == 0 {
         sentences(arguments, &replay, &summary, [permits, estimates])?;
     }
     let [(_, verdicts), (_, permissions), ..] = replay.tallies();
@@ -158,6 +117,69 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             && permissions.false_permits == 0
             && replay.open_moments().outside == 0,
     ))
+}
+
+/// Returns how many of the results that are files go to standard output.
+fn results_on_stdout(arguments: &Arguments) -> usize {
+    let outputs = [&arguments.rows, &arguments.output].into_iter().flatten();
+    outputs.filter(|output| output.is_standard()).count()
+}
+
+/// Refuses more than one result on standard output.
+fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
+    if results_on_stdout(arguments) + usize::from(arguments.json) > 1
+        || arguments.mcap.as_ref().is_some_and(Output::is_standard)
+    {
+        return Err(Failure::usage(
+            "standard output cannot hold more than one result, and no MCAP".into(),
+            "write the others to files",
+        ));
+    }
+    Ok(())
+}
+
+/// Returns the settings of the gate.
+fn settings<'a>(arguments: &'a Arguments, site: &Site, sources: &'a [Source]) -> Settings<'a> {
+    Settings {
+        task: &arguments.task,
+        site_digest: site.digest,
+        sources,
+        maximum_age_ms: arguments.max_age_ms,
+        response_ms: arguments.response_ms,
+        report_period_ms: 1,
+        permit_hold_ms: arguments.permit_hold_ms,
+        inhibit_hold_ms: arguments.inhibit_hold_ms,
+        permits_in_a_row: arguments.permits_in_a_row,
+        restart: Restart::Automatic,
+        most_runs: 1_000,
+        look_at: None,
+    }
+}
+
+/// Returns the results as JSON.
+fn summary(
+    arguments: &Arguments,
+    input: &Recorded,
+    inflated: &Inflated,
+    replay: &Replay<'_>,
+) -> Value {
+    let mut summary = replay.summary();
+    summary["task"] = json!(arguments.task);
+    if arguments.inflation_model.is_some() {
+        summary["inflation"] = inflated.to_json();
+    }
+    summary["recording"] = recording(input);
+    if let Some(looks) = &input.part.looks
+        && has_detections(input)
+    {
+        let counts = looks.counts().into_iter();
+        let counts: Map<String, Value> = counts
+            .map(|(name, count)| (name.into(), json!(count)))
+            .collect();
+        summary["looks"] = Value::Object(counts);
+        summary["looks"]["frame"] = json!(looks.frame());
+    }
+    summary
 }
 
 fn name_of(path: &std::path::Path) -> String {

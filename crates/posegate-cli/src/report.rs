@@ -1,6 +1,6 @@
 //! `posegate report`: writes a site as one HTML page.
 
-use crate::door::{Failure, Outcome, answer, progress, site, warn};
+use crate::site_input::{Failure, Outcome, answer, progress, site, warn};
 use posegate_host::files::{Files, Input, NamedInput, Output};
 use posegate_host::page::{Contents, PageInput, page};
 use serde_json::Value;

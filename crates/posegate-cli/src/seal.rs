@@ -1,6 +1,6 @@
 //! `posegate seal`: writes a checksum of a firmware's code into the firmware.
 
-use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Seal;
 use posegate::seal::seal;
 use posegate_host::files::{Files, Input, Output};

@@ -1,6 +1,6 @@
 //! Writes mounting sheets.
 
-use crate::door::Failure;
+use crate::site_input::Failure;
 use posegate_host::draw::{MountingSheet, mounting_sheet, mounting_sheet_html};
 use posegate_host::files::{Files, Output};
 

@@ -1,6 +1,6 @@
 //! `posegate site`: all tables, proofs and plans of a site, in shards.
 
-use crate::door::{
+use crate::site_input::{
     Failure, Outcome, answer, print, print_json, progress_with_rate, register, site,
 };
 use posegate_host::files::{Files, Input, OutputFolder};

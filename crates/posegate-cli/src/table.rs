@@ -1,7 +1,7 @@
 //! `posegate table`: builds, shows, proves and exports tables.
 
-use crate::door::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use crate::gate::not_a_table;
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use posegate::bake::{self, BakeError, BakeInput, Language, Layout, source};
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
 use posegate::verify::{
@@ -118,21 +118,7 @@ pub fn run(command: &Command, files: &Files) -> Outcome {
 }
 
 fn build(arguments: &Build, files: &Files) -> Outcome {
-    if arguments.json
-        && !arguments.dry_run
-        && arguments.output.as_ref().is_some_and(Output::is_standard)
-    {
-        return Err(Failure::usage(
-            "standard output cannot hold both the table and the JSON".into(),
-            "write the table to a file, or leave out --json",
-        ));
-    }
-    if arguments.threads == Some(0) {
-        return Err(Failure::usage(
-            "--threads 0 does no work".into(),
-            "give 1 or more, or leave it out",
-        ));
-    }
+    arguments.check()?;
     let site = site(files, &arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
     let mut spec = spec(&site, chosen, &arguments.site, &arguments.task)?;
@@ -144,17 +130,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
             LayoutName::Auto => Layout::Auto,
         };
     }
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()
-            .map_err(|error| {
-                Failure::usage(
-                    format!("--threads {threads}: {error}"),
-                    "give a small number of threads",
-                )
-            })?;
-    }
+    arguments.start_threads()?;
     let order = BakeInput {
         task: &arguments.task,
         success: &chosen.success,
@@ -184,32 +160,26 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         files.write(output, &bytes)?;
     }
     let table = Table::parse(&bytes).map_err(|error| Failure::internal(error.to_string()))?;
+    let file = arguments
+        .output
+        .as_ref()
+        .filter(|_| !arguments.dry_run)
+        .map(|output| output.display().to_string());
     if arguments.json {
         let mut facts = facts(&table);
-        facts["file"] = match &arguments.output {
-            Some(output) if !arguments.dry_run => json!(output.display().to_string()),
-            _ => Value::Null,
-        };
+        facts["file"] = json!(file);
         facts["proven"] = of_proof(proof);
         facts["build_s"] = json!(seconds);
         let volume = volume(&table, &chosen.success);
         facts["volume_m2_rad"] = json!({"cells": volume.cells, "facets": volume.facets});
         print_json(&facts)?;
     } else if arguments.dry_run || !arguments.output.as_ref().is_some_and(Output::is_standard) {
-        let [x, y, yaw] = [spec.extent.x, spec.extent.y, spec.extent.yaw_deg];
-        let cells = table.cells();
         if arguments.dry_run {
-            print(&format_args!(
-                "extent x {:.2} to {:.2} m, y {:.2} to {:.2} m, yaw {:.1} to {:.1} deg: {} x {} x {} cells",
-                x[0], x[1], y[0], y[1], yaw[0], yaw[1], cells.columns, cells.rows, cells.slabs
-            ))?;
+            print_extent(&spec, &table)?;
         }
-        let name = match &arguments.output {
-            Some(output) if !arguments.dry_run => output.display().to_string(),
-            _ => "not written".into(),
-        };
         print(&format_args!(
-            "{name}: {} bytes, proven inside: {} (built in {:.0} ms)",
+            "{}: {} bytes, proven inside: {} (built in {:.0} ms)",
+            file.unwrap_or_else(|| "not written".into()),
             bytes.len(),
             proof_text(proof),
             seconds * 1e3,
@@ -222,6 +192,52 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         ))?;
     }
     Ok(answer(true))
+}
+
+impl Build {
+    /// Refuses arguments that contradict each other.
+    fn check(&self) -> Result<(), Failure> {
+        let on_stdout = self.output.as_ref().is_some_and(Output::is_standard);
+        if self.json && !self.dry_run && on_stdout {
+            return Err(Failure::usage(
+                "standard output cannot hold both the table and the JSON".into(),
+                "write the table to a file, or leave out --json",
+            ));
+        }
+        if self.threads == Some(0) {
+            return Err(Failure::usage(
+                "--threads 0 does no work".into(),
+                "give 1 or more, or leave it out",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Starts the number of threads that --threads states.
+    fn start_threads(&self) -> Result<(), Failure> {
+        let Some(threads) = self.threads else {
+            return Ok(());
+        };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|error| {
+                Failure::usage(
+                    format!("--threads {threads}: {error}"),
+                    "give a small number of threads",
+                )
+            })
+    }
+}
+
+/// Prints the extent of a table and the number of its cells.
+fn print_extent(spec: &TableSpec, table: &Table<'_>) -> Result<(), Failure> {
+    let [x, y, yaw] = [spec.extent.x, spec.extent.y, spec.extent.yaw_deg];
+    let cells = table.cells();
+    print(&format_args!(
+        "extent x {:.2} to {:.2} m, y {:.2} to {:.2} m, yaw {:.1} to {:.1} deg: {} x {} x {} cells",
+        x[0], x[1], y[0], y[1], yaw[0], yaw[1], cells.columns, cells.rows, cells.slabs
+    ))
 }
 
 /// Returns what the table of a task covers.

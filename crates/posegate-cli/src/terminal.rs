@@ -1,12 +1,11 @@
 //! Prints answers on stdout, progress and warnings on stderr. Text from files is escaped. A failed write to stdout is an error.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, to_stderr};
 use indicatif::{ProgressBar, ProgressStyle};
 use posegate_host::files;
 use posegate_host::printable::{printable_json, printable_lines};
 use serde_json::Value;
 use std::fmt::Display;
-use std::io::Write;
 
 /// Prints a line of text on stdout. The caller must escape names that may contain line ends.
 pub fn print(line: &impl Display) -> Result<(), Failure> {
@@ -27,12 +26,6 @@ pub fn json_line(value: &Value) -> String {
 /// Prints a warning on stderr.
 pub fn warn(line: &impl Display) {
     to_stderr(&printable_lines(&line.to_string()));
-}
-
-/// Prints text and a line end on stderr. The caller must escape text from files. A failed write is ignored: there is nowhere
-/// to report it.
-pub fn to_stderr(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Returns a progress bar on stderr. It is hidden if stderr is not a terminal.

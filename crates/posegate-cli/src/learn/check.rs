@@ -1,7 +1,7 @@
 //! `posegate learn check`: tests whether a learnt model still holds on new data.
 
 use super::{refused, warn_of_cut_runs};
-use crate::door::{Failure, Outcome, answer, print, print_json};
+use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{
     BoundCheck, Change, CheckReport, CheckSettings, Detections, Model, RegionCheck, check_bounds,

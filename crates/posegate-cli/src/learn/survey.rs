@@ -1,7 +1,7 @@
 //! `posegate learn survey`: finds docks and tags that are not where the site file places them.
 
 use super::refused;
-use crate::door::{Outcome, answer, print, print_json, site};
+use crate::site_input::{Outcome, answer, print, print_json, site};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{OffsetReport, Surveyed, SurveyedSite, looks, survey};
 use serde_json::{Value, json};
@@ -96,7 +96,7 @@ fn sentence(report: &OffsetReport) -> String {
     )
 }
 
-fn print_reports(found: &[OffsetReport]) -> Result<(), crate::door::Failure> {
+fn print_reports(found: &[OffsetReport]) -> Result<(), crate::site_input::Failure> {
     for report in found {
         let name = named(report.kind, &report.name);
         let (Some(offset), Some(region)) = (report.offset, report.region) else {

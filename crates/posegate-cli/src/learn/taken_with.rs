@@ -1,6 +1,6 @@
 //! What the detections of `posegate learn bounds` were taken with.
 
-use crate::door::{Failure, site};
+use crate::site_input::{Failure, site};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::TakenWith;
 use posegate_host::site::Site;

@@ -1,7 +1,7 @@
 //! The arguments of `posegate replay`.
 
-use crate::door::Failure;
 use crate::gate::motion;
+use crate::site_input::Failure;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate_host::files::{Input, Output};

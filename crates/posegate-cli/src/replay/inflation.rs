@@ -2,8 +2,8 @@
 
 use super::arguments::{Arguments, Kind};
 use super::parameter;
-use crate::door::{Failure, warn};
 use crate::learn::{refused, young_age_warning};
+use crate::site_input::{Failure, warn};
 use posegate::confidence::radius_squared;
 use posegate::gate::InvalidParameter;
 use posegate::set::{Aging, Inflation, RadiusSquared};

@@ -3,12 +3,11 @@
 use super::Arguments;
 use super::arguments::Kind;
 use super::inflation::Inflated;
-use super::words::topics;
-use crate::door::Failure;
+use crate::site_input::Failure;
 use posegate_host::files::{FileError, Files, Input, Opened};
 use posegate_host::log::corners::MountedCamera;
 use posegate_host::log::recording::{
-    Bag, Format, Recording, Role, TagLocalizer, Text, Wanted, format_of,
+    Bag, Format, ReaderDiagnostics, Recording, Role, TagLocalizer, Text, Wanted, format_of,
 };
 use posegate_host::log::replay::{Clock, Part};
 use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, tum};
@@ -135,6 +134,19 @@ fn open(files: &Files, input: &Input) -> Result<Opened, Failure> {
         ));
     }
     Ok(files.open(input)?)
+}
+
+/// Lists the topics that are not read, one line each.
+pub fn topics(diagnostics: &ReaderDiagnostics) -> String {
+    let lines = diagnostics.skipped.iter().map(|(topic, skipped)| {
+        format!(
+            "\n  {} ({}, {} messages)",
+            printable(topic),
+            printable(&skipped.schema),
+            skipped.messages
+        )
+    });
+    lines.collect()
 }
 
 /// Returns the failure for a bag without --topic, with the bag's topics.

@@ -1,7 +1,7 @@
 //! The odometry of a replay: a topic of the recording, or a file.
 
 use super::Arguments;
-use crate::door::Failure;
+use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
 use posegate_host::files::{Files, Input};

@@ -1,7 +1,7 @@
 //! The files that a replay writes while it reads the recording.
 
 use super::Arguments;
-use crate::door::{Failure, json_line};
+use crate::site_input::{Failure, json_line};
 use posegate_host::files::{Draft, Files, unprinted};
 use posegate_host::log::replay::{Channels, Row};
 use serde_json::Value;

@@ -1,9 +1,9 @@
 //! The texts that report a replay.
 
 use super::Arguments;
-use super::input::Recorded;
+use super::input::{Recorded, topics};
 use super::odometry::no_edge;
-use crate::door::{Failure, print};
+use crate::site_input::{Failure, print};
 use posegate::gate::Reason;
 use posegate_host::log::Trajectory;
 use posegate_host::log::recording::{ReaderDiagnostics, SkipReason};
@@ -314,17 +314,4 @@ fn interlock(times: &Value) -> Result<(), Failure> {
         print(&format_args!("interlock never open: {why}"))?;
     }
     Ok(())
-}
-
-/// Lists the topics that are not read, one line each.
-pub fn topics(diagnostics: &ReaderDiagnostics) -> String {
-    let lines = diagnostics.skipped.iter().map(|(topic, skipped)| {
-        format!(
-            "\n  {} ({}, {} messages)",
-            printable(topic),
-            printable(&skipped.schema),
-            skipped.messages
-        )
-    });
-    lines.collect()
 }
