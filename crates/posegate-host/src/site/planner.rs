@@ -78,8 +78,8 @@ pub(super) fn planner(
     if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
         let errors = table.required(&keys::PLANNER_R)?;
         planner.looks = looks(&look, &errors, names, true)?;
-        let hung = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
-        let tags: BTreeMap<String, SiteTag> = candidates.iter().map(hung).collect();
+        let mounted = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
+        let tags: BTreeMap<String, SiteTag> = candidates.iter().map(mounted).collect();
         planner.offers = looks(
             &look,
             &errors,
@@ -94,8 +94,8 @@ pub(super) fn planner(
 }
 
 /// Makes one localization task per tag and error bound. Bounds that only the tolerances of tag and camera make
-/// impossible are skipped. If that skips all bounds of a tag, the result is an error for an existing tag (`are_there`);
-/// a candidate just gets no look.
+/// impossible are skipped. If all bounds are skipped, an existing tag (`are_there`) gives an error, and a candidate
+/// gets no look.
 fn looks(
     look: &Node<'_>,
     errors: &Node<'_>,
@@ -176,7 +176,7 @@ fn looks(
             let set = root.required(&keys::SUCCESS).map_err(wrong)?;
             let shape = match made(&set, names, of).map_err(wrong)? {
                 Made::Set(shape) => *shape,
-                // The tag's tolerance may allow another one of the errors.
+                // With the tag's tolerance another error may be possible.
                 Made::NotWithTolerance(fault) => {
                     too_poor.get_or_insert(wrong(fault));
                     continue;

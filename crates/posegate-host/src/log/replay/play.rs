@@ -1,4 +1,4 @@
-//! Plays a recording: one thread reads, the others judge.
+//! Plays a recording: one thread reads, the others evaluate.
 
 use super::{Replay, Row};
 use crate::log::recording::{Item, Recording, RecordingError, Sample, TagLocalizer, TruePose};
