@@ -132,8 +132,8 @@ fn changed_facets_are_not_proven() {
     }
 }
 
-/// Checking the ends of an arc is not a proof: a vertex that crosses a wall between the ends is
-/// inside at both. Here it crosses by a tenth of a millimetre.
+/// Checking the ends of an arc is not a proof: a vertex that crosses a wall between the ends is inside at both ends.
+/// Here it crosses by a tenth of a millimetre.
 #[test]
 fn a_border_that_is_crossed_between_the_ends_is_noticed() {
     let reach = 0.75;
@@ -213,7 +213,8 @@ fn square(half: f64) -> Vec<[f64; 2]> {
     vec![[half, half], [-half, half], [-half, -half], [half, -half]]
 }
 
-/// A set of two pieces: a pose-set is inside if one piece contains it, or both together, and not if a gap between them cuts it.
+/// A set of two pieces: a pose-set is inside if one piece contains it, or both together, and not if it intersects a
+/// gap between them.
 #[test]
 fn pieces_hold_a_set_together_unless_it_meets_a_gap() {
     let site = sample();

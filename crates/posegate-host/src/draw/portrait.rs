@@ -168,7 +168,7 @@ fn one(picture: &mut Picture, left: f64, side: &Side, body: &Body) {
     let at = |p: [f64; 3]| {
         let offset = [p[0] - centre[0], p[1] - centre[1], p[2]];
         if is_relative {
-            [dot(way, side.right), dot(way, side.up)]
+            [dot(offset, side.right), dot(offset, side.up)]
         } else {
             [p[0], p[1]]
         }

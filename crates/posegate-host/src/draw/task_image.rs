@@ -332,7 +332,10 @@ fn numbered(frame: &Frame, quad: &[[f64; 2]], picture: &mut Picture) {
         let direction = [corner[0] - middle[0], corner[1] - middle[1]];
         let length = libm::hypot(direction[0], direction[1]).max(1e-9);
         let [x, y] = frame.at(*corner);
-        let at = [x + 9.0 * direction[0] / length, y + 9.0 * direction[1] / length + 4.0];
+        let at = [
+            x + 9.0 * direction[0] / length,
+            y + 9.0 * direction[1] / length + 4.0,
+        ];
         picture.circle([x, y], 2.4, &Style::filled(palette::INK));
         let font = Font::new(11.0, palette::INK).bold();
         picture.text(at, &format!("{index}"), &font.anchored(Anchor::Middle));

@@ -143,7 +143,7 @@ pub fn learn_bounds(
     };
     let mut learnt = Calibration::new(&cells, settings, &places, runs.is_some());
     learnt.run(&fitted, &calibrated, &[translation, yaw], effect);
-    if !learnt.says_something() {
+    if !learnt.has_bounds() {
         let error = too_few((seen.len() as f64 / effect) as u64);
         return Err(match error {
             LearnError::TooFew { found, needed, .. } if found >= needed => LearnError::Nowhere {

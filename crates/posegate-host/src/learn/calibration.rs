@@ -12,7 +12,7 @@ use super::smooth::Lattice;
 use super::split::FITTED;
 use std::collections::BTreeSet;
 
-/// The needed number of scores in a region is `SCORES` Q / (1 - Q): more make a bound tighter, fewer make it more
+/// The intended number of scores in a region is `SCORES` Q / (1 - Q): more make a bound tighter, fewer make it more
 /// local. `ENOUGH` is enough for any Q, unless it is below `HARDLY` Q / (1 - Q).
 const SCORES: f64 = 30.0;
 const ENOUGH: f64 = 900.0;
@@ -110,7 +110,7 @@ impl<'a> Calibration<'a> {
         self.effect
     }
 
-    /// Returns `true` if any region has enough detections.
+    /// Returns `true` if any region has enough detections for a bound.
     pub(super) fn has_bounds(&self) -> bool {
         self.of_cell.iter().any(|cell| cell.region.is_some())
     }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// The settings of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckSettings {
-    /// A model that holds is ever contradicted with a probability of at most 1 - `confidence`, whatever the number of rows;
+    /// The probability that a valid model is ever contradicted is at most 1 - `confidence`, for any number of rows;
     /// above 0 and below 1.
     pub confidence: f64,
 }
@@ -115,7 +115,7 @@ pub struct CheckReport {
 const STAKES: [f64; 9] = [0.004, 0.01, 0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 0.85];
 /// The stake of the sum whose minimum dates a change.
 const DATED: f64 = 0.35;
-/// The share of the false alarms that is for detection: one half for the limits of the shares, one for the bet.
+/// The share of the false alarms for detection: one half for the limits of the shares, one half for the bet.
 const FOR_DETECTION: f64 = 0.25;
 /// The share of the bounds' false alarms for all regions together.
 const FOR_OVERALL: f64 = 0.5;

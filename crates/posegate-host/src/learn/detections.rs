@@ -22,10 +22,10 @@ const PLACE: [&str; 3] = ["d_m", "phi_deg", "psi_deg"];
 /// One view of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// d in metres, above 0; phi and psi in degrees, 0 to 180: computed from the truth.
+    /// d in metres, above 0; phi and psi in degrees, 0 to 180; computed from the truth.
     pub at: [f64; 3],
     /// The magnitudes of the errors of the position, metres, and of the yaw, radians; `None` if the tag was
-    /// not detected. Of two poses, those of the pose whose yaw errs less.
+    /// not detected. If the detector gave two poses: those of the pose with the smaller yaw error.
     pub errors: Option<[f64; 2]>,
 }
 

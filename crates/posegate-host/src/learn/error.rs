@@ -73,7 +73,7 @@ pub enum LearnError {
         why: String,
     },
     /// A setting that is not in (0, 1).
-    #[error("{name} {value} is not a share; expected a number above 0 and below 1")]
+    #[error("{name} {value} is no share; expected a number above 0 and below 1")]
     Share {
         /// The setting's name.
         name: &'static str,

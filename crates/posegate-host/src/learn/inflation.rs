@@ -5,7 +5,7 @@ use super::binomial::{conformal_rank, order_statistic, rank};
 use super::detections::hexadecimal;
 use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
-use super::groups::{self, GroupReport, for_a_new_one, own_factor};
+use super::groups::{self, GroupReport, for_a_new_group, own_factor};
 use super::student::normal_quantile;
 use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
@@ -155,7 +155,7 @@ pub fn learn_inflation(
     let overall = of(first, last);
     if grouped {
         let factors = scored.own_factors([first, last]);
-        if for_a_new_one(&factors, confidence).is_none() {
+        if for_a_new_group(&factors, confidence).is_none() {
             return Err(LearnError::TooFewGroups {
                 found: factors.iter().filter(|factor| factor.is_finite()).count() as u64,
                 of: estimates.grouped_by,
@@ -289,7 +289,7 @@ impl Scores<'_> {
         let at = |k: Option<u64>| k.and_then(|k| order_statistic(&factors, k));
         // A new group needs the factor of the groups, and at least the factor of all data together.
         let needed_factor = if self.groups > 0 {
-            for_a_new_one(&self.own_factors([from, to]), confidence)
+            for_a_new_group(&self.own_factors([from, to]), confidence)
                 .map(|factor| factor.max(at(upper).unwrap_or(0.0)))
         } else {
             at(upper)
@@ -364,7 +364,7 @@ impl Scores<'_> {
                     .map(|group| {
                         let mut others = factors.clone();
                         others.remove(group);
-                        for_a_new_one(&others, self.confidence).map(|factor| factor.max(1.0))
+                        for_a_new_group(&others, self.confidence).map(|factor| factor.max(1.0))
                     })
                     .collect()
             })

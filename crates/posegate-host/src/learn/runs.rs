@@ -12,7 +12,7 @@ pub enum RunSource {
     /// The rows are taken as independent of each other.
     #[default]
     Independent,
-    /// The column `run` names the run of each row.
+    /// The column `run` states the run of each row.
     Column,
     /// The rows follow each other at video rate: a new run starts after a gap in `t_s`.
     Gaps {

@@ -59,7 +59,7 @@ pub struct OffsetReport {
     /// The true place minus that of the site file: x, y (m, world axes), yaw (rad). `None` if there are too few dockings.
     pub offset: Option<[f64; 3]>,
     /// Half the extent of the confidence region of the offset along each of x, y and yaw. `None` if there are too few dockings, or if their
-    /// offsets do not scatter in x, y and yaw, each by itself: such numbers are no measurements, and the offset is not tested.
+    /// offsets do not scatter independently in x, y and yaw: such numbers are not measurements, and the offset is not tested.
     pub region: Option<[f64; 3]>,
     /// Hotelling's statistic of the offset over the limit beyond which it is significant; above 1 if it is.
     pub significance: f64,

@@ -12,7 +12,7 @@ use posegate::shape::{Headed, LineSegment};
 /// two rays.
 const BEYOND: f64 = 1.05;
 
-/// Directions tried from a tag, in addition to those in which it is seen best, if the disc's centre is outside
+/// Directions tried from a tag, in addition to those in which it is seen best. Used if the disc's centre is outside
 /// the set.
 const FAN: u32 = 32;
 
@@ -57,7 +57,7 @@ impl<'a> Disc<'a> {
     fn ray(&self, angle: f64) -> Ray {
         let walk = LineSegment {
             from: self.middle,
-            way: self.white.way([libm::cos(angle), libm::sin(angle)]),
+            way: self.white.to_metres([libm::cos(angle), libm::sin(angle)]),
             length: BEYOND * self.radius,
         };
         Ray::cast(self.headed, self.views, walk, self.radius)
@@ -78,17 +78,17 @@ impl<'a> Disc<'a> {
         let corners = self.corners(aim);
         let scale = known.seen.value;
         let rule = Cell::new(Rule::By7);
-        // A panel's ends are positions: the index of the corner before, plus a fraction of the way to the next
+        // A panel's ends are positions: the index of the previous corner, plus a fraction of the path to the next
         // corner.
         let take = |from: f64, to: f64| {
             let corner = libm::floor(from);
             let (low, high) = (corners[corner as usize], corners[corner as usize + 1]);
-            let (width, whole) = (high - low, corners.len() == 2);
+            let (width, is_full_turn) = (high - low, corners.len() == 2);
             let mut relative = None;
             panel(from, to, Smooth::Surely, |place| {
                 let s = place - corner;
                 // The slope is zero at corners, where a ray may touch a border.
-                let (share, slope) = if whole {
+                let (share, slope) = if is_full_turn {
                     (s, 1.0)
                 } else {
                     (s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s))
@@ -210,8 +210,8 @@ impl<'a> Disc<'a> {
         }
     }
 
-    /// Returns directions in which a border enters the disc between two evaluated angles, although at these
-    /// angles it is just outside the disc.
+    /// Returns directions in which a border enters the disc between two evaluated angles, but is just outside the
+    /// disc at these angles.
     fn nearly(&self, looked: &[Looked]) -> Vec<f64> {
         let mut seeds = Vec::new();
         let count = looked.len();
@@ -249,8 +249,8 @@ impl<'a> Disc<'a> {
         seeds
     }
 
-    /// Returns the directions from the disc's centre to the parts of the set that lie on lines from each tag.
-    /// Seen from outside, a set may be narrow.
+    /// Returns the directions from the disc's centre to the parts of the set that are on lines from each tag. From
+    /// outside, the set may be narrow.
     fn toward_the_set(&self) -> Vec<f64> {
         let mut seeds = Vec::new();
         for view in 0..self.views {

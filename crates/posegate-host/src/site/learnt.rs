@@ -106,19 +106,23 @@ pub(super) fn set(
 }
 
 /// Returns the error for a set in which no view is accurate enough.
-fn too_inaccurate(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]) -> SiteError {
+fn too_inaccurate(
+    limit: &Node<'_>,
+    view: &Visibility,
+    [translation, yaw_deg]: [f64; 2],
+) -> SiteError {
     let within = format!("within {translation} m and {yaw_deg} deg");
     if view.is_exact() {
         return limit
             .error(format!(
-                "too_inaccurate in the set are both bounds of the error model {within}"
+                "nowhere in the set are both bounds of the error model {within}"
             ))
             .help("allow a larger error, or learn from more detections at the task's views");
     }
     let [near, far] = [view.z_near, view.d_max].map(|d| view.tolerance_error(d));
     limit
         .error(format!(
-            "too_inaccurate in the set are both bounds of the error model {within}, with the error from the tolerances of tag and camera added: \
+            "nowhere in the set are both bounds of the error model {within}, with the error from the tolerances of tag and camera added: \
              {:.3} to {:.3} m, and {} deg",
             near[0], far[0], far[1] as f32
         ))

@@ -78,7 +78,8 @@ pub(super) fn planner(
     if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
         let errors = table.required(&keys::PLANNER_R)?;
         planner.looks = looks(&look, &errors, names, true)?;
-        let mounted = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
+        let mounted =
+            |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
         let tags: BTreeMap<String, SiteTag> = candidates.iter().map(mounted).collect();
         planner.offers = looks(
             &look,

@@ -153,7 +153,10 @@ fn covariance_equals_that_of_simulated_noise() {
         }
         for (r, c) in [(0, 1), (0, 2), (1, 2)] {
             let size = libm::sqrt(reported[(r, r)] * reported[(c, c)]);
-            assert!((sum[(r, c)] - reported[(r, c)]).abs() < 0.09 * size, "{r} {c}");
+            assert!(
+                (sum[(r, c)] - reported[(r, c)]).abs() < 0.09 * size,
+                "{r} {c}"
+            );
         }
         // Its standard deviation is sqrt(6 / 4,000).
         let mean = nees / f64::from(rounds);

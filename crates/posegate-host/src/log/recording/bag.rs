@@ -1,7 +1,7 @@
 //! ROS 2 bags in MCAP, read from start to end. No index is needed, and memory does not grow with the file.
 
-use super::message::{Content, Kind, Message, decoded};
 use super::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
+use super::message::{Content, Kind, Message, decoded};
 use super::transforms::{Composer, FrameNames, Pose, Transform};
 use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
 use crate::log::mcap::chunk::{self, Budget, LARGEST};
@@ -393,7 +393,10 @@ impl Notes {
         };
         let used = match used {
             Ok(used) => {
-                self.diagnostics.read.entry(channel.topic.into()).or_insert(0);
+                self.diagnostics
+                    .read
+                    .entry(channel.topic.into())
+                    .or_insert(0);
                 used
             }
             Err(why) => {

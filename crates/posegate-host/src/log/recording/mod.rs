@@ -22,23 +22,23 @@
 //! ```
 
 pub use self::bag::{Bag, Role, Wanted};
+pub use self::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::findings::Findings;
 pub use self::kind::{Format, format_of};
 pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
 pub use self::text::Text;
-pub use self::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::transforms::FrameNames;
 
 mod bag;
 mod cdr;
+mod diagnostics;
 mod findings;
 mod kind;
 mod layout;
 mod looks;
 mod message;
 mod text;
-mod diagnostics;
 mod transforms;
 
 pub(crate) use self::bag::yaw_of;

@@ -297,7 +297,8 @@ fn site_keys_for_a_calibration_are_checked() {
         assert!(error.message.contains(message), "{keys}: {error}");
     }
     let folding = ROS.replace("-0.22, 0.06", "-0.6, 0.06");
-    let error = site_with(&folding, "calibration = 'front.yaml'\nimage = 'raw'").expect_err("folds");
+    let error =
+        site_with(&folding, "calibration = 'front.yaml'\nimage = 'raw'").expect_err("folds");
     assert!(
         error.message.contains("the distortion folds at "),
         "{error}"

@@ -65,12 +65,13 @@ fn corners_are_in_the_image_within_the_tolerance() {
                 let mut nearest = f64::INFINITY;
                 for (corners, _, _) in sights(&site(&keys, view)) {
                     for ([u, v], direction, by) in corners.iter().flat_map(|corner| {
-                        [-1.0, 1.0]
-                            .into_iter()
-                            .flat_map(move |direction| [-1.0, 1.0].map(move |by| (*corner, direction, by)))
+                        [-1.0, 1.0].into_iter().flat_map(move |direction| {
+                            [-1.0, 1.0].map(move |by| (*corner, direction, by))
+                        })
                     }) {
-                        let off =
-                            |at: f64, axis: f64| at + direction * focal * (at - axis) + by * centre_px;
+                        let off = |at: f64, axis: f64| {
+                            at + direction * focal * (at - axis) + by * centre_px
+                        };
                         let (u, v) = (off(u, 350.0), off(v, 230.0));
                         let within = u.min(640.0 - u).min(v).min(480.0 - v) - kept;
                         nearest = nearest.min(within);
