@@ -75,9 +75,9 @@ fn sets_are_inside_single_runs_and_never_across_a_gap() {
     assert!(!is_inside(&bytes, &disc(-0.5, 0.0, 0.0, 0.31, 2.0)));
 }
 
-/// Every run, every row and every slab is evaluated: if any one cell is removed, a set that covers it is denied.
+/// Every run, every row and every slab is evaluated: if any cell is removed, a set that covers it is denied.
 #[test]
-fn each_missing_cell_denies() {
+fn set_over_any_missing_cell_is_denied() {
     let full = vec![vec![vec![run(0, 19)]; 20]; 4];
     let bytes = table_of(spec([-10.0, 10.0], 5.0), &full);
     let set = disc(0.0, 0.0, 0.0, 0.98, 9.9);

@@ -41,7 +41,7 @@ pub enum Command {
 pub struct Arguments {
     /// The file of the table.
     pub table: PathBuf,
-    /// The digest of the site file, as it was given.
+    /// The digest of the site file, as given.
     pub site_digest: Option<String>,
     /// The site file, for its tags and cameras.
     pub site: Option<PathBuf>,

@@ -43,7 +43,7 @@ pub enum GraphError {
     Environment {
         /// The variable.
         name: &'static str,
-        /// Its value.
+        /// The variable's value.
         given: String,
         /// The expected value.
         expected: &'static str,
@@ -135,7 +135,7 @@ pub struct Graph {
     pub odom: Option<Subscription<Odometry>>,
     /// The fail-safe permit.
     pub permission: Publisher<DiagnosticArray>,
-    /// The permit for eyes.
+    /// The permit for display only.
     pub permit: Publisher<Bool>,
     /// The diagnostics.
     pub diagnostics: Publisher<DiagnosticArray>,
@@ -143,7 +143,7 @@ pub struct Graph {
     pub markers: Publisher<MarkerArray>,
     /// The service that resets the gate.
     pub reset: Server<TriggerRequest, TriggerResponse>,
-    /// The service that says why the gate is closed.
+    /// The service that returns the reason why the gate is closed.
     pub explain: Server<TriggerRequest, TriggerResponse>,
     threads: DdsThreads,
     // Fields are dropped in their order: the node is the last one.

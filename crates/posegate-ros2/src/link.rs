@@ -5,7 +5,7 @@
 //! late, and a controller can restart. Therefore a state counts only if its age has a bound, and the bound is short.
 //! The bound comes from a round trip: telemetry that names one of our reports was made after we sent that report.
 //! Later telemetry is later by the controller's clock, reduced by [`DRIFT_PER_MILLE`]. This lasts for at most
-//! [`LIFE`]: then another round trip is needed. So no delay of the line, however constant, makes an old state look
+//! [`LIFE`]: then another round trip is needed. So no delay of the line, even if constant, makes an old state look
 //! new. If the clock is faster than assumed, a state looks younger by at most what the clock gains in [`LIFE`].
 
 use posegate::gate::State;

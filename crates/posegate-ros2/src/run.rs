@@ -1,6 +1,6 @@
 //! The control loop of the node.
 //!
-//! One thread reads, decides and publishes the heartbeat. A loop that hangs sends no heartbeat, and consumers deny.
+//! One thread reads, decides and publishes the heartbeat. A loop that is blocked sends no heartbeat, and consumers deny.
 
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;

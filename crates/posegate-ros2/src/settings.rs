@@ -27,7 +27,7 @@ pub struct Delivery {
 pub struct Serial {
     /// The device.
     pub path: PathBuf,
-    /// Its speed, bits per second.
+    /// The speed, bits per second.
     pub baud: u32,
     /// A state of the controller counts only if it is certainly younger than this, milliseconds.
     pub link_timeout_ms: u32,
@@ -190,7 +190,7 @@ pub enum SettingsError {
     WrongSite {
         /// The digest of the table.
         found: String,
-        /// The digest that was given.
+        /// The given digest.
         expected: String,
     },
 }

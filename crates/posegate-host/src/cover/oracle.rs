@@ -280,7 +280,7 @@ impl<'a> Oracle<'a> {
                         set.remove(number);
                         out.push(number);
                     }
-                    // `from` alone serves, so there is no such set.
+                    // `from` alone serves the task, so there is no such set.
                     None => return Ok((from, false)),
                 },
             }

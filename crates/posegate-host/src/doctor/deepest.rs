@@ -9,7 +9,7 @@ use crate::site::Task;
 pub struct Deepest {
     /// The pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// Its slack; below 0 if no pose of the set was found.
+    /// The pose's slack; below 0 if no pose of the set was found.
     pub least: MinSlack,
 }
 

@@ -30,7 +30,7 @@ pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
 /// The usual range of tag sizes, metres.
 pub(super) const SIZES: [f64; 2] = [0.02, 2.0];
-/// The sine of 45 degrees: a direction that rises more looks up or down.
+/// The sine of 45 degrees: a direction with a larger elevation looks up or down.
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// A wall that begins higher is above the robot, metres.
 const FLOOR: f64 = 0.05;

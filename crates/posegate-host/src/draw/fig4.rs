@@ -117,7 +117,7 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
     };
     let (start, found): (_, Result<Vec<_>, StudyError>) = rayon::join(
         start,
-        || // One after the other is not fast enough: each is a task of its own.
+        || // In sequence the searches are too slow.
             cases.into_par_iter().with_max_len(1).map(best).collect(),
     );
     let mut columns = std::vec![start?];

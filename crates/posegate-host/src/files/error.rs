@@ -10,7 +10,7 @@ pub enum FileError {
     /// An input cannot be read.
     #[error("{name}: {cause}")]
     Unread {
-        /// Its name.
+        /// The file's name.
         name: String,
         /// The reason.
         cause: io::Error,
@@ -18,7 +18,7 @@ pub enum FileError {
     /// An output cannot be written.
     #[error("{name}: {cause}")]
     Unwritten {
-        /// Its name.
+        /// The file's name.
         name: String,
         /// The reason.
         cause: io::Error,

@@ -63,11 +63,11 @@ struct Named {
 
 /// An open input.
 pub struct Opened {
-    /// Its bytes.
+    /// The input's bytes.
     pub reader: Box<dyn Read + Send>,
-    /// Its name for messages.
+    /// The input's name for messages.
     pub name: String,
-    /// Its length in bytes; 0 if it is not known.
+    /// The input's length in bytes; 0 if it is not known.
     pub length: u64,
 }
 

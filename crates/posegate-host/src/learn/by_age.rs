@@ -240,7 +240,7 @@ mod tests {
         let by_age = model(&[(0.05, 1.0), (10.0, 9.0)], "since_fix_s").by_age();
         let by_age = by_age.unwrap();
         assert!(at(&by_age, 0.2) < 1.5 && at(&by_age, 9.0) > 8.0);
-        // The size of a covariance is no age.
+        // The size of a covariance is not an age.
         let by_size = model(&[(0.2, 1.0), (10.0, 9.0)], "log_det")
             .by_age()
             .unwrap();

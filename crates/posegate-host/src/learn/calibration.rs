@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 const SCORES: f64 = 30.0;
 const ENOUGH: f64 = 900.0;
 const HARDLY: f64 = 6.0;
-/// With fewer scores than this, the confidence makes the bound much wider, whatever Q is.
+/// With fewer scores than this, the confidence makes the bound much wider, for any Q.
 const LEAST: f64 = 300.0;
 /// A cell is calibrated alone if the probability of so few hits is below this.
 const BY_CHANCE: f64 = 0.1;

@@ -120,7 +120,7 @@ pub(super) struct Cell {
     /// The index of its region, from 0; `None` if the cell has no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<usize>,
-    /// Its own steps or factors if they are larger than the region's.
+    /// The cell's own steps or factors if they are larger than the region's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<[f64; 2]>,
     /// The reason why it has no bound.

@@ -77,7 +77,7 @@ pub enum LearnError {
     Share {
         /// The setting's name.
         name: &'static str,
-        /// Its value.
+        /// The setting's value.
         value: f64,
     },
     /// A model file whose parts do not match.

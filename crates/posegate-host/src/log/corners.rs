@@ -11,7 +11,7 @@
 //!
 //! A tag that is small in the image fits nearly as well in its mirrored orientation (a pose flip). If the pixels do not
 //! distinguish the two poses, or fit no pose, [`locate`] returns no fix. [`locate_all`] returns both poses instead, each
-//! with its own covariance, and follows the valley of the least squares however it is curved.
+//! with its own covariance, and follows the valley of the least squares for any curvature.
 //!
 //! ```
 //! use posegate_host::log::corners::{MountedCamera, TagObservation, locate};

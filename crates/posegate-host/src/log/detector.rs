@@ -267,8 +267,8 @@ impl Detector {
             return Err(DetectorError::Calibration(name.clone()));
         }
         let tags = KnownTags::of(site);
-        if let Some(alike) = tags.alike() {
-            return Err(alike.clone().into());
+        if let Some(equal) = tags.alike() {
+            return Err(equal.clone().into());
         }
         Ok(Self {
             name: name.clone(),
@@ -412,7 +412,7 @@ impl Detector {
         Ok(locate_all(camera, &seen, corner_sigma_px, radius_squared)?)
     }
 
-    /// Returns the first tags of the site, in words.
+    /// Returns the first tags of the site as text.
     fn known(&self) -> String {
         let mut words: Vec<String> = self
             .tags

@@ -91,7 +91,7 @@ mod tests {
         let twin = "[tag.other]\nid = 7\nfamily = \"36h11\"\nsize = 0.3\npose = { x = 9.0, y = 9.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
         let both = known(twin);
         assert!(both.get("tag36h11", 7).is_none() && both.all().count() == 0);
-        let alike = both.alike().unwrap();
-        assert_eq!([&*alike.first, &*alike.second], ["other", "t7"]);
+        let equal = both.alike().unwrap();
+        assert_eq!([&*equal.first, &*equal.second], ["other", "t7"]);
     }
 }

@@ -68,7 +68,7 @@ pub struct Shown {
     pub sections: Vec<(f64, Vec<Vec<[f64; 2]>>)>,
     /// The floor plan.
     pub floor: String,
-    /// The camera's image with what is seen in it, if the task has a camera.
+    /// The camera's image with the visible tags, if the task has a camera.
     pub image: Option<(String, Vec<SeenFrom>)>,
 }
 

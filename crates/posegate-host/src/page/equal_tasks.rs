@@ -3,7 +3,7 @@
 use super::contents::Shown;
 use crate::site::{Site, Task};
 
-/// Lengths that differ by less are the same in a picture, metres; areas in square metres.
+/// Lengths that differ by less are equal in a picture, metres; areas in square metres.
 const SAME: f64 = 1e-3;
 
 /// Returns the tasks in groups of equal tasks, in the order of each group's first task.

@@ -80,7 +80,7 @@ mod tests {
     use posegate::verify::build;
 
     #[test]
-    fn the_first_pose_set_is_inside_and_near_the_border() {
+    fn first_pose_set_is_inside_and_near_the_border() {
         let site = Site::parse(SAMPLE, "site.toml").unwrap();
         for (name, task) in &site.tasks {
             let order = BakeInput {

@@ -156,7 +156,7 @@ impl<'a> Disc<'a> {
     /// repeated at the end.
     fn corners(&self, aim: AccuracyTarget) -> Vec<f64> {
         let count = aim.parts(24, 64);
-        // Offset from the axes, where corners often lie.
+        // Offset from the axes, because corners are often on the axes.
         let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
         let mut angles: Vec<f64> = (0..count).map(around).collect();
         let start = angles[0];

@@ -163,9 +163,9 @@ pub(super) fn line_within(
 /// Says if a function may have a kink within a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Smooth {
-    /// It has no kink.
+    /// The function has no kink.
     Surely,
-    /// It may have a kink.
+    /// The function may have a kink.
     Perhaps,
 }
 

@@ -40,7 +40,7 @@ pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
 /// A place to compare with others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Its name in the file, or its number from 1.
+    /// The place's name in the file, or its number from 1.
     pub name: String,
     /// The tag's pose in the world.
     pub pose: Pose3Deg,

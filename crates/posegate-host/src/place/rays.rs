@@ -29,7 +29,7 @@ pub(super) struct Ray {
     pub intervals: Vec<LineInterval>,
     /// The intervals from which each view sees its tag, with the view's number; empty with a single view.
     seen: Vec<(usize, LineInterval)>,
-    /// Where the ray leaves the set for the first time, at most the line's length; `None` if its start is outside.
+    /// The distance at which the ray first leaves the set, at most the line's length; `None` if its start is outside.
     pub leaves: Option<f64>,
 }
 

@@ -21,7 +21,7 @@ pub enum Space {
 pub struct Faces {
     name: String,
     faces: Vec<Face>,
-    /// Heights of the tag's middle, metres.
+    /// Heights of the tag's centre, metres.
     z: [f64; 2],
     /// Keep-outs, widened by half of the tag's width.
     keep_outs: Vec<[[f64; 2]; 2]>,

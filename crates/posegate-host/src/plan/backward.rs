@@ -100,7 +100,7 @@ impl SearchProblem<'_> {
         for place in self.ends {
             push(&mut queue, &mut cost, *place, 0.0);
         }
-        // The last look, and the drive to the goal (or none).
+        // The last look, and the drive to the goal (or no drive).
         for place in 0..self.places.len() {
             let looks: Vec<usize> = self.seen[place].iter().copied().filter(allowed).collect();
             for look in self.distinct(&looks) {

@@ -94,7 +94,7 @@ pub struct Nearest {
 /// The result of planning.
 #[derive(Clone, Debug)]
 pub struct PlanResult {
-    /// How the search ended.
+    /// The end of the search.
     pub status: Status,
     /// The plan.
     pub plan: Option<Plan>,

@@ -12,7 +12,7 @@ use posegate::verify::{BuildError, build};
 pub struct TaskTable {
     /// The task's name.
     pub name: String,
-    /// Its success set.
+    /// The task's success set.
     pub success: SuccessSet,
     wish: TableOverrides,
     bytes: Vec<u8>,

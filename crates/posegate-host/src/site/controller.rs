@@ -17,7 +17,7 @@ pub enum Core {
 /// The cycles that the motion controller can spend on a decision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller {
-    /// Its core.
+    /// The core.
     pub core: Core,
     /// The processor cycles of one control cycle that a decision may take.
     pub cycles_per_decision: u32,

@@ -15,9 +15,9 @@ use crate::site::error::{SiteError, Source};
 pub(super) struct FormatMessages {
     /// The kind of file: completes "expected ...".
     pub what: &'static str,
-    /// How the file is written.
+    /// Advice on the notation of the file.
     pub written: &'static str,
-    /// How its numbers are written.
+    /// Advice on the notation of its numbers.
     pub numbers: &'static str,
     /// Advice for a number that is not finite.
     pub not_finite: &'static str,

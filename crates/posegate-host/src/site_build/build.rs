@@ -37,11 +37,11 @@ pub struct BuildOptions {
 /// The result of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildSummary {
-    /// Number of its pieces.
+    /// Number of the shard's pieces.
     pub pieces: usize,
-    /// Number of its pieces that were kept.
+    /// Number of the shard's pieces that were kept.
     pub kept: usize,
-    /// Bytes of all files of its pieces.
+    /// Bytes of all files of the shard's pieces.
     pub bytes: u64,
 }
 

@@ -20,7 +20,7 @@ pub enum PieceError {
     /// The table cannot be made or proven.
     #[error(transparent)]
     Table(#[from] BuildError),
-    /// The planner refuses the question.
+    /// The planner rejects the task.
     #[error(transparent)]
     Plan(#[from] PlanError),
 }

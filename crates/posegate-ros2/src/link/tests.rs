@@ -239,7 +239,7 @@ fn repeated_bytes_do_not_extend_a_permit() {
     assert_eq!(line.link.counts().repeated, 20);
 }
 
-/// A recorded interval that is played repeatedly, as by a hung adapter.
+/// A recorded interval that is played repeatedly, as by a blocked adapter.
 #[test]
 fn repeated_interval_permits_nothing() {
     let mut line = Line::new(0);

@@ -130,7 +130,7 @@ struct Basin {
     covariance: Matrix3<f64>,
     /// The step of the heading, radians.
     step: f64,
-    /// Its range relative to the minimum's, up to where no position fits or to a saddle.
+    /// The range of headings relative to the minimum's, up to a heading without a position that fits, or to a saddle.
     ends: [f64; 2],
     /// The minima behind its saddles, if a position fits at the saddle.
     behind: Vec<(f64, Vector3<f64>)>,

@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// A tolerance: a ball of displacements of a tag or of the camera.
 pub(super) struct Ball<'v, 'e> {
-    /// Its radius, metres or radians, above 0.
+    /// The ball's radius, metres or radians, above 0.
     pub(super) size: f64,
     /// The view after a displacement along each of its axes.
     pub(super) axes: Vec<Moved<'v, 'e>>,

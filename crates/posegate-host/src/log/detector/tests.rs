@@ -191,11 +191,11 @@ fn equal_tags_and_calibration_tolerance_are_refused() {
         Detector::new(&site, Some("front"), SETTINGS).map(|_| ())
     };
     let twin = "[tag.other]\nid = 7\nfamily = \"36h11\"\nsize = 0.3\npose = { x = 9.0, y = 9.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
-    let alike = DetectorError::Alike(AlikeTags {
+    let expected = DetectorError::Alike(AlikeTags {
         first: "other".into(),
         second: "t7".into(),
     });
-    assert_eq!(new(&format!("{SAMPLE}\n{twin}")), Err(alike));
+    assert_eq!(new(&format!("{SAMPLE}\n{twin}")), Err(expected));
     assert_eq!(
         new(&format!("{SAMPLE}\n{}", twin.replace("id = 7", "id = 8"))),
         Ok(())

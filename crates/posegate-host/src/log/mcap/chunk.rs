@@ -32,7 +32,7 @@ pub(in crate::log) enum BadChunk {
         "the chunks are together more than {times} times as large as the file: a chunk of {size} bytes"
     )]
     Bomb { size: u64, times: u64 },
-    /// Its records cannot be decompressed.
+    /// The chunk's records cannot be decompressed.
     #[error(transparent)]
     Data(#[from] BadData),
     /// The records do not have the stated checksum.

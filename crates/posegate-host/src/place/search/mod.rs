@@ -44,7 +44,7 @@ pub enum Fidelity {
 pub struct Solution {
     /// The point in the unit cube.
     pub point: Vec<f64>,
-    /// Its value.
+    /// The value at the point.
     pub value: f64,
 }
 

@@ -30,7 +30,7 @@ impl Optimizer for Polish {
         let mut best = self.from.clone();
         let mut step = self.step;
         let mut last: Option<Vec<f64>> = None;
-        // The number of rounds in a row in which no axis helped.
+        // The number of consecutive rounds in which no axis helped.
         let mut failed = 0;
         while step > self.smallest && budget.left() > 0 {
             let drawn = DMatrix::from_fn(n, n, |_, _| random.sample::<f64, _>(StandardNormal));
