@@ -115,11 +115,9 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
             found.map_err(failed)?.best,
         ))
     };
-    let (start, found): (_, Result<Vec<_>, StudyError>) = rayon::join(
-        start,
-        || // In sequence the searches are too slow.
-            cases.into_par_iter().with_max_len(1).map(best).collect(),
-    );
+    let (start, found): (_, Result<Vec<_>, StudyError>) =
+        rayon::join(start, || // In sequence the searches are too slow.
+            cases.into_par_iter().with_max_len(1).map(best).collect());
     let mut columns = std::vec![start?];
     columns.extend(found?);
     Ok(columns)
