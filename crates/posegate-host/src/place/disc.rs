@@ -30,7 +30,7 @@ pub(super) struct Disc<'a> {
 }
 
 /// A direction that was evaluated.
-struct Looked {
+struct EvaluatedDirection {
     angle: f64,
     signature: u64,
     leaves: Option<f64>,
@@ -63,9 +63,9 @@ impl<'a> Disc<'a> {
         Ray::cast(self.headed, self.views, walk, self.radius)
     }
 
-    fn look(&self, angle: f64) -> Looked {
+    fn look(&self, angle: f64) -> EvaluatedDirection {
         let ray = self.ray(angle);
-        Looked {
+        EvaluatedDirection {
             angle,
             signature: ray.signature(),
             leaves: ray.leaves,
@@ -160,28 +160,29 @@ impl<'a> Disc<'a> {
         let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
         let mut angles: Vec<f64> = (0..count).map(around).collect();
         let start = angles[0];
-        let mut looked: Vec<Looked> = angles.drain(..).map(|angle| self.look(angle)).collect();
-        let outside = looked.iter().all(|look| look.leaves.is_none());
+        let mut evaluated: Vec<EvaluatedDirection> =
+            angles.drain(..).map(|angle| self.look(angle)).collect();
+        let outside = evaluated.iter().all(|look| look.leaves.is_none());
         let seeds = if outside {
             self.toward_the_set()
         } else {
-            self.nearly(&looked)
+            self.nearly(&evaluated)
         };
         for seed in seeds {
             let angle = start + (seed - start).rem_euclid(TAU);
-            looked.push(self.look(angle));
+            evaluated.push(self.look(angle));
         }
-        looked.sort_by(|a, b| a.angle.total_cmp(&b.angle));
-        if let Some(first) = looked.first() {
-            let again = Looked {
+        evaluated.sort_by(|a, b| a.angle.total_cmp(&b.angle));
+        if let Some(first) = evaluated.first() {
+            let again = EvaluatedDirection {
                 angle: start + TAU,
                 ..*first
             };
-            looked.push(again);
+            evaluated.push(again);
         }
         let tight = (1e-3 * aim.accuracy).max(1e-10);
         let mut corners = Vec::new();
-        for pair in looked.windows(2) {
+        for pair in evaluated.windows(2) {
             self.part(&pair[0], &pair[1], tight, &mut corners);
         }
         let first = corners.first().copied().unwrap_or(start);
@@ -193,7 +194,13 @@ impl<'a> Disc<'a> {
     }
 
     /// Adds the angles between two directions at which the rays' limiting constraints change, in order.
-    fn part(&self, a: &Looked, b: &Looked, tight: f64, corners: &mut Vec<f64>) {
+    fn part(
+        &self,
+        a: &EvaluatedDirection,
+        b: &EvaluatedDirection,
+        tight: f64,
+        corners: &mut Vec<f64>,
+    ) {
         let mut open = std::vec![(a.angle, a.signature, b.angle, b.signature)];
         while let Some((from, left, to, right)) = open.pop() {
             if left == right {
@@ -212,11 +219,11 @@ impl<'a> Disc<'a> {
 
     /// Returns directions in which a border enters the disc between two evaluated angles, but is just outside the
     /// disc at these angles.
-    fn nearly(&self, looked: &[Looked]) -> Vec<f64> {
+    fn nearly(&self, evaluated: &[EvaluatedDirection]) -> Vec<f64> {
         let mut seeds = Vec::new();
-        let count = looked.len();
-        let leaves = |k: usize| looked[k % count].leaves.unwrap_or(0.0);
-        for (k, look) in looked.iter().enumerate() {
+        let count = evaluated.len();
+        let leaves = |k: usize| evaluated[k % count].leaves.unwrap_or(0.0);
+        for (k, look) in evaluated.iter().enumerate() {
             let here = look.leaves.unwrap_or(0.0);
             let (before, after) = (leaves(k + count - 1), leaves(k + 1));
             let near = here > self.radius && here < BEYOND * self.radius;

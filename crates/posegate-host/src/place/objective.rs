@@ -171,8 +171,8 @@ impl Task {
     }
 }
 
-/// The evaluation of a place.
-pub(super) struct Question<'a> {
+/// Evaluates places of a tag.
+pub(super) struct PlaceEvaluator<'a> {
     pub task: &'a Task,
     pub known: PosePrior,
     pub cost: &'a dyn ViewCost,
@@ -216,7 +216,7 @@ pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 /// Largest installation error beyond the reserve that is tried, centimetres and degrees.
 const MOST_LEFT: f64 = 45.0;
 
-impl Question<'_> {
+impl PlaceEvaluator<'_> {
     /// Returns the value of a pose; less is better. A pose is worse than every other if the tag is not seen from the
     /// goal, or if its set contains less than required. Its value grows with the distance from a valid pose.
     pub fn value(&self, pose: Pose3Deg) -> f64 {

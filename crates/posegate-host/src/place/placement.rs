@@ -2,7 +2,7 @@
 
 use super::gaussian::Gaussian;
 use super::grid;
-use super::objective::{self, Objective, PosePrior, Question, Task, ViewCost};
+use super::objective::{self, Objective, PlaceEvaluator, PosePrior, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
 use super::search::{Budget, Descent, Fidelity, Optimizer, Polish, Problem, Solution};
@@ -124,8 +124,8 @@ const POLISHED: usize = 2;
 const AHEAD: u32 = 8;
 
 struct Searched<'a> {
-    quick: Question<'a>,
-    fine: Question<'a>,
+    quick: PlaceEvaluator<'a>,
+    fine: PlaceEvaluator<'a>,
     space: &'a Space,
     hints: Vec<Vec<f64>>,
 }
@@ -144,12 +144,12 @@ impl Problem for Searched<'_> {
     }
 
     fn value(&self, point: &[f64], look: Fidelity) -> f64 {
-        let question = match look {
+        let evaluator = match look {
             Fidelity::Quick => &self.quick,
             Fidelity::Fine => &self.fine,
         };
         match self.space.pose(point) {
-            Ok(pose) => question.value(pose),
+            Ok(pose) => evaluator.value(pose),
             // Worse than any valid pose, and better the closer it is to a valid one.
             Err(depth) => 1e40 * (1.0 + depth),
         }
@@ -180,8 +180,8 @@ pub fn place(
         POLISHED as u64 * share(DESCENT + LAST)
     };
     let searched = Searched {
-        quick: order.question(None, Fineness::ROUGH),
-        fine: order.question(Some(POLISH), Fineness::CLOSE),
+        quick: order.evaluator(None, Fineness::ROUGH),
+        fine: order.evaluator(Some(POLISH), Fineness::CLOSE),
         space,
         hints: if evaluations < SMALL {
             let ahead = order.task.ahead();
@@ -275,11 +275,11 @@ pub fn compare(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<(usize, Vec<Placed>), PlaceError> {
     order.check()?;
-    let question = order.question(Some(POLISH), Fineness::FINE);
+    let evaluator = order.evaluator(Some(POLISH), Fineness::FINE);
     let looked: Vec<(f64, Result<Placed, PlaceError>)> = poses
         .par_iter()
         .map(|pose| {
-            let both = (question.value(*pose), order.placed(*pose));
+            let both = (evaluator.value(*pose), order.placed(*pose));
             progress(1);
             both
         })
@@ -319,8 +319,8 @@ impl PlacementProblem<'_> {
         Ok(())
     }
 
-    fn question(&self, quadrature: Option<Quadrature>, fineness: Fineness) -> Question<'_> {
-        Question {
+    fn evaluator(&self, quadrature: Option<Quadrature>, fineness: Fineness) -> PlaceEvaluator<'_> {
+        PlaceEvaluator {
             task: self.task,
             known: self.known,
             cost: self.cost,
@@ -335,10 +335,10 @@ impl PlacementProblem<'_> {
     /// # Errors
     /// [`PlaceError::Cost`] if there is no expected cost.
     pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
-        let question = self.question(Some(ANSWER), Fineness::FINE);
+        let evaluator = self.evaluator(Some(ANSWER), Fineness::FINE);
         let size = match (self.objective, self.known) {
             (Objective::SmallestTag, PosePrior::About(_)) => {
-                let size = question.value(pose);
+                let size = evaluator.value(pose);
                 if size < 1e20 {
                     size
                 } else {
@@ -359,14 +359,14 @@ impl PlacementProblem<'_> {
             wall: self.task.wall.clone(),
             reserve: self.task.reserve,
         };
-        let question = Question {
+        let evaluator = PlaceEvaluator {
             task: &resized,
-            ..question
+            ..evaluator
         };
         let set = resized.at(pose);
         let reserved = resized.reserved(pose, size, 0.0);
         let goal = objective::goal(&set);
-        let cost_at_goal = question.at_goal(&set);
+        let cost_at_goal = evaluator.at_goal(&set);
         let distance = libm::hypot(pose.x - goal[0], pose.y - goal[1]);
         let mut placed = Placed {
             pose,
@@ -376,14 +376,14 @@ impl PlacementProblem<'_> {
             p_miss: 0.0,
             p_unknown: Approximate::default(),
             margin: None,
-            contained: question.sees_from_goal(&reserved),
+            contained: evaluator.sees_from_goal(&reserved),
             reserve: resized.reserve,
             left: 0.0,
             distance,
         };
         match self.known {
             PosePrior::Exactly => {
-                placed.p_miss = if question.sees_from_goal(&set) {
+                placed.p_miss = if evaluator.sees_from_goal(&set) {
                     0.0
                 } else {
                     1.0
