@@ -128,7 +128,7 @@ mod tests {
             ("x=1:two", "`two`"),
             ("x=1:inf", "`inf`"),
             ("x=1:2,x=1:2", "twice"),
-            ("", "no range"),
+            ("", "not a range"),
         ] {
             assert!(ranges(text).unwrap_err().contains(what), "{text}");
         }
