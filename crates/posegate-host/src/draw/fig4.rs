@@ -37,7 +37,7 @@ const EVALUATIONS_EXACT: u64 = 2_000;
 const EVALUATIONS: u64 = 300;
 
 /// Returns the tag at the start, at its best place for an exactly known pose, and at two best places for an uncertain
-/// pose. These have the least E[c], and the least E[c] if the complete pose-set must see the tag. `progress` is
+/// pose. These have the least E\[c\], and the least E\[c\] if the complete pose-set must see the tag. `progress` is
 /// called after each search.
 ///
 /// # Errors

@@ -198,8 +198,8 @@ fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), Strin
 
 /// Returns headings over a range of degrees, including the goal's if it is in the range.
 fn spread([lo, hi]: [f64; 2]) -> Vec<f64> {
-    let count_of_2_deg = libm::ceil(0.5 * (hi - lo)) as usize + 1;
-    let count = count_of_2_deg.clamp(HEADINGS[0], HEADINGS[1]);
+    let steps_of_2_deg = libm::ceil(0.5 * (hi - lo)) as usize + 1;
+    let count = steps_of_2_deg.clamp(HEADINGS[0], HEADINGS[1]);
     let last = (count - 1) as f64;
     // Stay within the closed set, despite the rounding of sums of angles.
     let within = 1e-9_f64.min(0.25 * (hi - lo));

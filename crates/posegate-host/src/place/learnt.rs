@@ -84,8 +84,8 @@ impl ViewCost for LearntCost<'_> {
         self.c_high
     }
 
-    /// A learnt bound has jumps and kinks at the borders of its cells. So the accuracy is at most 1e-4, and the
-    /// number of views is limited.
+    /// A learnt bound has jumps and kinks at the borders of its cells. So the relative error is never below
+    /// 1e-4, and the number of views is limited.
     fn quadrature(&self, requested: Quadrature) -> Quadrature {
         let views = if requested.accuracy > 1e-4 {
             60_000

@@ -1,7 +1,7 @@
 //! A proof that one pose-set lies in a success set, without a table.
 //!
 //! The set is the belief's set in the goal frame. Its lengths are 6 um and its angles 2^-22 turn wider than the
-//! floats, which covers their error of 1e-9 of that.
+//! floats. The error of the floats is 1e-9 of these margins.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -100,8 +100,8 @@ impl Rescues {
     }
 }
 
-/// Returns `true` if there is no plan from a belief and a risk because of an earlier failure at the same place, from
-/// a belief and a risk that are at least as good in every respect. A failure implies nothing for beliefs with less
+/// Returns `true` if an earlier failure at the same place implies that there is no plan from a belief and a risk: the
+/// failed belief and risk are at least as good in every respect. A failure implies nothing for beliefs with less
 /// uncertainty. Without pruning of dominated labels, a failure implies only that of an equal belief: only the pruning
 /// search may assume that less uncertainty is never worse.
 fn failure_follows(
