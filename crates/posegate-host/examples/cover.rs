@@ -1,6 +1,7 @@
-//! Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates. Prints cost, bound, gap and time as JSON lines.
-//! The judge of `crates/posegate-host/tests/planning` executes the plans on the written site. Fails if a goal is missed. Run by
-//! `ci.sh cover`. Arguments, if any: aisles, docks, candidates, and a file for the written site.
+//! Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates. Prints cost, bound, gap and time as
+//! JSON lines. The judge of `crates/posegate-host/tests/planning` executes the plans on the written site. Fails if a
+//! goal is missed. Run by `ci.sh cover`. Optional arguments: aisles, docks, candidates, and a file for the written
+//! site.
 
 use posegate::shape::Shape;
 use posegate_host::cover::{CoverOptions, cover, written};

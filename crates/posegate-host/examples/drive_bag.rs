@@ -1,5 +1,6 @@
-//! Writes a synthetic recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose`, `/odom` and the true pose
-//! in `/truth`, for a first try of `posegate replay`; and the estimates as CSV, for `posegate learn`.
+//! Writes a synthetic recording of a robot that drives to its dock, as a ROS 2 bag (MCAP) with `/amcl_pose`, `/odom`
+//! and the true pose in `/truth`, for a first try of `posegate replay`. Also writes the estimates as CSV, for
+//! `posegate learn`.
 //!
 //! ```sh
 //! cargo run --release -p posegate-host --example drive_bag -- drive.mcap drive.csv

@@ -1,5 +1,5 @@
-//! Measures how much of a success set is proven, and how fast. Prints one JSON line each; fails if a goal is missed.
-//! Run by `ci.sh paving`, which prints codac's figures for the same set next to them.
+//! Measures the proven share of a success set, and the speed. Prints one JSON line each; fails if a goal is missed.
+//! Run by `ci.sh paving`, which prints codac's figures for the same set.
 //!
 //! Volumes are in codac's unit, in which a degree of yaw counts as 2 cm: cubic metres.
 

@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-fn hung(site: &Site, task: &str) -> Result<Task, Box<dyn Error>> {
+fn placement_task(site: &Site, task: &str) -> Result<Task, Box<dyn Error>> {
     let set = site.task(task)?.success.clone();
     let tag = *set.tags().first().ok_or("the task looks at no tag")?;
     let reserve = Task::usual_reserve(&set, &tag);
@@ -41,7 +41,7 @@ fn hung(site: &Site, task: &str) -> Result<Task, Box<dyn Error>> {
 /// Measures costs of single poses, and expected costs, per second on one core.
 fn rate() -> Result<(), Box<dyn Error>> {
     let site = Site::parse(SAMPLE, "sample")?;
-    let task = hung(&site, "see-t7")?;
+    let task = placement_task(&site, "see-t7")?;
     let cost = Cost::default();
     let costs = task.set.watch();
     let mut sum = 0.0;
@@ -85,7 +85,7 @@ fn line(name: &str, value: f64, unit: &str, goal: Option<f64>) -> serde_json::Va
 
 /// Answers lines of standard input. An empty line ends a batch, whose lines are computed in parallel.
 fn serve(site: &Site, task: &str, sigmas: [f64; 3]) -> Result<(), Box<dyn Error>> {
-    let task = hung(site, task)?;
+    let task = placement_task(site, task)?;
     let belief = Gaussian::of_sigmas(sigmas, site.epsilon)?;
     let cost = Cost::default();
     let mean = |pose: &Pose3Deg| {

@@ -1,5 +1,5 @@
-//! Measures how fast recordings are read and replayed, and the memory for that. Prints JSON lines; fails if a goal is
-//! missed.
+//! Measures the speed of reading and replaying recordings, and the memory for that. Prints JSON lines; fails if a
+//! goal is missed.
 //!
 //! `cargo run --release -p posegate-host --example replay_speed` writes bags of 100 MB and 1 GB into a temporary folder,
 //! and reads each in a separate process, so that the peak memory of each is known.
@@ -48,8 +48,10 @@ fn all() -> Done<ExitCode> {
         Ok(numbers.map_err(|_| String::from_utf8_lossy(&output.stderr).into_owned())?)
     };
     let mut line = |name: &str, value: f64, unit: &str, goal: Option<f64>, least: bool| {
-        let told = goal.map_or("null".into(), |goal| goal.to_string());
-        println!(r#"{{"name": "{name}", "value": {value:.1}, "unit": "{unit}", "goal": {told}}}"#);
+        let goal_text = goal.map_or("null".into(), |goal| goal.to_string());
+        println!(
+            r#"{{"name": "{name}", "value": {value:.1}, "unit": "{unit}", "goal": {goal_text}}}"#
+        );
         short |= goal.is_some_and(|goal| {
             if least {
                 !(value >= goal)
@@ -127,7 +129,7 @@ fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> D
     let poses = writer.channel(schema, TOPIC);
     let cloud = writer.schema("sensor_msgs/msg/PointCloud2", b"");
     let clouds = writer.channel(cloud, "/points");
-    // Half of the payload repeats, as sensor data do.
+    // Half of the payload repeats, like sensor data.
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
         state ^= state << 13;

@@ -1,12 +1,13 @@
-//! Measures the time and memory of a site's tables and proofs by the size of the site and the number of nodes. Prints one JSON
-//! line each. Run by `ci.sh scale`, with the program, and optionally files for the two plots. It fails if 1,000 endpoints take a minute
-//! or more, or if a shard's memory grows with the site by more than the names of its tasks.
+//! Measures the time and memory of a site's tables and proofs by the size of the site and the number of nodes. Prints
+//! one JSON line each. Run by `ci.sh scale`, with the program, and optionally files for the two plots. It fails if
+//! 1,000 endpoints take a minute or more, or if a shard's memory grows with the site by more than the names of its
+//! tasks.
 //!
-//! Up to 1,000 endpoints (or the number in `POSEGATE_WHOLE`) a whole site is built, by two threads. Beyond that, one shard of about 200
-//! pieces is built and the time is extrapolated, as it is for more than four nodes. The model: every node reads its part of the site (`R`
-//! seconds), then makes its share of the pieces one after the other on each of its `C` cores (`p` seconds per piece), and the merge comes
-//! last (`m` seconds per piece): `T(N) = R + ceil(pieces / (N C)) p + m pieces`. Nodes share only the folder, whose speed is not in
-//! the model.
+//! Up to 1,000 endpoints (or the number in `POSEGATE_WHOLE`) the complete site is built, by two threads. Beyond that,
+//! one shard of about 200 pieces is built and the time is extrapolated, as for more than four nodes. In the model,
+//! every node reads its part of the site (`R` seconds). It then makes its share of the pieces in sequence on each of
+//! its `C` cores (`p` seconds per piece). The merge comes last (`m` seconds per piece): `T(N) = R + ceil(pieces / (N
+//! C)) p + m pieces`. Nodes share only the folder, whose speed is not in the model.
 
 use posegate_host::draw::logarithmic;
 use posegate_host::site::Site;
@@ -17,7 +18,7 @@ use std::time::Instant;
 
 use posegate_testkit::plant;
 
-/// Number of pieces of the shard that is built of a site that is too large to be built whole.
+/// Number of pieces of the shard that is built if a site is too large to be built completely.
 const SAMPLE: usize = 200;
 /// Largest time for 1,000 endpoints, seconds.
 const MOST: f64 = 60.0;

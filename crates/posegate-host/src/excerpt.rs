@@ -18,7 +18,7 @@ use crate::printable::push;
 const REACH: usize = 100;
 /// Largest number of lines of a fault that are shown. If a fault is longer, only its first line is shown.
 const MOST_LINES: usize = 8;
-/// Stands for omitted text.
+/// Replaces omitted text.
 const LEFT_OUT: char = '\u{2026}';
 
 /// A few lines around a fault in a text, printable ([`crate::printable`]) and shortened if they are long.
@@ -33,9 +33,9 @@ pub struct Excerpt {
 }
 
 impl Excerpt {
-    /// Extracts the lines of a fault, and one line before and after. The run time is proportional to the length of the
-    /// text; the result is of limited size. `fault` is a range of bytes, moved to character boundaries; `line` is the
-    /// number of the line in which it begins.
+    /// Extracts the lines of a fault, and one line before and after. The run time is proportional to the length of
+    /// the text; the result is of limited size. `fault` is a range of bytes, moved to character boundaries; `line` is
+    /// the number of the line in which it begins.
     #[must_use]
     pub fn new(text: &str, fault: Range<usize>, line: usize) -> Self {
         let start = text.floor_char_boundary(fault.start);
@@ -99,14 +99,14 @@ impl Out {
         if is_first {
             self.fault.start = self.text.len();
         }
-        let is_whole = self.letters(fault, REACH);
+        let is_complete = self.letters(fault, REACH);
         self.fault.end = self.text.len();
-        if is_whole {
+        if is_complete {
             self.letters(after, REACH);
         }
     }
 
-    /// Writes at most `most` characters of a line. Returns `true` if that is the whole line.
+    /// Writes at most `most` characters of a line. Returns `true` if that is the complete line.
     fn letters(&mut self, line: &str, most: usize) -> bool {
         let line = line.strip_suffix('\r').unwrap_or(line);
         let end = line.char_indices().nth(most);

@@ -1,5 +1,5 @@
-//! Reads whole files, up to a stated limit: an endless input (`/dev/zero`, an endless pipe) is an error instead of
-//! using all memory.
+//! Reads complete files, up to a stated limit: an endless input (`/dev/zero`, an endless pipe) is an error and does
+//! not use all memory.
 //!
 //! Recordings are read as streams (`log::recording`); there, [`Lines`] limits the length of a line.
 
@@ -62,7 +62,7 @@ pub enum InputError {
 }
 
 impl InputError {
-    /// Returns `true` if there is no such file.
+    /// Returns `true` if the file does not exist.
     #[must_use]
     pub fn is_not_found(&self) -> bool {
         matches!(self, Self::Io(cause) if cause.kind() == ErrorKind::NotFound)
@@ -78,7 +78,7 @@ impl InputError {
     }
 }
 
-/// Reads a whole file or pipe, up to a limit.
+/// Reads a complete file or pipe, up to a limit.
 ///
 /// # Errors
 /// [`InputError::Io`], [`InputError::TooLong`].
@@ -188,7 +188,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn devices_are_no_files() {
+    fn devices_and_pipes_are_refused() {
         assert!(matches!(
             read_file(Path::new("/dev/zero"), SHORT),
             Err(InputError::NotAFile)
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_limited_one_by_one() {
+    fn each_line_is_limited() {
         let longest = Lines::<&[u8]>::LONGEST;
         let mut text = std::vec![b'a'; longest];
         text.push(b'\n');

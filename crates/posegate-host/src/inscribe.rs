@@ -1,7 +1,7 @@
 //! A box inside a success set: intervals of x, y and yaw that another program can check, such as the tolerances of a goal checker.
 //!
-//! A box ([`InscribedBox`]) is the paper's task space region. Every pose of it is proven to lie in the set, by the same intervals
-//! that prove tables.
+//! A box ([`InscribedBox`]) is the paper's task space region. All of its poses are proven to be in the set, by the
+//! same intervals that prove tables.
 //!
 //! ```
 //! use posegate_host::inscribe::inscribed_box;
@@ -28,8 +28,8 @@ pub struct InscribedBox {
 }
 
 impl InscribedBox {
-    /// Returns the largest distance from the goal, in metres, and the largest yaw in radians, such that every pose within both is
-    /// in the box: what Nav2's `xy_goal_tolerance` and `yaw_goal_tolerance` may be.
+    /// Returns the largest distance from the goal, in metres, and the largest yaw, in radians, such that every pose
+    /// within both is in the box: values for Nav2's `xy_goal_tolerance` and `yaw_goal_tolerance`.
     #[must_use]
     pub fn tolerances(&self) -> [f64; 2] {
         let least = |ends: [f64; 2]| (-ends[0]).min(ends[1]);
@@ -40,10 +40,10 @@ impl InscribedBox {
     }
 }
 
-/// The ends of a box: x and y in 0.1 mm, yaw in 0.01 degrees; the lower ends are their negatives' distances from the goal.
+/// The ends of a box, as distances from the goal: x and y in 0.1 mm, yaw in 0.01 degrees; lower end first.
 type Reach = [[i64; 2]; 3];
 
-/// The farthest end of a box, metres and degrees: wider headings cannot be proven at once.
+/// The largest distance of an end of a box, metres and degrees: wider headings cannot be proven at once.
 const FARTHEST: [i64; 3] = [1_000_000, 1_000_000, 4_400];
 /// Widths of y and of yaw (0.01 degrees) for 0.1 mm of x, from which the search begins.
 const RATIOS: [(f64, f64); 15] = [
@@ -66,8 +66,9 @@ const RATIOS: [(f64, f64); 15] = [
 /// The number of starts whose faces are moved.
 const REFINED: usize = 4;
 
-/// Returns a large box about the goal that is inside the set; `None` if the goal itself is not proven inside. With `yaw_deg` the
-/// box has the headings from `-yaw_deg` to `yaw_deg`, and `None` also means that the set lacks one of them at the goal.
+/// Returns a large box about the goal that is inside the set; `None` if the goal itself is not proven inside. With
+/// `yaw_deg` the box has the headings from `-yaw_deg` to `yaw_deg`, and `None` also means that the goal at one of
+/// these headings is not in the set.
 ///
 /// The box cannot be enlarged at any one of its faces by more than the resolution; other boxes may be larger. Takes some
 /// thousand proofs of blocks: milliseconds for a box, seconds for a view past walls.
@@ -107,7 +108,7 @@ pub fn inscribed_box(success: &SuccessSet, yaw_deg: Option<f64>) -> Option<Inscr
     })
 }
 
-/// Moves one face after the other outwards until none can be moved.
+/// Moves one face after the other outwards until no face can be moved.
 fn grown(mut reach: Reach, yaw: Option<i64>, holds: &dyn Fn(&Reach) -> bool) -> Reach {
     let axes = if yaw.is_some() { 2 } else { 3 };
     for _ in 0..8 {
@@ -131,7 +132,8 @@ fn grown(mut reach: Reach, yaw: Option<i64>, holds: &dyn Fn(&Reach) -> bool) -> 
     reach
 }
 
-/// Returns the largest number up to `most` found by doubling and halving for which a test holds; it holds for 0.
+/// Returns the largest number up to `most`, found by doubling and halving, for which a test is true; it is true for
+/// 0.
 fn largest(most: i64, holds: impl Fn(i64) -> bool) -> i64 {
     let (mut low, mut step) = (0, 1);
     while low + step <= most && holds(low + step) {
@@ -148,7 +150,7 @@ fn largest(most: i64, holds: impl Fn(i64) -> bool) -> i64 {
 }
 
 fn volume(reach: &Reach) -> f64 {
-    // A box without extent in one of its dimensions is worth less than any other.
+    // A box without extent in one of its dimensions is worse than any other.
     let wide = reach.iter().map(|[lo, hi]| (lo + hi) as f64 + 1e-3);
     wide.product()
 }
@@ -181,7 +183,7 @@ mod tests {
 
     /// The largest box in a box is that box.
     #[test]
-    fn a_box_is_its_own_largest_box() {
+    fn largest_box_in_a_box_is_that_box() {
         let (found, _) = of("dock", None).unwrap();
         let near = |a: [f64; 2], b: [f64; 2], off: f64| {
             (a[0] - b[0]).abs() <= off && (a[1] - b[1]).abs() <= off
@@ -193,7 +195,8 @@ mod tests {
         assert!((0.0598..=0.06).contains(&xy) && yaw <= 4f64.to_radians());
     }
 
-    /// Corners, faces and the middle are in the set by a code path of its own, and a box that is longer at a face is not.
+    /// Corners, faces and the centre are in the set by an independent code path. A box that is longer at a face is
+    /// not.
     #[test]
     fn poses_of_the_box_are_in_the_set_and_faces_touch_its_border() {
         for (task, yaw_deg) in [("park", None), ("see-t7", Some(2.0)), ("see-t7", None)] {
@@ -233,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn without_the_goal_there_is_no_box() {
+    fn no_box_if_the_goal_is_outside() {
         assert_eq!(of("dock", Some(4.5)), None);
         let text = SAMPLE.replacen("x = [-0.08, 0.08]", "x = [0.02, 0.08]", 1);
         let site = Site::parse(&text, "site.toml").unwrap();

@@ -37,7 +37,7 @@ pub mod doctor;
 
 pub mod page;
 
-/// Returns how many rounds a test runs: `all`, or the smaller number `interpreted` under Miri, which is slow.
+/// Returns the number of iterations of a test: `all`, or the smaller number `interpreted` under Miri, which is slow.
 #[cfg(test)]
 pub(crate) const fn rounds(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }

@@ -1,7 +1,7 @@
 //! Text from files and arguments, made safe to print on a terminal.
 //!
-//! A name may hold an escape sequence that clears the screen, or a format character that reorders what follows. Every function
-//! here replaces such characters by a visible escape and keeps all others.
+//! A name may contain an escape sequence that clears the screen, or a format character that reorders the text after
+//! it. Every function here replaces such characters by a visible escape and keeps all others.
 //!
 //! ```
 //! use posegate_host::printable::printable;
@@ -13,8 +13,8 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Returns `true` if a terminal shows the character as itself: it is not a control character (C0, DEL, C1), does not change the
-/// direction of text, and does not hide.
+/// Returns `true` if a terminal shows the character as itself: it is not a control character (C0, DEL, C1), does not
+/// change the direction of text, and is not invisible.
 #[must_use]
 pub const fn is_printable(letter: char) -> bool {
     !matches!(letter,
@@ -35,13 +35,13 @@ pub(crate) fn push(out: &mut String, letter: char) {
     }
 }
 
-/// Returns the text on one line: every character that is not printable is escaped, line ends and tabs too.
+/// Returns the text on one line: every character that is not printable is escaped, including line ends and tabs.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |_| false, push)
 }
 
-/// Returns the text with its line ends. Only for text whose line ends are the program's own.
+/// Returns the text with its line ends. Use it only for text whose line ends are the program's own.
 #[must_use]
 pub fn printable_lines(text: &str) -> Cow<'_, str> {
     escaped(text, |letter| letter == '\n', push)

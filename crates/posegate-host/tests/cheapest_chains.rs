@@ -1,4 +1,4 @@
-//! Plans without a needless look, the bound that holds for every chain, and plans on large sites.
+//! Plans without unnecessary looks, the bound for all chains, and plans on large sites.
 
 use posegate::chain::StartAssumption;
 use posegate_host::plan::{Options, PlanResult, Prepared, Status, StepKind, evaluate, plan_near};
@@ -39,9 +39,9 @@ fn looks(planned: &PlanResult) -> usize {
         .count()
 }
 
-/// None of the library's places allows a chain with one look: with these places alone the cheapest plan has two.
+/// No place of the library allows a chain with one look: with these places the cheapest plan has two looks.
 #[test]
-fn a_look_that_is_not_needed_is_left_out() {
+fn unnecessary_look_is_omitted() {
     for views in [6, 12, 24] {
         let site = Site::parse(&dock_before_a_tag(views), "dock.toml").expect("a site");
         let found = planned(&site, "start", "dock");
@@ -54,11 +54,11 @@ fn a_look_that_is_not_needed_is_left_out() {
         assert!(plan.report().succeeds());
         let margins = plan.steps.iter().filter_map(|step| step.report.margin);
         assert!(margins.into_iter().all(|margin| margin.q16() >= 1 << 16));
-        // A look and the straight way; the work may also be done 0.12 m before the goal.
-        let way = libm::hypot(4.0 - 1.5, 0.2 + 0.3);
-        assert!(plan.cost < 1.005 * (1.0 + way), "{}", plan.cost);
+        // A look and the straight path; the work may also be done 0.12 m before the goal.
+        let path = libm::hypot(4.0 - 1.5, 0.2 + 0.3);
+        assert!(plan.cost < 1.005 * (1.0 + path), "{}", plan.cost);
         assert!(
-            found.bound_of_all > 1.0 + way - 0.16,
+            found.bound_of_all > 1.0 + path - 0.16,
             "{}",
             found.bound_of_all
         );
@@ -142,7 +142,7 @@ fn with_random_chains(random: &mut Random, count: usize) -> String {
             let look = usize::from(random.unit() < 0.2);
             steps.push(format!("{{ task = \"see-{look}\" }}"));
         }
-        // Not always to the goal itself.
+        // Not always exactly to the goal.
         drive([1.5 + random.between(-0.05, 0.1), 0.2, 180.0], &mut steps);
         steps.push("{ task = \"dock\" }".into());
         site += &format!(
@@ -207,20 +207,20 @@ fn no_proven_chain_costs_less_than_the_bound() {
     }
 }
 
-/// On a site with more looks than are prepared as a whole, a plan costs as much as with all of them.
+/// On a site with more looks than are prepared completely, a plan costs as much as with all of them.
 #[test]
-fn plans_near_the_way_cost_as_much_as_with_all_looks() {
+fn plans_near_the_path_cost_as_much_as_with_all_looks() {
     let mut plans = 0;
     let seeds = counts::one_a_day(&[0, 1, 2]);
     for seed in &seeds {
         let text = hall(&mut Random(*seed), 100, 8, Drive::Bounded);
         let site = Site::parse(&text, "hall.toml").expect("a site");
-        let mut whole = Prepared::of(&site, None).expect("a library");
+        let mut complete = Prepared::of(&site, None).expect("a library");
         for dock in 0..8 {
             let start = &site.chains[&format!("to{dock}")].start;
             let task = format!("dock{dock}");
             let options = Options::default();
-            let all = whole.plan(start, &task, &options).expect("an answer");
+            let all = complete.plan(start, &task, &options).expect("an answer");
             let near = plan_near(&site, None, start, &task, &options).expect("an answer");
             let cost = |found: &PlanResult| found.plan.as_ref().map(|plan| plan.cost);
             assert_eq!(near.status, all.status, "seed {seed}, {task}");
@@ -240,10 +240,11 @@ fn plans_near_the_way_cost_as_much_as_with_all_looks() {
     assert!(plans >= 4 * seeds.len(), "{plans}");
 }
 
-/// A tag whose region is near the way faces away, so that the way to where it is seen is long; one whose region is farther off faces the
-/// robot and gives the cheaper plan. Dozens of tags beyond reach make the site too large to be prepared as a whole.
+/// A tag whose region is near the path faces away, so the path to its viewpoints is long. A tag whose region is
+/// farther away faces the robot and gives the cheaper plan. Dozens of tags beyond reach make the site too large to be
+/// prepared completely.
 #[test]
-fn a_plan_with_looks_near_the_way_is_not_taken_if_one_farther_off_may_cost_less() {
+fn looks_near_the_path_do_not_hide_a_cheaper_plan_farther_away() {
     let mut text = String::from(
         r#"
 [camera.front]

@@ -1,5 +1,5 @@
-//! A contingent plan on the controller: the firmware example under emulation takes the same steps as the host,
-//! through a lost tag and a surprise. The committed rules and tables are those that the committed site produces.
+//! A contingent plan on the controller: the firmware example under emulation makes the same steps as the host,
+//! through a lost tag and a surprise. The committed rules and tables equal those made from the committed site.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate-host --test contingent_plan` rewrites them.
 
@@ -15,7 +15,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 #[test]
-fn the_firmware_takes_the_same_steps() {
+fn firmware_makes_the_same_steps() {
     let mut here = String::new();
     contingent_run::run(&mut here).unwrap();
     let elf = firmware::build_with("contingent_plan", "firmware");

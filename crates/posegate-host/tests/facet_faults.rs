@@ -132,10 +132,10 @@ fn changed_facets_are_not_proven() {
     }
 }
 
-/// Checking the ends of an arc is not a proof: a vertex that crosses a wall between the ends is
-/// inside at both. Here it crosses by a tenth of a millimetre.
+/// Checking the ends of an arc is not a proof: a vertex that crosses a wall between the ends is inside at both ends.
+/// Here it crosses by a tenth of a millimetre.
 #[test]
-fn a_border_that_is_crossed_between_the_ends_is_noticed() {
+fn border_crossed_between_the_ends_is_detected() {
     let reach = 0.75;
     let footprint = Footprint::new(vec![[0.0, reach]], square(1.5)).unwrap();
     let success = SuccessSet {
@@ -213,9 +213,10 @@ fn square(half: f64) -> Vec<[f64; 2]> {
     vec![[half, half], [-half, half], [-half, -half], [half, -half]]
 }
 
-/// A set of two pieces: a pose-set is inside if one piece contains it, or both together, and not if a gap between them cuts it.
+/// A set of two pieces: a pose-set is inside if one piece contains it, or both together, and not if it intersects a
+/// gap between them.
 #[test]
-fn pieces_hold_a_set_together_unless_it_meets_a_gap() {
+fn set_is_inside_joined_pieces_unless_it_meets_a_gap() {
     let site = sample();
     let order = order(&site, "dock");
     let claim = claim(&site, "dock");
@@ -366,7 +367,7 @@ fn facets_and_grid_agree() {
 /// The estimate is rounded to length units (64 or 128 um here). A permit must still be correct to the
 /// micrometre. Small discs are moved over each border of a box in small steps, at turned goals.
 #[test]
-fn the_rounding_of_the_estimate_is_paid_for() {
+fn permits_are_correct_despite_rounding_of_the_estimate() {
     let (mut permits, mut closest) = (0, f64::INFINITY);
     // Sixteen sizes, so that the last rounding of a facet's offset leaves no slack for some of them.
     let sizes = (0..16).map(|k| 1.0 + 4e-6 * f64::from(k));
@@ -435,7 +436,7 @@ fn the_rounding_of_the_estimate_is_paid_for() {
 
 /// The worst pose of facets is on the border across which the set leaves, in the goal's axes.
 #[test]
-fn the_worst_pose_is_on_a_facet() {
+fn worst_pose_is_on_a_facet() {
     let goal = PoseDeg {
         x: 2.0,
         y: -1.0,

@@ -1,4 +1,4 @@
-//! The committed tables are those that the committed site produces, byte for byte, and they are proven.
+//! The committed tables equal those made from the committed site, byte for byte, and they are proven.
 //!
 //! `POSEGATE_BLESS=1` rewrites them.
 
@@ -78,9 +78,9 @@ fn committed_tables_are_made_from_the_committed_site() {
     assert!(length("tables/see-t7.posegate") <= 500);
 }
 
-/// The table with which a gate tests itself, with both layouts, of a tag that is seen from an unusual place.
+/// The table of the gate's self-test, with both layouts, of a tag that is seen from an unusual place.
 #[test]
-fn the_self_test_has_the_table_that_is_made() {
+fn self_test_table_equals_the_one_that_is_made() {
     let examples = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples");
     let site = Site::read(examples.join("sites/dock.toml")).unwrap();
     let mut success = site.task("see-t7").unwrap().success.clone();

@@ -1,5 +1,5 @@
-//! The walk over grids that `bake` does not make: several runs in a row, the whole circle, sets wider
-//! than the table, and the worst pose.
+//! The walk over grids that `bake` does not make: several runs in a row, the full circle, sets wider than the table,
+//! and the worst pose.
 
 use posegate_testkit::sites;
 
@@ -55,7 +55,7 @@ fn is_inside(bytes: &[u8], set: &PoseSet) -> bool {
 
 /// A wall of uncovered cells between two rooms: sets fit into either room, and no permitted set spans the wall.
 #[test]
-fn several_runs_in_a_row() {
+fn sets_are_inside_single_runs_and_never_across_a_gap() {
     let rows = vec![vec![run(0, 7), run(10, 19)]; 20];
     let bytes = table_of(spec([-10.0, 10.0], 5.0), &vec![rows; 4]);
     assert_eq!(
@@ -75,9 +75,9 @@ fn several_runs_in_a_row() {
     assert!(!is_inside(&bytes, &disc(-0.5, 0.0, 0.0, 0.31, 2.0)));
 }
 
-/// Every run, every row and every slab is evaluated: if any one cell is removed, a set that covers it is denied.
+/// Every run, every row and every slab is evaluated: if any cell is removed, a set that covers it is denied.
 #[test]
-fn each_missing_cell_denies() {
+fn set_over_any_missing_cell_is_denied() {
     let full = vec![vec![vec![run(0, 19)]; 20]; 4];
     let bytes = table_of(spec([-10.0, 10.0], 5.0), &full);
     let set = disc(0.0, 0.0, 0.0, 0.98, 9.9);
@@ -107,7 +107,7 @@ fn each_missing_cell_denies() {
 }
 
 #[test]
-fn an_empty_row_denies() {
+fn set_over_an_empty_row_is_denied() {
     let mut rows = vec![vec![run(0, 19)]; 20];
     rows[13].clear();
     let bytes = table_of(spec([-10.0, 10.0], 5.0), &vec![rows; 4]);
@@ -115,9 +115,9 @@ fn an_empty_row_denies() {
     assert!(!is_inside(&bytes, &disc(0.0, 0.0, 0.0, 0.31, 2.0)));
 }
 
-/// A table of the whole circle has no seam, wherever it begins.
+/// A table of the full circle has no seam, for any begin.
 #[test]
-fn the_whole_circle_has_no_seam() {
+fn full_circle_has_no_seam() {
     for lo in [-180.0, 0.0, 33.0, 180.0] {
         let slabs = vec![vec![vec![run(0, 19)]; 20]; 36];
         let bytes = table_of(spec([lo, lo + 360.0], 10.0), &slabs);
@@ -151,7 +151,7 @@ fn the_whole_circle_has_no_seam() {
 
 /// A range of headings that passes 180 degrees.
 #[test]
-fn headings_pass_180() {
+fn range_of_headings_may_pass_180_degrees() {
     let slabs = vec![vec![vec![run(0, 19)]; 20]; 8];
     let bytes = table_of(spec([160.0, 200.0], 5.0), &slabs);
     for yaw in [180.0, -180.0, 179.0, -179.0, 540.0, -540.0] {
@@ -170,7 +170,7 @@ fn headings_pass_180() {
 }
 
 #[test]
-fn a_set_wider_than_the_table_says_so() {
+fn set_wider_than_the_table_has_its_own_reason() {
     let slabs = vec![vec![vec![run(0, 19)]; 20]; 4];
     let bytes = table_of(spec([-10.0, 10.0], 5.0), &slabs);
     let table = Table::parse(&bytes).unwrap();
@@ -219,7 +219,7 @@ fn a_set_wider_than_the_table_says_so() {
 
 /// The worst pose is a pose of the set, and no cell covers the poses just beyond it.
 #[test]
-fn the_worst_pose_is_where_the_set_leaves() {
+fn worst_pose_is_at_the_exit_of_the_set() {
     let rows: Vec<Vec<Run>> = (0..20u16)
         .map(|row| vec![run(row / 4, 19 - row / 4)])
         .collect();

@@ -1,5 +1,5 @@
-//! A shard of a large site reads only its own tasks, and they equal those of the whole site, for any formatting of the
-//! file and also if it has faults.
+//! A shard of a large site reads only its own tasks, and they equal those of the complete site, for any formatting of
+//! the file and any faults.
 
 #[allow(dead_code)]
 use posegate_testkit::plant;
@@ -115,16 +115,16 @@ fn parts(path: &Path, count: u32) -> Vec<Option<(Site, Inventory)>> {
     shards.map(|shard| part(path, shard, "program")).collect()
 }
 
-/// Returns how a shard's part differs from the whole site.
-fn other(whole: &Site, shard: Shard, (site, inventory): &(Site, Inventory)) -> Option<String> {
-    if *inventory != Inventory::new(whole, Recipe::new(whole, None, "program")) {
+/// Returns the difference of a shard's part from the complete site; `None` if there is none.
+fn other(complete: &Site, shard: Shard, (site, inventory): &(Site, Inventory)) -> Option<String> {
+    if *inventory != Inventory::new(complete, Recipe::new(complete, None, "program")) {
         return Some("another inventory".to_owned());
     }
     for piece in inventory.share(shard) {
         let Piece::Table { task } = piece else {
             return Some(format!("{piece}"));
         };
-        if site.tasks.get(task) != whole.tasks.get(task) || !whole.tasks.contains_key(task) {
+        if site.tasks.get(task) != complete.tasks.get(task) || !complete.tasks.contains_key(task) {
             return Some(format!("another `{task}`"));
         }
     }
@@ -137,36 +137,37 @@ fn other(whole: &Site, shard: Shard, (site, inventory): &(Site, Inventory)) -> O
             site.cameras.clone(),
         )
     };
-    if common(site) != common(whole) {
+    if common(site) != common(complete) {
         return Some("another frame of the tasks".to_owned());
     }
-    let tags = |(name, tag)| whole.tags.get(name) == Some(tag);
-    let goals = |(name, goal)| whole.goals.get(name) == Some(goal);
-    let chains = |(name, chain)| whole.chains.get(name) == Some(chain);
+    let tags = |(name, tag)| complete.tags.get(name) == Some(tag);
+    let goals = |(name, goal)| complete.goals.get(name) == Some(goal);
+    let chains = |(name, chain)| complete.chains.get(name) == Some(chain);
     let same = site.tags.iter().all(tags)
         && site.goals.iter().all(goals)
         && site.chains.iter().all(chains);
     (!same).then(|| "other tags, goals or chains".to_owned())
 }
 
-/// Compares the parts of a text with the whole site. Returns the number of shards that read the whole file, or a fault.
+/// Compares the parts of a text with the complete site. Returns the number of shards that read the complete file, or
+/// a fault.
 fn wrong(text: &[u8], count: u32) -> Result<usize, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
     std::fs::write(&path, text).unwrap();
     let parts = parts(&path, count);
-    let whole = Site::read(&path);
+    let complete = Site::read(&path);
     for (index, found) in parts.iter().enumerate() {
-        let (Some(found), Ok(whole)) = (found, &whole) else {
+        let (Some(found), Ok(complete)) = (found, &complete) else {
             continue;
         };
         let shard = Shard::new(index as u32, count).unwrap();
-        if let Some(why) = other(whole, shard, found) {
+        if let Some(why) = other(complete, shard, found) {
             return Err(format!("shard {shard}: {why}"));
         }
     }
     let left = parts.iter().filter(|part| part.is_none()).count();
-    match whole {
+    match complete {
         Err(fault) if left == 0 => Err(format!("no shard finds: {fault}")),
         _ => Ok(left),
     }
@@ -186,9 +187,9 @@ fn sections(text: &str) -> Vec<String> {
     sections
 }
 
-/// Tasks equal those of the whole site. Each tag and goal is read by some shard, and no shard reads all of them.
+/// Tasks equal those of the complete site. Each tag and goal is read by some shard, and no shard reads all of them.
 #[test]
-fn parts_are_as_the_whole() {
+fn parts_equal_the_complete_site() {
     for (text, counts) in [
         (SITE.to_owned(), [2, 3, 4]),
         (plant::plant(1, 60), [2, 7, 30]),
@@ -197,10 +198,10 @@ fn parts_are_as_the_whole() {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("site.toml");
             std::fs::write(&path, &text).unwrap();
-            let whole = Site::read(&path).unwrap();
+            let complete = Site::read(&path).unwrap();
             assert_eq!(
                 SiteIndex::read(&path).unwrap().tasks(),
-                whole.tasks.keys().cloned().collect::<Vec<_>>()
+                complete.tasks.keys().cloned().collect::<Vec<_>>()
             );
             for count in counts {
                 let (mut tasks, mut tags, mut goals) =
@@ -208,25 +209,26 @@ fn parts_are_as_the_whole() {
                 for (index, found) in parts(&path, count).into_iter().enumerate() {
                     let found = found.expect("a file of the simple kind");
                     let shard = Shard::new(index as u32, count).unwrap();
-                    assert_eq!(other(&whole, shard, &found), None, "{shard}");
+                    assert_eq!(other(&complete, shard, &found), None, "{shard}");
                     // Chains of the small site name all of its tasks.
-                    let all = found.0.tasks.len() == whole.tasks.len();
+                    let all = found.0.tasks.len() == complete.tasks.len();
                     assert!(!all || text.starts_with(SITE.lines().next().unwrap()));
                     tasks.extend(found.0.tasks.into_keys());
                     tags.extend(found.0.tags.into_keys());
                     goals.extend(found.0.goals.into_keys());
                 }
-                assert!(tasks.iter().eq(whole.tasks.keys()));
-                assert!(tags.iter().eq(whole.tags.keys()));
-                assert!(goals.iter().eq(whole.goals.keys()));
+                assert!(tasks.iter().eq(complete.tasks.keys()));
+                assert!(tags.iter().eq(complete.tags.keys()));
+                assert!(goals.iter().eq(complete.goals.keys()));
             }
         }
     }
 }
 
-/// A shard's memory does not grow with the site: its part has its own tasks, and only the tags that it needs or must check.
+/// A shard's memory does not grow with the site: its part has its own tasks, and only the tags that it needs or must
+/// check.
 #[test]
-fn a_part_has_no_more_than_its_own() {
+fn part_has_only_its_own_tasks_and_tags() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
     std::fs::write(&path, plant::plant(1, 2_000)).unwrap();
@@ -237,9 +239,9 @@ fn a_part_has_no_more_than_its_own() {
     assert!(site.tags.len() < 80, "{}", site.tags.len());
 }
 
-/// A file with unusual syntax is read as a whole. So are the site of a single shard, and a path that is not a file.
+/// A file with unusual syntax is read completely. So are the site of a single shard, and a path that is not a file.
 #[test]
-fn what_is_in_doubt_is_read_whole() {
+fn unusual_files_are_read_completely() {
     for more in [
         "[import.map]\nfile = \"map.json\"\n",
         "[candidate.c]\n",
@@ -258,10 +260,10 @@ fn what_is_in_doubt_is_read_whole() {
     assert!(SiteIndex::read("/dev/null").is_none());
 }
 
-/// Each section's fault makes at least one shard read the whole file, whether or not a task needs the section, and also if
-/// headers and brackets are correct.
+/// Each section's fault makes at least one shard read the complete file, even if no task needs the section, and even
+/// if headers and brackets are correct.
 #[test]
-fn faults_are_found_wherever_they_are() {
+fn fault_in_any_section_is_found() {
     let counts = 2..=5;
     for count in counts.clone() {
         assert_eq!(wrong(SITE.as_bytes(), count), Ok(0));
@@ -300,12 +302,12 @@ fn faults_are_found_wherever_they_are() {
     }
 }
 
-/// A fault in a section that no task names keeps one and the same piece from being made, for any number of shards: so no mix of
+/// A fault in a section that no task names prevents the same piece for any number of shards. So no combination of
 /// shards has all pieces.
 #[test]
-fn a_fault_leaves_a_piece_missing_for_any_number_of_shards() {
-    let whole = Site::parse(SITE, "site.toml").unwrap();
-    let inventory = Inventory::new(&whole, Recipe::new(&whole, None, "program"));
+fn fault_prevents_one_piece_for_any_number_of_shards() {
+    let complete = Site::parse(SITE, "site.toml").unwrap();
+    let inventory = Inventory::new(&complete, Recipe::new(&complete, None, "program"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
     for unused in ["unused", "another", "third", "fourth"] {
@@ -330,9 +332,9 @@ fn a_fault_leaves_a_piece_missing_for_any_number_of_shards() {
     }
 }
 
-/// Endless chains of names are not followed for long.
+/// Very long chains of names are followed only to a limit.
 #[test]
-fn long_ways_are_read_whole() {
+fn long_chains_of_names_are_read_completely() {
     let mut text = SITE.to_owned();
     for link in 1..100 {
         let before = if link == 1 {
@@ -358,9 +360,9 @@ fn long_ways_are_read_whole() {
     assert_eq!(of("t1").unwrap().tasks.len(), 2);
 }
 
-/// A file that changes between two readings is read as a whole, which gives the content of one moment.
+/// A file that changes between two readings is read completely, which gives the content of one moment.
 #[test]
-fn a_file_that_changes_is_read_whole() {
+fn changing_file_is_read_completely() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("site.toml");
     std::fs::write(&path, SITE).unwrap();
@@ -456,10 +458,10 @@ fn edited(text: &str, edit: &Edit) -> String {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4_000))]
 
-    /// For any edit of a file, the tasks of every shard equal those of the whole site. If the whole site has a fault, at least
-    /// one shard reads the whole file and finds it.
+    /// For any edit of a file, the tasks of every shard equal those of the complete site. If the complete site has a
+    /// fault, at least one shard reads the complete file and finds it.
     #[test]
-    fn edits_are_seen_or_harmless(edits in prop::collection::vec(edit(), 1..4), count in 2_u32..5) {
+    fn edits_are_detected_or_harmless(edits in prop::collection::vec(edit(), 1..4), count in 2_u32..5) {
         let text = edits.iter().fold(SITE.to_owned(), |text, edit| edited(&text, edit));
         let found = wrong(text.as_bytes(), count);
         prop_assert!(found.is_ok(), "{found:?}\n{text}");

@@ -1,9 +1,10 @@
-//! Promise P7: at every moment at which the interlock is open, every pose where the robot may be by what was reported, by what it can
-//! have driven since and by what it can drive until the permission ends, lies in the success set.
+//! Promise P7: at every moment at which the interlock is open, every possible pose of the robot is in the success
+//! set. Possible poses follow from the report, the robot's motion since then, and its motion until the permission
+//! ends.
 //!
-//! The judge shares no code with the gate: floats, the footprint's corners, and the hall's walls. A simulated source reports sets that
-//! the judge has moved to where the gate should just permit or just deny; fixes come late, or not at all. The robot drives towards the
-//! wall as fast as it may.
+//! The judge shares no code with the gate: floats, the footprint's corners, and the hall's walls. A simulated source
+//! reports sets that the judge has moved to the border between permit and denial; fixes come late, or not at all. The
+//! robot drives towards the wall as fast as it may.
 
 use posegate::gate::{Gate, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
@@ -51,7 +52,8 @@ impl Drive {
         }
     }
 
-    /// How long a permission that is given as soon as an estimate comes may last after its stamp, seconds.
+    /// The longest time after its stamp for which a permission can last, if it is given as soon as the estimate
+    /// arrives, seconds.
     fn longest(&self) -> f64 {
         let held = self.latency_ms + self.permit_hold_ms + self.response_ms;
         f64::from(held.min(self.maximum_age_ms)) * 1e-3
@@ -65,8 +67,8 @@ struct Found {
     outside: u64,
 }
 
-/// Drives with a gate that has been told `told` of the robot's speeds.
-fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, found: &mut Found) {
+/// Drives with a gate whose motion bounds are `stated(drive)`.
+fn drive(rng: &mut Rng, bytes: &[u8], stated: impl Fn(&Drive) -> MotionBounds, found: &mut Found) {
     let table = Table::parse(bytes).expect("a table");
     let radius_squared = f64::from(table.radius_squared().q16()) / 65_536.0;
     let drive = Drive::drawn(rng);
@@ -74,7 +76,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
         frame: FrameId::of("map"),
         trust: Trust::FULL,
         aging: Aging::NONE,
-        motion: told(&drive),
+        motion: stated(&drive),
     }];
     let settings = Settings {
         task: "hall",
@@ -109,9 +111,9 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
             }
             let longest = drive.longest();
             let (length, swing) = (drive.speed * longest, drive.rate * longest);
-            let room = rng.within(-0.004, 0.008);
+            let slack = rng.within(-0.004, 0.008);
             let drawn = Believed::drawn(rng, [0.15, 0.6]);
-            let Some(set) = drawn.placed(rng.within(0.0, 6.3), room, length, swing) else {
+            let Some(set) = drawn.placed(rng.within(0.0, 6.3), slack, length, swing) else {
                 return;
             };
             sequence += 1;
@@ -142,7 +144,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
         }
         found.openings += u64::from(!was_open);
         let (stamp, set) = newest.expect("an open gate has permitted a report");
-        // In force until the output has followed the next answer.
+        // Valid until the output has followed the next answer.
         let ends = f64::from(now_ms + drive.response_ms - stamp) * 1e-3;
         found.moments += 1;
         if set.room(drive.speed * ends, drive.rate * ends) < -1e-9 {
@@ -154,12 +156,12 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> MotionBounds, fou
     }
 }
 
-fn driven(openings: u64, seed: u64, told: impl Fn(&Drive) -> MotionBounds) -> Found {
+fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> MotionBounds) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
     let mut rng = Rng::new(seed);
     let mut found = Found::default();
     while found.openings < openings {
-        drive(&mut rng, &bytes, &told, &mut found);
+        drive(&mut rng, &bytes, &stated, &mut found);
     }
     println!("{found:?}");
     found
@@ -177,9 +179,9 @@ fn no_open_moment_has_a_pose_outside() {
     assert!(found.moments > 5 * found.openings, "{found:?}");
 }
 
-/// The judge finds a gate that is told of no speed, of nine tenths of it, or of half the turn rate.
+/// The judge detects a gate with bounds of no speed, of nine tenths of it, or of half the turn rate.
 #[test]
-fn the_judge_finds_a_gate_that_is_told_too_little() {
+fn judge_detects_a_gate_with_too_small_bounds() {
     let still = driven(200, 3, |_| MotionBounds::STANDS_STILL);
     assert!(still.outside > 100, "{still:?}");
     let slower = driven(200, 3, |drive| {

@@ -40,9 +40,9 @@ fn detections(size: f64, seed: u64, rows: u64) -> Detections {
             rng.within(-20.0, 20.0),
         );
         // The tag's normal is along x; the camera is at an angle psi from it.
-        let way = psi.to_radians();
-        let camera_at = [d * way.cos(), d * way.sin()];
-        let yaw = way + core::f64::consts::PI + f64::to_radians(phi);
+        let angle = psi.to_radians();
+        let camera_at = [d * angle.cos(), d * angle.sin()];
+        let yaw = angle + core::f64::consts::PI + f64::to_radians(phi);
         let (sin, cos) = yaw.sin_cos();
         let mut noise = || 0.3 * (0..12).map(|_| rng.unit() - 0.5).sum::<f64>();
         let half = 0.5 * size;
@@ -111,7 +111,7 @@ fn held(model: &ErrorModel, later: &Detections) -> ([f64; 3], f64) {
     (held.map(|held| held / f64::max(count, 1.0)), count)
 }
 
-/// Bounds hold for tags twice and half as large; without the scale, and without the lever, they do not.
+/// Bounds are valid for tags twice and half as large; without the scale, or without the lever, they are not.
 #[test]
 fn bounds_are_scaled_to_tags_of_another_size() {
     let lever = MOUNT.x.abs();
@@ -128,7 +128,7 @@ fn bounds_are_scaled_to_tags_of_another_size() {
         share[1] >= QUANTILE - 0.01 && share[2] >= QUANTILE - 0.01,
         "{share:?}"
     );
-    // Nearby, the robot is between camera and tag, and its position errs by less than the camera's.
+    // At short range the robot is between camera and tag, so its position errs by less than the camera's.
     let (share, _) = held(&small.for_tags_of(0.2, 0.0, 0.0).unwrap(), &large);
     println!("without the lever: {share:?}");
     assert!(share[1] < QUANTILE - 0.02, "{share:?}");
@@ -145,12 +145,12 @@ fn bounds_are_scaled_to_tags_of_another_size() {
     println!("not scaled: {share:?}");
     assert!(share[0] < 0.6, "{share:?}");
 
-    // A lean of the detector's pose adds its part, and only where the size differs.
+    // A tilt of the detector's pose adds its part, and only if the size differs.
     let [flat, leaning] = [0.0, 0.3].map(|rise| large.for_tags_of(0.1, lever, rise).unwrap());
     let mut compared = 0;
     for row in &small.rows {
         if let (Some(flat), Some(leaning)) = (flat.bounds_deg(row.at), leaning.bounds_deg(row.at)) {
-            // Half of 0.3 m; between corners the logarithm of a sum is a little more than that of its parts.
+            // Half of 0.3 m; between corners the logarithm of a sum is slightly more than that of its parts.
             let more = leaning.0 - flat.0;
             assert!(
                 (0.15 - 1e-9..0.17).contains(&more) && flat.1 == leaning.1,

@@ -1,4 +1,4 @@
-//! A pose-set that is proven without a table to lie in a success set does lie in it.
+//! If a pose-set is proven without a table to be in a success set, it is in the set.
 
 use nalgebra::{Matrix3, Vector3};
 use posegate::certify::{Body, ProofBudget, Prover};
@@ -6,7 +6,7 @@ use posegate::shape::SuccessSet;
 use posegate_host::site::{SAMPLE, Site};
 use posegate_testkit::counts;
 
-const PATIENCE: ProofBudget = ProofBudget {
+const BUDGET: ProofBudget = ProofBudget {
     blocks: 20_000,
     smallest: 1e-4,
 };
@@ -51,7 +51,7 @@ fn no_pose_of_a_proven_set_is_outside() {
                 let square =
                     factor * factor.transpose() * scale * scale + Matrix3::identity() * 1e-16;
                 let body = Body::ellipsoid(centre.into(), square);
-                body.is_some_and(|body| body.is_within(&prover, PATIENCE))
+                body.is_some_and(|body| body.is_within(&prover, BUDGET))
             };
             let (mut low, mut high) = (0.0, 8.0);
             for _ in 0..9 {
@@ -60,8 +60,8 @@ fn no_pose_of_a_proven_set_is_outside() {
             }
             counts[usize::from(low > 0.01)] += 1;
             for _ in 0..400 {
-                let way = Vector3::new(random.next(), random.next(), random.next());
-                let pose = centre + factor * way.normalize() * low;
+                let direction = Vector3::new(random.next(), random.next(), random.next());
+                let pose = centre + factor * direction.normalize() * low;
                 assert!(low == 0.0 || holds(&set, pose), "{task}: {pose} at {low}");
             }
             // Cylinders.
@@ -69,7 +69,7 @@ fn no_pose_of_a_proven_set_is_outside() {
                 0.5 * reach[0] * random.next().abs(),
                 0.5 * reach[2] * random.next().abs(),
             );
-            if Body::cylinder(centre.into(), radius, yaw).is_within(&prover, PATIENCE) {
+            if Body::cylinder(centre.into(), radius, yaw).is_within(&prover, BUDGET) {
                 for _ in 0..200 {
                     let angle = 3.2 * random.next();
                     let off = Vector3::new(
@@ -86,17 +86,17 @@ fn no_pose_of_a_proven_set_is_outside() {
 }
 
 #[test]
-fn what_is_no_number_is_not_proven() {
+fn sets_with_nan_or_infinity_are_not_proven() {
     let prover = Prover::new(&set("dock"));
-    assert!(Body::cylinder([0.0; 3], 0.01, 0.01).is_within(&prover, PATIENCE));
+    assert!(Body::cylinder([0.0; 3], 0.01, 0.01).is_within(&prover, BUDGET));
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert!(!Body::cylinder([bad, 0.0, 0.0], 0.01, 0.01).is_within(&prover, PATIENCE));
-        assert!(!Body::cylinder([0.0; 3], bad, 0.01).is_within(&prover, PATIENCE));
-        assert!(!Body::cylinder([0.0; 3], 0.01, bad).is_within(&prover, PATIENCE));
+        assert!(!Body::cylinder([bad, 0.0, 0.0], 0.01, 0.01).is_within(&prover, BUDGET));
+        assert!(!Body::cylinder([0.0; 3], bad, 0.01).is_within(&prover, BUDGET));
+        assert!(!Body::cylinder([0.0; 3], 0.01, bad).is_within(&prover, BUDGET));
         let square = Matrix3::from_diagonal(&Vector3::new(1e-4, bad, 1e-4));
         let body = Body::ellipsoid([0.0; 3], square);
-        assert!(body.is_none_or(|body| !body.is_within(&prover, PATIENCE)));
+        assert!(body.is_none_or(|body| !body.is_within(&prover, BUDGET)));
     }
-    assert!(!Body::cylinder([0.0; 3], -0.01, 0.01).is_within(&prover, PATIENCE));
-    assert!(!Body::cylinder([0.0; 3], 0.01, -0.01).is_within(&prover, PATIENCE));
+    assert!(!Body::cylinder([0.0; 3], -0.01, 0.01).is_within(&prover, BUDGET));
+    assert!(!Body::cylinder([0.0; 3], 0.01, -0.01).is_within(&prover, BUDGET));
 }

@@ -1,6 +1,7 @@
-//! How long an interlock with the exact sets would have been open on the recorded hall: what `./ci.sh recorded DIR` prints next to the
-//! time of the gate. In plain floats: the covariance is propagated exactly, the fix is carried from its very stamp, slip and motion are a
-//! disc, and the hall is a box along the world's axes, so that the sum of ellipsoid and disc is inside exactly if its extents are.
+//! The time for which an interlock with the exact sets would have been open on the recorded hall; `./ci.sh recorded
+//! DIR` prints it with the time of the gate. In plain floats: the covariance is propagated exactly, the fix is
+//! carried from its exact stamp, and slip and motion are a disc. The hall is a box along the world's axes, so the sum
+//! of ellipsoid and disc is inside exactly if its extents are.
 
 use posegate::report::Heading;
 use posegate::set::Uncertainty;
@@ -36,16 +37,16 @@ struct Fix {
 }
 
 fn read(path: &Path) -> (Vec<Fix>, Vec<Timed>) {
-    let wanted = [
+    let topics = [
         ("/amcl_pose", Role::Estimates(0)),
         ("/odom", Role::Odometry),
     ];
-    let wanted = wanted.map(|(topic, role)| Wanted {
+    let topics = topics.map(|(topic, role)| Wanted {
         topic: topic.into(),
         role,
     });
     let file = File::open(path).expect("the recording");
-    let mut bag = Bag::new(BufReader::new(file), "nav2", &wanted);
+    let mut bag = Bag::new(BufReader::new(file), "nav2", &topics);
     let (mut fixes, mut odometry) = (Vec::new(), Vec::new());
     while let Some(item) = bag.next().expect("a bag") {
         match item {
@@ -93,7 +94,8 @@ struct Carried {
 impl Carried {
     fn of(fix: &Fix) -> Self {
         let [[xx, xy, _], [_, yy, _], [_, _, tt]] = fix.covariance;
-        // AMCL fills no terms between position and heading: twice both parts is above every covariance with any such terms.
+        // AMCL gives no terms between position and heading: twice both parts is above every covariance with any such
+        // terms.
         let covariance =
             [[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, tt]].map(|row| row.map(|v| 2.0 * v));
         Self {
@@ -204,7 +206,7 @@ fn recorded_hall_with_exact_sets() {
             let share = ((now_s - fix.t_s) / (now_s - before_s)).clamp(0.0, 1.0);
             let mut new = Carried::of(fix);
             new.moves(by.map(|v| share * v));
-            // One from before the odometry began is of no use.
+            // A fix from before the start of the odometry is ignored.
             if fix.t_s >= before_s {
                 carried = (now_s - before_s <= GAP_S).then_some(new);
             }

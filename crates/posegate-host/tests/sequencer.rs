@@ -1,4 +1,4 @@
-//! Plans on the controller that succeed, lose a tag or meet a surprise; and damaged rules.
+//! Plans on the controller that succeed, lose a tag or have a surprise; and damaged rules.
 
 use posegate::num::BinaryAngle;
 use posegate::pose::Pose;
@@ -67,7 +67,7 @@ fn set(x_m: f64, translation_m: f64) -> PoseSet {
 }
 
 #[test]
-fn a_plan_that_goes_well() {
+fn plan_without_failures_succeeds() {
     let bytes = bytes();
     let mut plan = Sequencer::new(Rules::parse(&bytes).unwrap());
     assert_eq!(plan.rules().site_digest(), &[5; 32]);
@@ -97,7 +97,7 @@ fn a_plan_that_goes_well() {
 }
 
 #[test]
-fn a_lost_tag_is_tried_again_and_then_done_without() {
+fn lost_tag_is_tried_twice_and_then_replaced() {
     let bytes = bytes();
     let mut plan = Sequencer::new(Rules::parse(&bytes).unwrap());
     let see_7 = Instruction::Look {
@@ -122,7 +122,7 @@ fn a_lost_tag_is_tried_again_and_then_done_without() {
 }
 
 #[test]
-fn a_surprise_finds_another_entry_or_inhibits() {
+fn surprise_leads_to_another_entry_or_inhibits() {
     let bytes = bytes();
     let mut plan = Sequencer::new(Rules::parse(&bytes).unwrap());
     let _ = plan.next(&set(0.0, 0.3));
@@ -155,7 +155,7 @@ fn a_surprise_finds_another_entry_or_inhibits() {
         plan.next(&set(0.0, 0.51)),
         Instruction::Inhibit(StopReason::NoEntry)
     );
-    // Such a pause ends by itself as soon as an entry applies again.
+    // Such a pause ends as soon as an entry applies again.
     assert_eq!(
         plan.next(&set(0.0, 0.5)),
         Instruction::Look {
@@ -165,9 +165,9 @@ fn a_surprise_finds_another_entry_or_inhibits() {
     );
 }
 
-/// A lost tag is not looked at again after any surprise.
+/// After any surprise, a lost tag is not looked at again.
 #[test]
-fn a_lost_tag_stays_lost() {
+fn lost_tag_stays_lost_after_surprises() {
     let bytes = bytes();
     let mut plan = Sequencer::new(Rules::parse(&bytes).unwrap());
     let _ = plan.next(&set(0.0, 0.3));
@@ -181,7 +181,7 @@ fn a_lost_tag_stays_lost() {
 }
 
 #[test]
-fn every_damage_is_found() {
+fn damaged_rules_are_refused() {
     let good = bytes();
     for bit in 0..good.len() * 8 {
         let mut bytes = good.clone();
@@ -211,7 +211,7 @@ fn every_damage_is_found() {
 }
 
 #[test]
-fn rules_that_lead_nowhere_are_refused() {
+fn rules_with_invalid_targets_are_refused() {
     let parse = |order: RuleOrder| {
         let bytes = write(&[order], [0; 32]).unwrap();
         Rules::parse(&bytes).map(|_| ())

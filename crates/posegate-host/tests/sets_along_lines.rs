@@ -147,7 +147,7 @@ fn walks_agree_with_membership() {
             };
             let headed = along.at(yaw);
             let stretches = headed.stretches(&walk);
-            // Views that are intersected once give the same intervals, bit for bit, with the same numbers.
+            // Views that are intersected together give the same intervals, bit for bit, with the same numbers.
             let (same, seen) = headed.stretches_and_seen(&walk);
             assert_eq!(same, stretches, "{text}");
             for view in 0..along.views() {
@@ -206,7 +206,7 @@ fn world(goal: PoseDeg, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn arcs_end_at_their_headings() {
+fn yaw_arcs_end_at_their_headings() {
     let (text, ..) = SETS[8];
     let along = LineClipper::of(&set([text, "", ""]));
     let ends = along.ends_of_arcs();
@@ -222,7 +222,7 @@ fn arcs_end_at_their_headings() {
 }
 
 #[test]
-fn a_watch_agrees_with_membership() {
+fn view_evaluator_agrees_with_membership() {
     let site = posegate_host::site::Site::parse(posegate_host::site::SAMPLE, "site.toml").unwrap();
     let set = &site.task("see-t7").unwrap().success;
     let watch = set.watch();

@@ -89,7 +89,7 @@ type Changes = Vec<(&'static str, String)>;
 
 /// Each row makes a slack stricter that determines a border of the tables.
 #[test]
-fn what_is_stricter_is_held() {
+fn each_limit_and_tolerance_is_enforced() {
     let tag = |t: f64, a: f64| {
         (
             "# tag",
@@ -221,7 +221,7 @@ fn what_is_stricter_is_held() {
     }
 }
 
-/// Returns the same set without a sight record: with a second alternative that no pose of the extent is in.
+/// Returns the same set without a sight record: with a second alternative that contains no pose of the extent.
 fn only_cells(success: &SuccessSet) -> SuccessSet {
     let far = Shape::Box(posegate::shape::BoxSet {
         x: [90.0, 91.0],

@@ -1,4 +1,4 @@
-//! A damaged table is refused; a wrong table is not proven.
+//! Damaged tables are refused; wrong tables are not proven.
 
 use posegate_testkit::sites;
 
@@ -74,7 +74,7 @@ fn facets(task: &str) -> Vec<u8> {
 }
 
 #[test]
-fn erased_flash_is_no_table() {
+fn erased_flash_is_refused() {
     for fill in [0x00, 0xff, 0xa5] {
         for length in [0, 4, 179, 180, 181, 4096] {
             assert!(Table::parse(&vec![fill; length]).is_err());
@@ -87,7 +87,7 @@ fn erased_flash_is_no_table() {
 }
 
 #[test]
-fn another_version_is_refused_by_name() {
+fn another_version_has_its_own_error() {
     let mut bytes = table("dock");
     bytes[8] = 2;
     repair(&mut bytes);
@@ -98,9 +98,9 @@ fn another_version_is_refused_by_name() {
     assert_eq!(Table::parse(&bytes).err(), Some(TableError::Magic));
 }
 
-/// With the checksum repaired, a changed header byte is refused by the parser, or by the proof.
+/// If the checksum is corrected, a changed header byte is refused by the parser or by the proof.
 #[test]
-fn every_header_field_is_held_by_the_proof() {
+fn proof_checks_every_header_field() {
     let site = sample();
     let claim = claim(&site, "dock");
     let bytes = table("dock");
@@ -132,7 +132,7 @@ fn sight_at(bytes: &[u8]) -> usize {
 
 /// The parser or the proof refuses the least change of any byte of a sight record, and its loss.
 #[test]
-fn every_number_of_the_sight_record_is_held_by_the_proof() {
+fn proof_checks_every_number_of_the_sight_record() {
     let site = sample();
     let claim = claim(&site, "see-t7");
     let bytes = facets("see-t7");
@@ -208,7 +208,7 @@ fn only_visibility_sets_have_a_sight_record() {
 
 /// If any one run is widened by one cell, `verify` names that cell.
 #[test]
-fn a_run_that_is_one_cell_too_wide_is_not_proven() {
+fn run_that_is_one_cell_too_wide_is_not_proven() {
     let site = sample();
     for (task, slab_step, row_step) in [("dock", 1, 1), ("park", 1, 2), ("see-t7", 2, 3)] {
         let mut order = order(&site, task);
@@ -316,10 +316,10 @@ fn is_inside(success: &SuccessSet, cells: &Cells, slab: usize, row: usize, colum
     })
 }
 
-/// Sampling of corners would accept this table: in a wide slab the parked car swings out between the
-/// sampled headings.
+/// Sampling of corners would accept this table: in a wide slab the parked car swings out between the sampled
+/// headings.
 #[test]
-fn a_dip_between_samples_is_not_proven() {
+fn exit_between_samples_is_not_proven() {
     let site = sample();
     let task = site.task("park").unwrap();
     // The vertex (2, 1) is farthest along x at a heading of -26.57 deg, so the slab is [-40, -13.13].
@@ -396,7 +396,7 @@ fn a_dip_between_samples_is_not_proven() {
 }
 
 #[test]
-fn bytes_are_the_same_at_any_number_of_threads() {
+fn bytes_are_equal_for_any_number_of_threads() {
     let site = sample();
     let order = order(&site, "see-t7");
     let with = |threads| {
@@ -411,7 +411,7 @@ fn bytes_are_the_same_at_any_number_of_threads() {
 }
 
 #[test]
-fn what_the_format_does_not_hold_is_refused_with_numbers() {
+fn values_beyond_the_format_are_refused_with_numbers() {
     let site = sample();
     let with = |extent: Extent, step: Step| {
         let mut order = order(&site, "dock");

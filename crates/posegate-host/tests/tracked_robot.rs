@@ -1,11 +1,13 @@
-//! Promise P7 for a robot whose fixes are carried along its odometry ([`posegate::track`]): at every moment at which the interlock is
-//! open, every pose where the robot may be, and every pose that it can reach until the permission ends, lies in the success set.
+//! Promise P7 for a robot whose fixes are carried along its odometry ([`posegate::track`]). At every moment at which
+//! the interlock is open, every possible pose of the robot, and every pose that it can reach until the permission
+//! ends, is in the success set.
 //!
-//! The judge shares no code with the tracker or the gate. At each open moment it looks for a history that agrees with all that was
-//! reported and that ends as near to a wall as possible: a true pose within the ellipsoid of the fix, increments whose noise is within the
-//! same ellipsoid (all deviations together have at most the length of the table's radius), and slip at its bound, in the worst direction
-//! in each increment. It drives that history in plain floats, without any linearisation. Fixes come late, in between two increments,
-//! before the odometry of their time, or not at all.
+//! The judge shares no code with the tracker or the gate. At each open moment it searches a history that agrees with
+//! all reports and that ends as near to a wall as possible. A history has a true pose within the ellipsoid of the fix
+//! and increments whose noise is within the same ellipsoid (all deviations together have at most the length of the
+//! table's radius). Its slip is at its bound, in the worst direction in each increment. The judge drives that history
+//! in plain floats, without any linearisation. Fixes come late, between two increments, before the odometry of their
+//! time, or not at all.
 
 use posegate::gate::{Gate, Reason, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
@@ -32,8 +34,8 @@ struct Drive {
     cycle_ms: u32,
     response_ms: u32,
     permit_hold_ms: u32,
-    /// Whether the controller weighs the carried fix in every cycle, or only with news.
-    weighs_again: bool,
+    /// `true` if the controller evaluates the carried fix in every cycle, `false` if only after new data.
+    evaluates_every_cycle: bool,
 }
 
 impl Drive {
@@ -69,9 +71,9 @@ impl Drive {
             },
             cycle_ms,
             response_ms: cycle_ms + 1 + rng.below(5) as u32,
-            // Also one that ends before the next odometry: then all of it is used.
+            // May end before the next odometry: then all of it is used.
             permit_hold_ms: 1 + rng.below(2 * odometry_ms as usize) as u32,
-            weighs_again: rng.chance(0.3),
+            evaluates_every_cycle: rng.chance(0.3),
         }
     }
 
@@ -88,7 +90,7 @@ struct Read {
     to_ms: u32,
 }
 
-/// A fix: when it was true, when it comes, and what it says.
+/// A fix: its stamp, its arrival, and its set.
 #[derive(Clone, Copy, Debug)]
 struct Fix {
     stamp_ms: u32,
@@ -115,7 +117,8 @@ impl Fix {
     }
 }
 
-/// One moment of a history: the increment, how much of it was after the fix, and its deviations (place on each axis, turn).
+/// One moment of a history: the increment, the part of it after the fix, and its deviations (place on each axis,
+/// turn).
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     by: [f64; 3],
@@ -123,7 +126,7 @@ struct Moment {
     slips: [f64; 2],
 }
 
-/// What the tracker was told, up to the report that was permitted.
+/// The reports to the tracker, up to the permitted one.
 struct Evidence<'a> {
     fix: Fix,
     reads: &'a [Read],
@@ -132,7 +135,8 @@ struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// The increments since the fix. `part` is the share of the first one that was driven after the fix, of what may be.
+    /// The increments since the fix. `part` is the share of the first increment that was driven after the fix, within
+    /// the possible range.
     fn moments(&self, part: f64) -> Vec<Moment> {
         let errors = &self.drive.errors;
         let since = self
@@ -142,8 +146,8 @@ impl Evidence<'_> {
         let moment = |read: &Read| {
             let passed = f64::from(read.to_ms - read.from_ms) * 1e-3;
             let before = f64::from(self.fix.stamp_ms.saturating_sub(read.from_ms)) * 1e-3;
-            // Within the increment it may have driven unevenly, also back and forth: before the fix and after it as far as its speed
-            // allows, and in sum what was read.
+            // Within the increment the robot may have driven unevenly, also back and forth: before and after the fix
+            // as far as its speed allows, with the reported sum.
             let share = |length: f64, fastest: f64| {
                 if before > 0.0 && length > 0.0 {
                     let [first, second] = [before, passed - before].map(|s| fastest * s / length);
@@ -170,7 +174,7 @@ impl Evidence<'_> {
             let heading = square(errors.rad_per_sqrt_rad) * turn
                 + square(errors.rad_per_sqrt_m) * length
                 + square(errors.rad_per_sqrt_s) * seconds;
-            // Where part of an increment counts, its noise is that of the share of its time.
+            // If only part of an increment counts, its noise is that of the share of its time.
             let noise = if before > 0.0 { 0.0 } else { self.radius };
             Moment {
                 by,
@@ -184,7 +188,8 @@ impl Evidence<'_> {
         since.map(moment).collect()
     }
 
-    /// How far a corner can be beyond a wall, metres: below zero it cannot. The history that leads there is driven exactly.
+    /// The largest distance of a corner beyond a wall, metres; negative if it cannot reach the wall. The history that
+    /// leads there is driven exactly.
     fn beyond(
         &self,
         (moments, places): (&[Moment], &[[f64; 3]]),
@@ -199,9 +204,9 @@ impl Evidence<'_> {
             [pose[0] + c * vx - s * vy, pose[1] + s * vx + c * vy]
         };
         let end = tip(pose);
-        // How far a turn about a place moves the corner towards the wall, metres per radian.
+        // The movement of the corner towards the wall by a turn about a place, metres per radian.
         let lever = |at: [f64; 3]| wall[1] * (end[0] - at[0]) - wall[0] * (end[1] - at[1]);
-        // The direction of all deviations together in which the corner goes farthest.
+        // The direction of all deviations together that moves the corner farthest.
         let along = |column: usize| wall[0] * set.x[column] + wall[1] * set.y[column];
         let first = [along(0) + lever(set.mean) * set.turn, along(1), along(2)];
         let mut square: f64 = first.iter().map(|v| v * v).sum();
@@ -215,7 +220,7 @@ impl Evidence<'_> {
         let length = square.sqrt().max(1e-12);
         let reach = self.drive.speed * ends_s;
         let swing = self.drive.rate * ends_s;
-        // Where the wall is far from all that, the exact history need not be driven.
+        // If the wall is out of reach, the exact history need not be driven.
         let linear = wall[0] * end[0] + wall[1] * end[1] + length + slipped + reach + 0.5 * swing;
         if linear < TO_WALL_M - 0.2 {
             return linear - TO_WALL_M;
@@ -240,7 +245,7 @@ impl Evidence<'_> {
                 pose[2] + turned,
             ];
         }
-        // Until the permission ends it drives straight at the wall, and turns as it likes.
+        // Until the permission ends it drives straight at the wall, with any turn.
         let shares = [-1.0, -0.5, 0.0, 0.5, 1.0].into_iter();
         let farthest = shares.map(|share| {
             let [x, y] = tip([pose[0], pose[1], pose[2] + share * swing]);
@@ -249,20 +254,20 @@ impl Evidence<'_> {
         farthest.fold(f64::NEG_INFINITY, f64::max) + reach - TO_WALL_M
     }
 
-    /// How far the robot can be beyond any wall when the permission ends, metres.
+    /// The largest distance of the robot beyond any wall at the end of the permission, metres.
     fn worst(&self, ends_s: f64) -> f64 {
         let mut worst = f64::NEG_INFINITY;
         for part in [0.0, 1.0] {
             let moments = self.moments(part);
-            // The way as it was read.
+            // The path as it was read.
             let mut places = vec![self.fix.set.mean];
             for moment in &moments {
                 places.push(moved(places[places.len() - 1], moment.by));
             }
             for wall in WALLS {
                 for corner in CORNERS {
-                    let way = (moments.as_slice(), places.as_slice());
-                    worst = worst.max(self.beyond(way, [wall, corner], ends_s));
+                    let path = (moments.as_slice(), places.as_slice());
+                    worst = worst.max(self.beyond(path, [wall, corner], ends_s));
                 }
             }
         }
@@ -286,13 +291,18 @@ struct Found {
     outside: u64,
     late: u64,
     early: u64,
-    /// Moments with less than a centimetre of room, and the least room, micrometres.
+    /// Moments with less than a centimetre of slack, and the least slack, micrometres.
     near: u64,
     least_um: i64,
 }
 
-/// Drives with a tracker that has been told `told` of the odometry's errors.
-fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, found: &mut Found) {
+/// Drives with a tracker whose odometry errors are `stated(drive)`.
+fn drive(
+    rng: &mut Rng,
+    bytes: &[u8],
+    stated: impl Fn(&Drive) -> OdometryErrors,
+    found: &mut Found,
+) {
     let table = Table::parse(bytes).expect("a table");
     let q16 = table.radius_squared().q16();
     let radius = (f64::from(q16) / 65_536.0).sqrt();
@@ -318,7 +328,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
         look_at: None,
     };
     let tracker = TrackerSettings {
-        errors: told(&drive),
+        errors: stated(&drive),
         bounds: drive.bounds(),
         trust: Trust::FULL,
         radius_squared: RadiusSquared::from_q16(q16).expect("of a table"),
@@ -329,13 +339,13 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
     // Near the wrap of the clock.
     let start = u32::MAX - rng.below(3_000) as u32;
     let mut gate = Gate::new(bytes, &settings, start).expect("settings");
-    // The robot drives towards a wall, as its odometry reads it, from where it still has some room.
+    // The robot drives towards a wall by its odometry, from a place with some slack.
     let speed = rng.within(0.3, 0.95) * drive.speed;
     let rate = rng.within(-0.9, 0.9) * drive.rate;
     let towards = rng.within(-3.1, 3.1);
-    let room = rng.within(0.0, 2.0) * speed;
+    let slack = rng.within(0.0, 2.0) * speed;
     let set = Believed::drawn(rng, SIZES);
-    let Some(set) = set.placed(towards, room, 0.0, 0.0) else {
+    let Some(set) = set.placed(towards, slack, 0.0, 0.0) else {
         return;
     };
     let mut at = set.mean;
@@ -348,16 +358,16 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
     let mut fixes: Vec<Fix> = Vec::new();
     let (mut now_ms, mut next_fix) = (0u32, 3 + rng.below(30) as u32);
     let mut newest_ms = 0;
-    // A fix with the very stamp of the next odometry.
+    // A fix with the exact stamp of the next odometry.
     let mut with_next = false;
     let _ = tracker.odometry(Increment::of(0.0, 0.0, 0.0, [start; 2]).expect("no movement"));
     let mut current: Option<Fix> = None;
-    // The newest permitted evidence: the fix, how many increments, and the stamp.
+    // The newest permitted evidence: the fix, the number of increments, and the stamp.
     let mut permitted: Option<(Fix, usize, u32)> = None;
     let mut is_open = false;
     while now_ms < 3_500 {
         now_ms += 1 + rng.below(drive.cycle_ms as usize) as u32;
-        // Between two readings the robot moves evenly, as far as anyone knows.
+        // Between two readings the robot moves evenly.
         while next_fix <= now_ms {
             if rng.chance(0.3) {
                 with_next = true;
@@ -368,7 +378,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             }
             next_fix += 1 + rng.below(2 * drive.fix_ms as usize) as u32;
         }
-        let (mut step, mut is_news) = (None, drive.weighs_again);
+        let (mut step, mut is_news) = (None, drive.evaluates_every_cycle);
         if now_ms - newest_ms >= drive.odometry_ms && !rng.chance(0.05) {
             let seconds = f64::from(now_ms - newest_ms) * 1e-3;
             // In whole micrometres, as a controller reads it.
@@ -376,7 +386,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             let by = [um(ahead * seconds), 0.0, rate * seconds];
             let stamp = start.wrapping_add(now_ms);
             let span = [start.wrapping_add(newest_ms), stamp];
-            let increment = Increment::of(by[0], by[1], by[2], span).expect("a short way");
+            let increment = Increment::of(by[0], by[1], by[2], span).expect("a short path");
             if let Err(reason) = tracker.odometry(increment) {
                 step = Some(gate.inhibit(start.wrapping_add(now_ms), reason));
                 current = None;
@@ -446,7 +456,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
             drive: &drive,
             radius,
         };
-        // In force until the output has followed the next answer.
+        // Valid until the output has followed the next answer.
         let ends_s = f64::from(now_ms + drive.response_ms - stamp) * 1e-3;
         let beyond = evidence.worst(ends_s);
         found.near += u64::from(beyond > -0.01);
@@ -460,7 +470,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], told: impl Fn(&Drive) -> OdometryErrors, f
     }
 }
 
-fn driven(openings: u64, seed: u64, told: impl Fn(&Drive) -> OdometryErrors) -> Found {
+fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> OdometryErrors) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
     let mut rng = Rng::new(seed);
     let mut found = Found {
@@ -468,7 +478,7 @@ fn driven(openings: u64, seed: u64, told: impl Fn(&Drive) -> OdometryErrors) -> 
         ..Found::default()
     };
     while found.openings < openings {
-        drive(&mut rng, &bytes, &told, &mut found);
+        drive(&mut rng, &bytes, &stated, &mut found);
     }
     println!("{found:?}");
     found
@@ -488,9 +498,9 @@ fn no_open_moment_of_a_tracked_robot_has_a_history_that_ends_outside() {
     assert!(found.least_um < 5_000, "{found:?}");
 }
 
-/// The judge finds a tracker that is told of no slip, of half of it, or of half of the noise.
+/// The judge detects a tracker with errors of no slip, of half of the slip, or of half of the noise.
 #[test]
-fn the_judge_finds_a_tracker_that_is_told_too_little() {
+fn judge_detects_a_tracker_with_too_small_errors() {
     let no_slip = driven(6_000, 3, |drive| OdometryErrors {
         slip: 0.0,
         turn_slip: 0.0,

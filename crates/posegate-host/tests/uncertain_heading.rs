@@ -1,5 +1,5 @@
-//! A pose-set whose heading is uncertain is decided as any other: permitted where every pose of it succeeds, denied with a pose that does
-//! not succeed.
+//! A pose-set with an uncertain heading is decided like any other: permitted if every pose of it succeeds, denied
+//! with a pose that does not succeed.
 
 use posegate::contain::{Decision, decide, examine, second};
 use posegate::report::PoseEstimate;
@@ -31,7 +31,7 @@ fn uncertainties(sigma: f64, sigma_yaw: f64) -> [Uncertainty; 2] {
 }
 
 #[test]
-fn a_robot_amid_a_hall_is_permitted_at_any_uncertainty_of_its_heading() {
+fn robot_far_from_walls_is_permitted_at_any_uncertainty_of_heading() {
     let site = hall::site(GOAL);
     let bytes = hall::facets(&site, "hall", 2.5);
     let table = Table::parse(&bytes).expect("a table");
@@ -63,9 +63,9 @@ fn a_robot_amid_a_hall_is_permitted_at_any_uncertainty_of_its_heading() {
     }
 }
 
-/// Near a wall a corner meets it at some heading: the worst pose is outside of the set.
+/// Near a wall a corner touches it at some heading: the worst pose is outside of the set.
 #[test]
-fn near_a_wall_the_worst_pose_is_one_that_fails() {
+fn worst_pose_near_a_wall_fails() {
     let site = hall::site(GOAL);
     let bytes = hall::facets(&site, "hall", 2.5);
     let table = Table::parse(&bytes).expect("a table");
@@ -73,7 +73,8 @@ fn near_a_wall_the_worst_pose_is_one_that_fails() {
     let mut denied = 0;
     for sigma_yaw_deg in [5.9, 12.0, 20.0, 40.0, 60.0f64] {
         for uncertainty in uncertainties(0.05, sigma_yaw_deg.to_radians()) {
-            // In the hall's axes the estimate is ahead of the wall by 0.5 m at least: a robot that faces it fits, one that is turned does not.
+            // In the hall's axes the estimate is at least 0.5 m from the wall: a robot that faces the wall fits, a
+            // turned one does not.
             let (s, c) = 30f64.to_radians().sin_cos();
             let ahead = 1.52;
             let estimate = Estimate {
@@ -87,7 +88,8 @@ fn near_a_wall_the_worst_pose_is_one_that_fails() {
                 continue;
             }
             denied += 1;
-            // It is where the set leaves first as it grows: on the border. A hundredth farther it is outside.
+            // The worst pose is the first to leave the set as the pose-set grows: on the border. A hundredth farther
+            // is outside.
             let pose = found.worst_pose.expect("a denial has a worst pose");
             let turned = f64::from(pose.yaw.minus(set.mean().yaw).signed()) / 4_294_967_296.0 * TAU;
             let farther = |from: f64, to: f64| from + 1.01 * (to - from);
@@ -105,9 +107,10 @@ fn near_a_wall_the_worst_pose_is_one_that_fails() {
     assert!(denied >= 6, "{denied}");
 }
 
-/// Positions that go with the heading, through up to a turn: what the first evaluation permits, the second confirms.
+/// Positions that are correlated with the heading, up to a turn: the second evaluation confirms what the first
+/// permits.
 #[test]
-fn permits_of_sets_that_turn_are_confirmed() {
+fn permits_of_sets_with_large_yaw_errors_are_confirmed() {
     let site = hall::site(GOAL);
     let bytes = hall::facets(&site, "hall", 2.5);
     let table = Table::parse(&bytes).expect("a table");

@@ -1,4 +1,4 @@
-//! The worst pose of a denial is a pose of the given pose-set, however small or thin the set is.
+//! The worst pose of a denial is a pose of the given pose-set, for small and thin sets too.
 
 use posegate_testkit::{counts, oracle};
 
@@ -62,7 +62,7 @@ fn estimate_of([x_m, y_m, yaw_rad]: Pose) -> Estimate {
 }
 
 #[test]
-fn worst_poses_lie_in_the_set_that_was_given() {
+fn worst_poses_are_in_the_given_set() {
     let mut rng = Rng::new(11 + counts::first_seed());
     let sets = if counts::is_deep() { 4_000 } else { 1_000 };
     let (mut denials, mut near, mut at_estimate) = (0u32, 0u32, 0u32);
@@ -73,12 +73,12 @@ fn worst_poses_lie_in_the_set_that_was_given() {
         let goal = coordinates(table.goal().pose);
         // Estimates near the border, found by a search outwards from the goal with a tiny set.
         for _ in 0..sets {
-            let way = rng.within(-3.2, 3.2);
+            let direction = rng.within(-3.2, 3.2);
             let turn = rng.within(-0.1, 0.1);
             let tiny = |far: f64| {
                 let pose = [
-                    goal[0] + far * way.cos(),
-                    goal[1] + far * way.sin(),
+                    goal[0] + far * direction.cos(),
+                    goal[1] + far * direction.sin(),
                     goal[2] + turn,
                 ];
                 let set = PoseSet::bounded(estimate_of(pose), 1e-6, 1e-7).unwrap();
@@ -130,10 +130,10 @@ fn worst_poses_lie_in_the_set_that_was_given() {
     assert!(at_estimate * 5 < denials, "{at_estimate} of {denials}");
 }
 
-/// The worst pose of sets that are millimetres long and micrometres thin, round or turned, inflated or not, is in the
-/// set.
+/// The worst pose of sets that are millimetres long and micrometres thin, round or rotated, inflated or not, is in
+/// the set.
 #[test]
-fn thin_sets_have_a_worst_pose_of_their_own() {
+fn worst_pose_of_a_thin_set_is_in_the_set() {
     let bytes = read("examples/tables/dock.posegate");
     let table = Table::parse(&bytes).unwrap();
     let radius = table.radius_squared();

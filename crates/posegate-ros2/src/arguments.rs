@@ -4,7 +4,7 @@ use crate::names::{NameError, Names};
 use crate::parameters::{ParameterError, Parameters};
 use std::path::PathBuf;
 
-/// What `--help` prints.
+/// The text that `--help` prints.
 pub const USAGE: &str = "\
 Decide whether a robot is localized well enough for a task, as a ROS 2 node
 
@@ -25,7 +25,7 @@ Examples:
 
 The parameters, the topics and what a consumer of the permit must do: docs/for-ros.md.";
 
-/// What the command line asks for.
+/// A parsed command line.
 #[derive(Debug)]
 pub enum Command {
     /// Run the node.
@@ -41,7 +41,7 @@ pub enum Command {
 pub struct Arguments {
     /// The file of the table.
     pub table: PathBuf,
-    /// The digest of the site file, as it was given.
+    /// The digest of the site file, as given.
     pub site_digest: Option<String>,
     /// The site file, for its tags and cameras.
     pub site: Option<PathBuf>,
@@ -53,45 +53,45 @@ pub struct Arguments {
     pub names: Names,
 }
 
-/// A command line that is refused.
+/// The reason why a command line is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ArgumentError {
-    /// No table.
+    /// No table is given.
     #[error(
         "no table is given: write `posegate-node TABLE`, with a table of `posegate table build`"
     )]
     NoTable,
-    /// More than one file.
+    /// More than one file is given.
     #[error(
         "two tables are given, `{0}` and `{1}`: a node has one task; start a node for each table"
     )]
     TwoTables(String, String),
-    /// An option that does not exist.
+    /// The option does not exist.
     #[error(
         "`{0}` is not an option of posegate-node: expected a table, --site-digest, --site, --serial, --baud or --ros-args; see --help"
     )]
     Unknown(String),
-    /// An option of ROS that does not exist.
+    /// The ROS argument does not exist.
     #[error(
         "`{0}` is not an argument of ROS: expected -p NAME:=VALUE, --params-file FILE, -r FROM:=TO, --log-level LEVEL or `--`"
     )]
     UnknownRos(String),
-    /// Not a speed.
+    /// The value is not a speed.
     #[error("--baud is `{0}`: expected bits per second, a whole number from 1200 to 4000000")]
     Baud(String),
-    /// A speed without a line.
+    /// A speed is given without a line.
     #[error("--baud is given without --serial: write --serial DEV --baud N")]
     BaudAlone,
-    /// An option without its value.
+    /// An option has no value.
     #[error("{0} needs a value: write {0} {1}")]
     NoValue(&'static str, &'static str),
-    /// A parameter file that cannot be read.
+    /// A parameter file cannot be read.
     #[error("cannot read the parameter file {0}: {1}")]
     File(String, std::io::Error),
-    /// Not a parameter.
+    /// A parameter is refused.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// Not a name.
+    /// A name is refused.
     #[error(transparent)]
     Name(#[from] NameError),
 }
@@ -100,7 +100,7 @@ impl Command {
     /// Reads the arguments after the program's name.
     ///
     /// # Errors
-    /// [`ArgumentError`]. Parameter files are read, so a missing one is an error too.
+    /// [`ArgumentError`]. Parameter files are read, so a missing file is also an error.
     pub fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
         let mut words = given.into_iter();
         let (mut table, mut site_digest, mut serial, mut baud) = (None, None, None, None);
@@ -190,7 +190,7 @@ struct Ros {
 }
 
 impl Ros {
-    /// Reads up to `--`, or to the end.
+    /// Reads the arguments up to `--`, or to the end.
     fn parse(&mut self, words: &mut impl Iterator<Item = String>) -> Result<(), ArgumentError> {
         while let Some(word) = words.next() {
             let mut value = |option, form| words.next().ok_or(ArgumentError::NoValue(option, form));
@@ -206,7 +206,7 @@ impl Ros {
                     self.parameters.push(Source::File(value));
                 }
                 "-r" | "--remap" => self.remaps.push(value("-r", "FROM:=TO")?),
-                // Of no use to this node; launch files give them to every node.
+                // This node does not use it, but launch files give it to every node.
                 "--log-level" => drop(value("--log-level", "LEVEL")?),
                 "--log-config-file" => drop(value("--log-config-file", "FILE")?),
                 "-e" | "--enclave" => drop(value("--enclave", "PATH")?),
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_has_a_table_parameters_and_names() {
+    fn run_has_table_parameters_and_names() {
         let line = "dock.posegate --site-digest abc --ros-args -p inflation:=2.0 -r pose:=/filter/pose --log-level info -- ";
         let Ok(Command::Run(arguments)) = parse(line) else {
             panic!("{line}");
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_lines_are_refused_with_words() {
+    fn invalid_command_lines_have_their_own_errors() {
         for (line, words) in [
             ("", "no table is given"),
             ("a.posegate b.posegate", "two tables"),

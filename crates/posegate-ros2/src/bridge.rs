@@ -1,5 +1,5 @@
-//! The bridge to a controller on a serial line. The gate on the controller decides; the bridge passes reports to it and says what it
-//! says, never more.
+//! The bridge to a controller on a serial line. The gate on the controller decides; the bridge passes reports to it
+//! and publishes its answers, without any permit of its own.
 
 use crate::clock::Now;
 use crate::decider::Decider;
@@ -20,11 +20,11 @@ use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher};
 use std::time::{Duration, Instant};
 
-/// How often the line is read. A controller sends a hundred messages a second.
-const PATIENCE: Duration = Duration::from_millis(5);
-/// For how long a clock that was set denies. Stamps from before and after are not of one clock.
+/// The period at which the line is read. A controller sends a hundred messages a second.
+const READ_PERIOD: Duration = Duration::from_millis(5);
+/// The time for which the bridge denies after a clock was set. Stamps from before and after are not of one clock.
 const HOLD: Duration = Duration::from_millis(500);
-/// Reports whose verdict may still come.
+/// The number of reports whose verdict may still arrive.
 const SENT: usize = 64;
 
 /// The bridge to a controller.
@@ -34,7 +34,7 @@ pub struct Bridge {
     link: Link,
     limit: Duration,
     order: Order,
-    /// Where the numbers of this run begin.
+    /// The first sequence number of this run.
     first: u32,
     gaps: u32,
     held: Option<(Instant, Reason)>,
@@ -51,7 +51,7 @@ impl Bridge {
     /// # Errors
     /// [`SerialError`]
     pub fn open(serial: &Serial) -> Result<Self, SerialError> {
-        // A number that the controller has from a run before this one would be an answer to another report.
+        // A number that the controller has from an earlier run would be an answer to another report.
         let first = std::hash::RandomState::new().build_hasher().finish() as u32;
         Ok(Self {
             port: Port::open(&serial.path, serial.baud)?,
@@ -69,11 +69,12 @@ impl Bridge {
         })
     }
 
-    /// Reads what the controller sent.
+    /// Reads the bytes that the controller sent.
     fn listen(&mut self) {
         let now = Instant::now();
         match self.port.read(now) {
-            // Bytes that waited while this program did not run are no newer for that: the link bounds their age by a round trip.
+            // Bytes that waited while this program did not run are not newer for that: the link bounds their age by a
+            // round trip.
             Some(bytes) => self.link.take(&bytes, Instant::now()),
             None => self.link.close(),
         }
@@ -102,7 +103,7 @@ impl Bridge {
             // The permission or the output contradicts the state.
             (_, _, Some(State::Permitted)) if is_young => State::Inhibited(Reason::InterlockFault),
             (_, _, Some(state)) if is_young => state,
-            // The reason of a controller that speaks but has not answered yet.
+            // The reason of a controller that sends telemetry but has not answered yet.
             (_, _, Some(State::Inhibited(reason) | State::Latched(reason)))
                 if self.is_heard(moment) =>
             {
@@ -124,7 +125,7 @@ impl Bridge {
             .is_some_and(|silence| silence < self.limit)
     }
 
-    /// Returns what is wrong with the line, in words.
+    /// Returns the problem of the line as text; `None` if there is none.
     fn problem(&self, now: Instant) -> Option<String> {
         let path = self.port.path().display();
         if let Some(problem) = self.port.problem() {
@@ -162,8 +163,8 @@ impl Decider for Bridge {
         self.frame = Some(message.header.frame_id.clone());
         let moment = Instant::now();
         let clock_ms = self.link.clock_ms(moment).filter(|_| self.is_heard(moment));
-        // A stamp that is not on this machine's clock has no age.
-        // The age is read after the controller's clock: a pause in between makes the estimate older, never younger.
+        // A stamp that is not on this machine's clock has no age. The age is read after the controller's clock: a
+        // pause in between makes the estimate older, never younger.
         let aged = Now::read();
         let stamp_ms = aged.stamp_ms(message.header.stamp).zip(clock_ms);
         let sequence = self.first.wrapping_add(self.gaps).wrapping_add(sequence);
@@ -213,7 +214,7 @@ impl Decider for Bridge {
 
     fn inhibit(&mut self, now: Now, reason: Reason) -> Answer {
         self.held = Some((Instant::now(), reason));
-        // The monotonic clock stands still while the machine is suspended: what was heard before has no age any more.
+        // The monotonic clock stops while the machine is suspended: earlier telemetry has no known age any more.
         self.link.close();
         self.gaps = self.gaps.wrapping_add(1);
         self.answer(now)
@@ -311,6 +312,6 @@ impl Decider for Bridge {
     }
 
     fn patience(&self) -> Option<Duration> {
-        Some(PATIENCE)
+        Some(READ_PERIOD)
     }
 }

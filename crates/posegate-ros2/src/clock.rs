@@ -1,9 +1,10 @@
-//! The node's clock: ROS time in milliseconds, as the gate counts them, and whether it was set.
+//! The node's clock: ROS time in the gate's milliseconds, and a check for changes of the clock.
 
 use crate::message::Time;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// A clock that differs from the monotonic clock by more than this since the last check was set, milliseconds.
+/// If the system's clock differs from the monotonic clock by more than this since the last check, it was set;
+/// milliseconds.
 const STEP_MS: i128 = 20;
 
 /// A moment of the system's clock, which is ROS time.
@@ -42,7 +43,7 @@ impl Now {
             }) as u32
     }
 
-    /// Returns the moment as a stamp of a message.
+    /// Returns the moment as the stamp of a message.
     #[must_use]
     pub const fn time(self) -> Time {
         Time {
@@ -51,8 +52,8 @@ impl Now {
         }
     }
 
-    /// Returns the stamp of a message on the gate's clock, rounded down. `None` if it is not a time, or is farther from this moment
-    /// than the gate's clock can tell (24.8 days).
+    /// Returns the stamp of a message on the gate's clock, rounded down. `None` if it is not a time, or is farther
+    /// from this moment than the range of the gate's clock (24.8 days).
     #[must_use]
     pub fn stamp_ms(self, stamp: Time) -> Option<u32> {
         if !(stamp.nanosec < 1_000_000_000) {
@@ -63,7 +64,7 @@ impl Now {
         is_near.then_some(ns.div_euclid(1_000_000) as u32)
     }
 
-    /// Returns how old a stamp is, seconds; negative for a stamp of the future.
+    /// Returns the age of a stamp, seconds; negative for a stamp in the future.
     #[must_use]
     pub fn age_s(self, stamp: Time) -> f64 {
         let ns = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
@@ -73,15 +74,15 @@ impl Now {
 
 /// Compares the system's clock with the monotonic one.
 ///
-/// A gate notices that its clock goes backwards between two steps. It cannot notice a clock that is set forward, or back by less
-/// than a cycle; then stamps from before and after are not of one clock.
+/// A gate detects that its clock goes backwards between two steps. It cannot detect a clock that is set forward, or
+/// back by less than a cycle; then stamps from before and after are not of one clock.
 #[derive(Clone, Copy, Debug)]
 pub struct ClockWatch {
     last: Option<(Now, [Instant; 2])>,
 }
 
 impl ClockWatch {
-    /// Returns a watch that has not seen a moment.
+    /// Returns a watch without a reading.
     #[must_use]
     pub const fn new() -> Self {
         Self { last: None }
@@ -94,8 +95,8 @@ impl ClockWatch {
         self.was_set(now, [before, Instant::now()])
     }
 
-    /// Takes the next moment of the system's clock, with the monotonic clock just before and just after it. A program that was not
-    /// running in between makes the monotonic time less certain, but is no clock that was set.
+    /// Adds a reading of the system's clock, with the monotonic clock just before and just after it. If the program
+    /// did not run in between, the monotonic time is less certain, but the clock was not set.
     fn was_set(&mut self, now: Now, [before, after]: [Instant; 2]) -> bool {
         let Some((last, [last_before, last_after])) = self.last.replace((now, [before, after]))
         else {
@@ -126,7 +127,7 @@ mod tests {
     const SECOND: i128 = 1_000_000_000;
 
     #[test]
-    fn ages_are_never_rounded_down() {
+    fn ages_are_rounded_up() {
         let now = Now::from_ns(5 * SECOND + 1);
         let stamp = Time {
             sec: 4,
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn stamps_that_are_no_time_or_far_away_have_no_place_on_the_clock() {
+    fn invalid_and_distant_stamps_are_not_on_the_clock() {
         let now = Now::from_ns(1_800_000_000 * SECOND);
         assert_eq!(now.stamp_ms(Time { sec: 0, nanosec: 0 }), None);
         assert_eq!(
@@ -167,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_is_set_is_found() {
+    fn setting_the_clock_is_detected() {
         let start = Instant::now();
         let mut watch = ClockWatch::new();
         let mut was_set = |system_ms: i128, monotonic_ms: u64, late_ms: u64| {

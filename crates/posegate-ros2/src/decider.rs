@@ -1,4 +1,4 @@
-//! What the node needs from whoever decides: the gate in this process, or the controller at the other end of a serial line.
+//! The interface of a decider: the gate in this process, or the controller on a serial line.
 
 use crate::clock::Now;
 use crate::diagnostics::explanation;
@@ -13,45 +13,45 @@ use crate::tags::Tags;
 use posegate::gate::Reason;
 use std::time::Duration;
 
-/// Decides, from messages of ROS.
+/// Decides from ROS messages.
 pub trait Decider {
-    /// Takes a pose with its covariance.
+    /// Processes a pose with its covariance.
     fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer;
 
-    /// Takes the detections of an image.
+    /// Processes the detections of an image.
     fn detections(&mut self, now: Now, message: &AprilTagDetectionArray, origin: Origin) -> Answer;
 
-    /// Takes a camera info; `None` if it could not be read.
+    /// Processes a camera info; `None` if it could not be decoded.
     fn camera_info(&mut self, message: Option<&CameraInfo>);
 
-    /// Takes a pose of the odometry.
+    /// Processes a pose of the odometry.
     fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer;
 
-    /// Takes notice of a message of the odometry that could not be read.
+    /// Reports that a message of the odometry could not be decoded.
     fn odometry_lost(&mut self, now: Now) -> Answer;
 
     /// Advances the time. Called in every control cycle.
     fn tick(&mut self, now: Now) -> Answer;
 
-    /// Ends a permit for a cause that only the node sees.
+    /// Ends a permit for a cause outside of the gate.
     fn inhibit(&mut self, now: Now, reason: Reason) -> Answer;
 
-    /// Restarts, closed, and returns what that was, in words.
+    /// Restarts the gate, closed. Returns a description.
     ///
     /// # Errors
-    /// Why it does not restart, in words.
+    /// The reason, as text, why it does not restart.
     fn reset(&mut self, now: Now) -> Result<String, String>;
 
-    /// Returns what the heartbeat says of the last report.
+    /// Returns the values of the last report for the heartbeat.
     fn report(&self) -> Vec<KeyValue>;
 
     /// Returns the name of the frame of the last pose.
     fn frame(&self) -> Option<&str>;
 
-    /// Returns what the diagnostics say in addition.
+    /// Returns additional diagnostics.
     fn diagnostics(&self, now: Now) -> Vec<DiagnosticStatus>;
 
-    /// Returns why there is a permit or none, and what to do.
+    /// Returns the reason of the answer and a recommended action, as text.
     fn explain(&self, answer: &Answer) -> String;
 
     /// Returns the markers of the last report.

@@ -1,4 +1,4 @@
-//! What `/diagnostics` says: the permission, and each subscription.
+//! The content of `/diagnostics`: the permission, and each subscription.
 
 use crate::clock::Now;
 use crate::message::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, Time, WARN};
@@ -9,27 +9,27 @@ use crate::settings::{Delivery, NodeSettings};
 use posegate::gate::Reason;
 use posegate::report::FrameId;
 
-/// What is counted of a subscription.
+/// The counts of a subscription.
 #[derive(Clone, Debug)]
 pub struct Received {
     /// The name of the topic.
     pub topic: String,
-    /// The parameters that set its quality of service, and to what, in words.
+    /// The parameters that set its quality of service, with values, as text.
     pub parameters: &'static str,
-    /// How it is received.
+    /// The quality of service of the subscription.
     pub delivery: Delivery,
-    /// Its publishers.
+    /// The publishers of the topic.
     pub peers: Peers,
-    /// Messages that were read.
+    /// Messages that were decoded.
     pub messages: u64,
-    /// Messages that could not be read.
+    /// Messages that could not be decoded.
     pub unreadable: u64,
     /// The stamp of the last message.
     pub last: Option<Time>,
 }
 
 impl Received {
-    /// Begins to count.
+    /// Returns the counts of a new subscription.
     #[must_use]
     pub const fn new(
         topic: String,
@@ -75,7 +75,7 @@ impl Received {
     }
 }
 
-/// Returns the diagnostics of the node: `frame` is that of the last pose, and `more` is what the decider adds.
+/// Returns the diagnostics of the node: `frame` is that of the last pose, and `more` are those of the decider.
 #[must_use]
 pub fn diagnostics(
     answer: &Answer,
@@ -135,20 +135,21 @@ fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> Dia
     }
 }
 
-/// Returns what a reason means, and what to do.
+/// Returns the meaning of a reason and a recommended action.
 #[must_use]
 pub fn words(reason: Reason) -> String {
     format!("{} {}", reason.meaning(), reason.action())
 }
 
-/// Returns the answer of the service `explain`: the state of the gate, why the last report was denied, and what to do.
+/// Returns the answer of the service `explain`: the state of the gate, the reason of the last denial, and a
+/// recommended action.
 #[must_use]
 pub fn explanation(answer: &Answer, last: Option<Reason>) -> String {
     let now = match answer.reason() {
         None => "permit".to_owned(),
         Some(reason) => format!("deny, {}: {}", reason.name(), words(reason)),
     };
-    // While permits are counted, the last report says why they are not counted on.
+    // While permits are counted, the last report has the reason why a permit does not count.
     match last {
         Some(reason) if Some(reason) != answer.reason() => {
             format!("{now} Last report: {}: {}", reason.name(), words(reason))

@@ -21,7 +21,7 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Messages that wait for the node: those of one cycle at 1,000 per second, and some.
+/// Messages that wait for the node: those of one cycle at 1,000 per second, and a reserve.
 const DEPTH: usize = 64;
 
 /// The environment of a ROS program.
@@ -29,29 +29,29 @@ const DEPTH: usize = 64;
 pub struct Environment {
     /// `ROS_DOMAIN_ID`.
     pub domain: u16,
-    /// Whether the node talks to programs on this machine only.
+    /// `true` if the node communicates only with programs on this machine.
     pub localhost_only: bool,
-    /// How services are mapped: `RMW_IMPLEMENTATION` of the other programs.
+    /// The mapping of services: `RMW_IMPLEMENTATION` of the other programs.
     pub services: ServiceMapping,
 }
 
-/// A graph that cannot be joined.
+/// The reason why the graph cannot be joined.
 #[derive(Debug, thiserror::Error)]
 pub enum GraphError {
-    /// A variable of the environment.
+    /// A variable of the environment is invalid.
     #[error("{name} is `{given}`: expected {expected}")]
     Environment {
         /// The variable.
         name: &'static str,
-        /// Its value.
+        /// The variable's value.
         given: String,
-        /// What is expected.
+        /// The expected value.
         expected: &'static str,
     },
-    /// DDS.
+    /// DDS reports an error.
     #[error("cannot join the ROS graph: {0}; check ROS_DOMAIN_ID and the network")]
     Dds(String),
-    /// The operating system.
+    /// The operating system cannot wait for messages.
     #[error("cannot wait for messages: {0}")]
     Poll(#[from] std::io::Error),
 }
@@ -108,7 +108,7 @@ impl Environment {
     }
 }
 
-/// What poses come from.
+/// The source of poses.
 pub enum Input {
     /// A topic of poses.
     Poses(Subscription<PoseWithCovarianceStamped>),
@@ -135,7 +135,7 @@ pub struct Graph {
     pub odom: Option<Subscription<Odometry>>,
     /// The fail-safe permit.
     pub permission: Publisher<DiagnosticArray>,
-    /// The permit for eyes.
+    /// The permit for display only.
     pub permit: Publisher<Bool>,
     /// The diagnostics.
     pub diagnostics: Publisher<DiagnosticArray>,
@@ -143,10 +143,10 @@ pub struct Graph {
     pub markers: Publisher<MarkerArray>,
     /// The service that resets the gate.
     pub reset: Server<TriggerRequest, TriggerResponse>,
-    /// The service that says why the gate is closed.
+    /// The service that returns the reason why the gate is closed.
     pub explain: Server<TriggerRequest, TriggerResponse>,
     threads: DdsThreads,
-    // Fields are dropped in their order: the node goes last.
+    // Fields are dropped in their order: the node is the last one.
     _node: Node,
 }
 
@@ -170,7 +170,7 @@ impl Graph {
         let context = Context::from_domain_participant(participant)?;
         let node_name = NodeName::new(&names.namespace, &names.node);
         let node_name = node_name.map_err(|error| GraphError::Dds(format!("{error:?}")))?;
-        // Settings do not change while the node runs, so there are no services for parameters.
+        // Settings do not change while the node runs, so there are no parameter services.
         let options = NodeOptions::new()
             .enable_rosout(false)
             .start_parameter_services(false);
@@ -252,14 +252,14 @@ impl Graph {
 
     /// Returns `true` if the threads of DDS run.
     ///
-    /// They end when a wait of theirs is interrupted: by SIGSTOP and SIGCONT, a debugger, or a machine that was suspended. The node
-    /// then neither receives nor sends, and must join again.
+    /// They end if one of their waits is interrupted: by SIGSTOP and SIGCONT, a debugger, or a suspended machine. The
+    /// node then neither receives nor sends, and must join again.
     #[must_use]
     pub fn is_alive(&self) -> bool {
         self.threads.run()
     }
 
-    /// Begins to count what is received of the poses or of the detections.
+    /// Returns the counts of a new subscription to poses or detections.
     #[must_use]
     pub fn received_poses(&self, names: &Names, settings: &NodeSettings) -> Received {
         let pose = match &self.input {
@@ -283,7 +283,7 @@ impl Graph {
         )
     }
 
-    /// Begins to count what is received of the camera info. `None` if it is not used.
+    /// Returns the counts of a new subscription to the camera info; `None` if it is not used.
     #[must_use]
     pub fn received_camera_info(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
         let Input::Detections(_, camera_info) = &self.input else {
@@ -297,7 +297,7 @@ impl Graph {
         ))
     }
 
-    /// Begins to count what is received of the odometry. `None` if it is not used.
+    /// Returns the counts of a new subscription to the odometry; `None` if it is not used.
     #[must_use]
     pub fn received_odometry(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
         let guid = self.odom.as_ref()?.guid();
@@ -326,7 +326,8 @@ fn heartbeat_qos(settings: &NodeSettings) -> QosProfile {
         .liveliness_lease(ms(settings.valid_ms))
 }
 
-/// Threads of DDS, by their numbers in the operating system. Linux only: elsewhere none is found, and all run.
+/// Threads of DDS, by their numbers in the operating system. Linux only: on other systems the list is empty, and all
+/// count as running.
 struct DdsThreads(Vec<PathBuf>);
 
 impl DdsThreads {
@@ -420,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn the_environment_is_that_of_ros() {
+    fn environment_follows_ros_variables() {
         let plain = read(&[]).unwrap();
         assert_eq!((plain.domain, plain.localhost_only), (0, false));
         let given = read(&[

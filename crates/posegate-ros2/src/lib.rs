@@ -1,9 +1,9 @@
 //! Posegate as a ROS 2 node: poses with covariance in, a fail-safe permit out.
 //!
-//! [`tags::Tags`] makes poses from detections of tags. [`permit_gate::PermitGate`] is the gate of the core behind ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate
-//! on a controller instead. [`run::Runner`] is the node. The program
-//! `posegate-node` parses a command line ([`arguments::Command`]) and runs it. What the topics mean and what a consumer of the permit
-//! must do is described in `docs/for-ros.md`.
+//! [`tags::Tags`] computes poses from detections of tags. [`permit_gate::PermitGate`] is the gate of the core behind
+//! ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate on a controller instead. [`run::Runner`] is
+//! the node. The program `posegate-node` parses a command line ([`arguments::Command`]) and runs it.
+//! `docs/for-ros.md` describes the topics, and what a consumer of the permit must do.
 
 pub mod arguments;
 pub mod bridge;

@@ -1,42 +1,44 @@
-//! The line to a controller, in time: what it said last, and how old that can be. No input or output in here.
+//! The line to a controller over time: its last telemetry and a bound of its age. This module does no input or
+//! output.
 //!
-//! A permit of the controller is news only for a moment. A line can be silent, repeat old bytes or deliver them late, and a controller
-//! can start again. Therefore a state counts only if its age has a bound, and the bound is short. The bound comes from a round trip:
-//! telemetry that names a report of ours was made after we sent that report. Later telemetry is later by the controller's clock, of
-//! which [`DRIFT_PER_MILLE`] is taken off, for [`LIFE`] at most: then another round trip is needed. So no delay of the line, however
-//! constant, makes an old state look new. A clock that is faster than assumed makes a state look younger by what it gains in
-//! [`LIFE`], and no more.
+//! A permit of the controller is valid only for a moment. A line can be silent, repeat old bytes or deliver them
+//! late, and a controller can restart. Therefore a state counts only if its age has a bound, and the bound is short.
+//! The bound comes from a round trip: telemetry that names one of our reports was made after we sent that report.
+//! Later telemetry is later by the controller's clock, reduced by [`DRIFT_PER_MILLE`]. This lasts for at most
+//! [`LIFE`]: then another round trip is needed. So no delay of the line, even if constant, makes an old state look
+//! new. If the clock is faster than assumed, a state looks younger by at most what the clock gains in [`LIFE`].
 
 use posegate::gate::State;
 use posegate::wire::{LinkCounters, Receiver, Telemetry};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// By how much the controller's clock may be faster than this machine's, in thousandths: an RC oscillator is within 30.
+/// The controller's clock may be faster than this machine's by this much, in thousandths: an RC oscillator is within
+/// 30.
 pub const DRIFT_PER_MILLE: u32 = 30;
-/// For how long a round trip bounds the age of later telemetry, by the controller's clock.
+/// The time for which a round trip bounds the age of later telemetry, by the controller's clock.
 pub const LIFE: Duration = Duration::from_secs(2);
-/// Reports whose telemetry may still come.
+/// The number of reports whose telemetry may still arrive.
 const SENT: usize = 64;
-/// A state that would have been made so long after it arrived is of another clock: times are whole milliseconds.
+/// A state that would be made this much later than it arrived is of another clock: times are whole milliseconds.
 const AHEAD: Duration = Duration::from_millis(2);
 /// The source of the reports that this end sends.
 pub const SOURCE: u8 = 0;
 
-/// What is counted of a line.
+/// The counts of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Telemetry messages that were read.
     pub telemetry: u64,
     /// Frames that were damaged.
     pub damaged: u64,
-    /// Frames that are no telemetry of this version.
+    /// Frames that are not telemetry of this version.
     pub foreign: u64,
-    /// Messages that came again.
+    /// Messages that were repeated.
     pub repeated: u64,
     /// Messages that were lost, by their numbers.
     pub lost: u64,
-    /// How often the controller, or its clock, started again.
+    /// The number of restarts of the controller or its clock.
     pub restarts: u64,
 }
 
@@ -58,7 +60,7 @@ struct Heard {
 }
 
 impl Link {
-    /// Returns a line on which nothing was heard.
+    /// Returns a line without any telemetry.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -70,7 +72,7 @@ impl Link {
         }
     }
 
-    /// Forgets what was heard: the line was closed.
+    /// Forgets all telemetry: the line was closed.
     pub fn close(&mut self) {
         let counts = self.counts;
         *self = Self {
@@ -79,7 +81,7 @@ impl Link {
         };
     }
 
-    /// Takes bytes that were read.
+    /// Adds bytes that were read.
     pub fn take(&mut self, bytes: &[u8], at: Instant) {
         for byte in bytes {
             match self.receiver.push(*byte) {
@@ -131,14 +133,15 @@ impl Link {
         }
     }
 
-    /// Takes the clock of the controller for a new one. What was sent before is of the old one.
+    /// Starts with a new clock of the controller. Earlier telemetry is of the old clock.
     fn restart(&mut self) {
         self.counts.restarts += 1;
         self.anchor = None;
         self.sent.clear();
     }
 
-    /// Returns a time of this machine that was certainly before a time of the controller's clock. `None` if no round trip is recent.
+    /// Returns a time of this machine that was certainly before a time of the controller's clock. `None` if there is
+    /// no recent round trip.
     fn made_after(&self, now_ms: u32) -> Option<Instant> {
         let (anchor_ms, anchor) = self.anchor?;
         let passed = u64::from(now_ms.wrapping_sub(anchor_ms));
@@ -149,7 +152,7 @@ impl Link {
         Some(anchor + Duration::from_millis(certain))
     }
 
-    /// Notes a report that is written to the line.
+    /// Records a report that is written to the line.
     pub fn note_sent(&mut self, sequence: u32, at: Instant) {
         if self.sent.len() == SENT {
             self.sent.pop_front();
@@ -163,21 +166,22 @@ impl Link {
         self.last.as_ref().map(|heard| &heard.telemetry)
     }
 
-    /// Returns how long ago the last telemetry arrived.
+    /// Returns the time since the last telemetry arrived.
     #[must_use]
     pub fn silence(&self, now: Instant) -> Option<Duration> {
         let last = self.last?;
         Some(now.saturating_duration_since(last.at))
     }
 
-    /// Returns how old the last telemetry is at most. `None` without a round trip: it can have any age.
+    /// Returns an upper bound of the age of the last telemetry. `None` without a round trip: it can have any age.
     #[must_use]
     pub fn age(&self, now: Instant) -> Option<Duration> {
         let bound = self.made_after(self.last?.telemetry.now_ms)?;
         Some(now.saturating_duration_since(bound))
     }
 
-    /// Returns the time of the controller's clock at a moment, or an earlier one: the delay of the telemetry is not added.
+    /// Returns the time of the controller's clock at a moment, or an earlier one: the delay of the telemetry is not
+    /// added.
     #[must_use]
     pub fn clock_ms(&self, now: Instant) -> Option<u32> {
         let last = self.last?;
@@ -185,8 +189,8 @@ impl Link {
         Some(last.telemetry.now_ms.wrapping_add(since as u32))
     }
 
-    /// Returns `true` if the controller permits: by a state that is certainly younger than `limit`, with its output high and without a
-    /// fault.
+    /// Returns `true` if the controller permits: its state is certainly younger than `limit`, its output is high, and
+    /// it has no fault.
     #[must_use]
     pub fn permits(&self, now: Instant, limit: Duration) -> bool {
         let is_young = self.age(now).is_some_and(|age| age < limit);

@@ -71,6 +71,6 @@ fn start() -> Result<(), Box<dyn Error>> {
         );
         runner.run(&stop)?;
     }
-    // Leaving the graph in order takes DDS many seconds, and the denial has been published.
+    // DDS needs many seconds to leave the graph in order, and the denial has been published.
     std::process::exit(0);
 }

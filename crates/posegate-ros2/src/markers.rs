@@ -1,4 +1,5 @@
-//! Markers for a viewer: where the robot may be, and the section of the success set at its heading. For eyes only.
+//! Markers for a viewer: the pose-set of the robot, and the section of the success set at its heading. For display
+//! only.
 
 use crate::message::{Color, Header, Marker, MarkerArray, Pose};
 use crate::permit_gate::{Answer, LastReport};
@@ -73,7 +74,7 @@ pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerA
     MarkerArray { markers }
 }
 
-/// Returns the lower triangular root of the plane's covariance times the radius, and the reach in heading.
+/// Returns the lower triangular root of the plane's covariance times the radius, and the extent in heading.
 fn spread(spread: Option<&Uncertainty>, radius: f64) -> Option<([f64; 3], f64)> {
     match spread? {
         Uncertainty::Gaussian([[xx, xy, _], [_, yy, _], [_, _, tt]]) => {
@@ -94,7 +95,7 @@ fn spread(spread: Option<&Uncertainty>, radius: f64) -> Option<([f64; 3], f64)> 
     }
 }
 
-/// Returns triangles over the headings that are possible, 30 cm long.
+/// Returns triangles over the possible headings, 30 cm long.
 fn fan([x, y, yaw]: [f64; 3], reach: f64) -> Vec<[f64; 3]> {
     let reach = reach.min(core::f64::consts::PI);
     let tip = |share: f64| {
@@ -107,7 +108,7 @@ fn fan([x, y, yaw]: [f64; 3], reach: f64) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Returns points of the success set at a heading as the table has it, and their distance, metres.
+/// Returns points of the table's success set at a heading, and their distance, metres.
 fn section(table: &Table<'_>, yaw: f64) -> (Vec<[f64; 3]>, f64) {
     let cells = table.cells();
     let goal = table.goal();
@@ -160,7 +161,7 @@ fn marker(
         ns: "posegate".into(),
         id,
         kind,
-        // An empty list is refused by viewers: delete what was drawn before.
+        // Viewers refuse an empty list: delete the earlier markers.
         action: if points.is_empty() { 2 } else { 0 },
         pose: Pose {
             position: [0.0; 3],

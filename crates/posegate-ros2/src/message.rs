@@ -1,7 +1,7 @@
 //! The ROS 2 messages of the node, field by field in the order of their definitions.
 //!
-//! CDR has no field names: the order is the format. Arrays of equal numbers stand for structs of numbers (`Point`, `Quaternion`),
-//! because CDR writes both in the same way.
+//! CDR has no field names: the order is the format. Structs of equal numbers (`Point`, `Quaternion`) are arrays here,
+//! because CDR encodes both in the same way.
 
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
@@ -86,11 +86,12 @@ pub struct AprilTagDetection {
     pub hamming: i32,
     /// Unused.
     pub goodness: f32,
-    /// How clearly bits are black or white.
+    /// The contrast of black and white bits.
     pub decision_margin: f32,
-    /// Column and row of the middle, pixels.
+    /// Column and row of the centre, pixels.
     pub centre: [f64; 2],
-    /// Columns and rows of the corners, pixels, from the bottom left one against the clock as a viewer sees the upright tag.
+    /// Columns and rows of the corners, pixels, counter-clockwise from the bottom left as a viewer sees the upright
+    /// tag.
     pub corners: [[f64; 2]; 4],
     /// Unused: from the tag's square to pixels, by rows.
     pub homography: [f64; 9],
@@ -131,7 +132,7 @@ pub struct CameraInfo {
     pub width: u32,
     /// The name of the lens model.
     pub distortion_model: String,
-    /// Its coefficients.
+    /// The coefficients of the lens model.
     pub d: Vec<f64>,
     /// The matrix of the raw camera, by rows.
     pub k: [f64; 9],
@@ -196,7 +197,7 @@ impl KeyValue {
 
 /// The level of a [`DiagnosticStatus`]: all is well.
 pub const OK: u8 = 0;
-/// The level of a [`DiagnosticStatus`]: works, but not as wanted.
+/// The level of a [`DiagnosticStatus`]: works with restrictions.
 pub const WARN: u8 = 1;
 /// The level of a [`DiagnosticStatus`]: does not work.
 pub const ERROR: u8 = 2;
@@ -255,15 +256,15 @@ pub struct Marker {
     pub kind: i32,
     /// 0 to add, 2 to delete.
     pub action: i32,
-    /// Where it is drawn.
+    /// The pose of the drawing.
     pub pose: Pose,
-    /// Its size, metres.
+    /// The size, metres.
     pub scale: [f64; 3],
-    /// Its colour.
+    /// The colour.
     pub color: Color,
-    /// How long it stays: seconds and nanoseconds; zero for ever.
+    /// The lifetime: seconds and nanoseconds; zero for no limit.
     pub lifetime: (i32, u32),
-    /// Whether it moves with its frame.
+    /// `true` if the marker moves with its frame.
     pub frame_locked: bool,
     /// Points of lines and polygons.
     pub points: Vec<[f64; 3]>,
@@ -302,9 +303,9 @@ pub struct TriggerRequest {
 /// The response of `std_srvs/srv/Trigger`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TriggerResponse {
-    /// Whether the request was carried out.
+    /// `true` if the request was carried out.
     pub success: bool,
-    /// In words.
+    /// A description.
     pub message: String,
 }
 

@@ -1,6 +1,6 @@
 //! The names of the node, its topics and its services, with remapping.
 
-/// The names that are in use, each absolute.
+/// The names in use, each absolute.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
     /// The namespace, `/` or `/robot1`.
@@ -17,7 +17,7 @@ pub struct Names {
     pub camera_info: String,
     /// Published: `diagnostic_msgs/msg/DiagnosticArray`, the fail-safe permit.
     pub permission: String,
-    /// Published: `std_msgs/msg/Bool`, for eyes only.
+    /// Published: `std_msgs/msg/Bool`, for display only.
     pub permit: String,
     /// Published: `diagnostic_msgs/msg/DiagnosticArray`.
     pub diagnostics: String,
@@ -29,18 +29,18 @@ pub struct Names {
     pub explain: String,
 }
 
-/// A rule or a name that is refused.
+/// The reason why a rule or a name is refused.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum NameError {
-    /// Not a rule.
+    /// The text is not a rule.
     #[error("the remapping `{0}` has no `:=`: write -r FROM:=TO, such as -r pose:=/amcl_pose")]
     NotARule(String),
-    /// A rule for a name that the node does not have.
+    /// The rule is for a name that the node does not have.
     #[error(
         "the remapping `{0}` changes no name of this node: expected one of pose, odom, detections, camera_info, /posegate/permission, /posegate/permit, /diagnostics, /posegate/markers, /posegate/reset, /posegate/explain, __node, __ns"
     )]
     NoSuchName(String),
-    /// Not a name of ROS.
+    /// The text is not a ROS name.
     #[error(
         "`{0}` is not a name of ROS: expected letters, digits and underscores between single slashes, and no digit after a slash"
     )]

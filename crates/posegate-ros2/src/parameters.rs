@@ -17,37 +17,37 @@ pub enum Value {
     Text(String),
 }
 
-/// The parameters that were given, with where each was given.
+/// The given parameters, each with its source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parameters {
     values: BTreeMap<String, (Value, String)>,
 }
 
-/// A parameter that is refused.
+/// The reason why a parameter is refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum ParameterError {
-    /// Not an assignment.
+    /// The text is not an assignment.
     #[error("the parameter `{0}` has no `:=`: write -p NAME:=VALUE, such as -p max_speed:=0.3")]
     NotAnAssignment(String),
-    /// A value that is not a scalar.
+    /// The value is not a scalar.
     #[error(
         "{place}: the parameter `{name}` is not a single value: expected true, false, a number or a text"
     )]
     NotAScalar {
         /// The parameter.
         name: String,
-        /// Where it was given.
+        /// The source: the file or the argument.
         place: String,
     },
-    /// A text that is not YAML.
+    /// The text is not YAML.
     #[error("{place}: {error}")]
     Yaml {
-        /// Where it was given.
+        /// The source: the file or the argument.
         place: String,
         /// What the YAML parser reports, with line and column.
         error: String,
     },
-    /// YAML of another shape.
+    /// The YAML has another structure.
     #[error(
         "{place}: no parameters for the node `{node}`: expected `{short}:`, in it `ros__parameters:`, and in that the parameters"
     )]
@@ -62,7 +62,7 @@ pub enum ParameterError {
 }
 
 impl Parameters {
-    /// Takes an assignment `NAME:=VALUE` or `NODE:NAME:=VALUE`. An assignment for another node is ignored.
+    /// Adds an assignment `NAME:=VALUE` or `NODE:NAME:=VALUE`. An assignment for another node is ignored.
     ///
     /// # Errors
     /// [`ParameterError`]
@@ -84,7 +84,7 @@ impl Parameters {
         self.set(name, &value, &place)
     }
 
-    /// Takes a parameter file. Sections of other nodes are ignored; a file without a section for this node is refused.
+    /// Adds a parameter file. Sections of other nodes are ignored; a file without a section for this node is refused.
     ///
     /// # Errors
     /// [`ParameterError`]
@@ -104,7 +104,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// Looks for `ros__parameters` below the names of nodes. Returns `true` if a section is for this node.
+    /// Searches `ros__parameters` below the names of nodes. Returns `true` if a section is for this node.
     fn sections(
         &mut self,
         yaml: &Yaml,
@@ -151,7 +151,7 @@ impl Parameters {
                 }
                 Ok(())
             }
-            // `ros__parameters:` with nothing below it.
+            // `ros__parameters:` without parameters.
             Yaml::Null if prefix.is_empty() => Ok(()),
             _ => self.set(prefix, yaml, place),
         }
@@ -182,19 +182,19 @@ impl Parameters {
         self.values.get(name).map(|(value, _)| value)
     }
 
-    /// Returns where a parameter was given: the file, or the argument.
+    /// Returns the source of a parameter: the file, or the argument.
     #[must_use]
     pub fn place(&self, name: &str) -> &str {
         self.values.get(name).map_or("", |(_, place)| place)
     }
 
-    /// Returns the names of all parameters that were given.
+    /// Returns the names of all given parameters.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.values.keys().map(String::as_str)
     }
 }
 
-/// Returns `true` if the name of a node in a parameter file or an assignment is this node's, or stands for every node.
+/// Returns `true` if the name of a node in a parameter file or an assignment is this node's name or a wildcard.
 fn is_for(node: &str, names: &Names) -> bool {
     let bare = node.trim_start_matches('/');
     let full = names.full_node();

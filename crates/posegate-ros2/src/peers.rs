@@ -1,4 +1,4 @@
-//! Who publishes what the node subscribes to, from discovery: matched publishers, and those that do not match.
+//! The publishers of the node's subscriptions, from discovery: matched publishers, and publishers that do not match.
 
 use crate::settings::Delivery;
 use rustdds::policy::{Durability, Reliability};
@@ -15,12 +15,12 @@ pub struct Peers {
     matched: BTreeSet<GUID>,
     /// Publishers of the topic with another type.
     other_types: BTreeMap<GUID, String>,
-    /// Publishers whose quality of service does not match, and why.
+    /// Publishers whose quality of service does not match, with the difference.
     incompatible: BTreeMap<GUID, String>,
 }
 
 impl Peers {
-    /// Watches a topic by its name, such as `/amcl_pose`, and its type, such as `nav_msgs` and `Odometry`.
+    /// Observes a topic by its name, such as `/amcl_pose`, and its type, such as `nav_msgs` and `Odometry`.
     #[must_use]
     pub fn new(topic: &str, [package, name]: [&str; 2], reader: GUID) -> Self {
         Self {
@@ -31,7 +31,7 @@ impl Peers {
         }
     }
 
-    /// Takes an event of discovery.
+    /// Processes an event of discovery.
     pub fn note(&mut self, event: &Event) {
         match event {
             Event::RemoteWriterMatched {
@@ -74,7 +74,7 @@ impl Peers {
         self.matched.len()
     }
 
-    /// Returns what is wrong with the publishers, in words. `None` if there is exactly one, and it matches.
+    /// Returns the problem of the publishers as text; `None` if there is exactly one, and it matches.
     #[must_use]
     pub fn problem(&self, topic: &str, parameters: &str) -> Option<String> {
         let incompatible = self.incompatible.values().next();
@@ -101,7 +101,7 @@ impl Peers {
     }
 }
 
-/// Returns how the quality of service of a publisher falls short.
+/// Returns the difference between the offered and the requested quality of service.
 fn mismatch(requested: &QosPolicies, offered: &QosPolicies) -> String {
     let mut words = Vec::new();
     let is_reliable =
@@ -120,7 +120,7 @@ fn mismatch(requested: &QosPolicies, offered: &QosPolicies) -> String {
     words.join(", and ")
 }
 
-/// Returns a delivery in words.
+/// Returns a description of a delivery.
 #[must_use]
 pub const fn delivery_words(delivery: Delivery) -> &'static str {
     match (delivery.reliable, delivery.transient_local) {

@@ -1,8 +1,9 @@
-//! The fail-safe permit: a heartbeat with a stamp, a number and a time for which it may be used.
+//! The fail-safe permit: a heartbeat with a stamp, a number and a validity.
 //!
 //! A `Bool` that a publisher leaves behind looks like a new one. Therefore consumers use this message, a
-//! `diagnostic_msgs/msg/DiagnosticArray` with one status. It permits only if all of its parts agree: zeroed or default messages deny.
-//! The rules that a consumer must follow are in `docs/for-ros.md`, and in `integrations/ros2/permit_listener.py` as a program.
+//! `diagnostic_msgs/msg/DiagnosticArray` with one status. It permits only if all of its parts agree: zeroed or
+//! default messages deny. `docs/for-ros.md` has the rules that a consumer must follow;
+//! `integrations/ros2/permit_listener.py` is such a program.
 
 use crate::clock::Now;
 use crate::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, OK, WARN};
@@ -16,7 +17,7 @@ use std::hash::{BuildHasher, Hasher};
 pub const NAME: &str = "posegate";
 /// The version of the message's rules.
 pub const FORMAT: &str = "1";
-/// The message of a permit. Everything else denies.
+/// The message of a permit. All other messages deny.
 pub const PERMIT: &str = "permit";
 /// The message of a denial.
 pub const DENY: &str = "deny";
@@ -29,7 +30,7 @@ pub struct Heartbeat {
 }
 
 impl Heartbeat {
-    /// Begins the heartbeats of a run, with a random name by which consumers notice a restart.
+    /// Starts the heartbeats of a run, with a random name by which consumers detect a restart.
     #[must_use]
     pub fn new() -> Self {
         let random = std::hash::RandomState::new().build_hasher().finish();
@@ -39,7 +40,7 @@ impl Heartbeat {
         }
     }
 
-    /// Returns the next heartbeat, with what it says of the last report.
+    /// Returns the next heartbeat, with the values of the last report.
     pub fn next(
         &mut self,
         answer: &Answer,
@@ -78,7 +79,7 @@ impl Default for Heartbeat {
     }
 }
 
-/// Returns states with a stamp.
+/// Returns statuses with a stamp.
 #[must_use]
 pub fn array(now: Now, status: Vec<DiagnosticStatus>) -> DiagnosticArray {
     DiagnosticArray {
@@ -90,7 +91,7 @@ pub fn array(now: Now, status: Vec<DiagnosticStatus>) -> DiagnosticArray {
     }
 }
 
-/// Returns the last report in names and values: its verdict alone, and what the gate answered.
+/// Returns the last report as names and values: its verdict alone, and the gate's answer.
 #[must_use]
 pub fn report_values(last: &LastReport) -> [KeyValue; 6] {
     let (reason, margin, worst_pose) = match last.verdict {

@@ -1,7 +1,7 @@
-//! The gate of the core behind ROS messages. No DDS in here.
+//! The gate of the core behind ROS messages, without DDS.
 //!
-//! [`PermitGate`] turns poses and odometry into reports, calls the gate in every control cycle, and keeps what telemetry shows of the
-//! last report. Everything that decides is [`posegate::gate::Gate`] and [`posegate::track::Tracker`].
+//! [`PermitGate`] converts poses and odometry to reports, calls the gate in every control cycle, and keeps the last
+//! report for telemetry. All decisions are made by [`posegate::gate::Gate`] and [`posegate::track::Tracker`].
 
 use crate::clock::Now;
 use crate::message::{
@@ -17,12 +17,12 @@ use posegate::set::{Growth, Inflation, Uncertainty};
 use posegate::task::Risk;
 use posegate::track::{Increment, Tracker, TrackerSettings};
 
-/// How many increments of the odometry are kept for fixes that come late: 2.5 s at 50 Hz.
+/// The number of increments of the odometry that are kept for late fixes: 2.5 s at 50 Hz.
 const INCREMENTS: usize = 128;
 /// Bytes of the table that are compared in a cycle.
 const SCRUBBED: usize = 256;
 
-/// Where a message comes from.
+/// The origin of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Origin {
     /// The identity of the publisher, new for each start of its program.
@@ -36,14 +36,14 @@ pub struct Origin {
 pub struct Answer {
     /// The moment.
     pub now: Now,
-    /// Whether the gate is open.
+    /// `true` if the gate is open.
     pub is_open: bool,
     /// The state of the gate.
     pub state: State,
 }
 
 impl Answer {
-    /// Returns why the gate is closed, or `None` if it is open.
+    /// Returns the reason why the gate is closed; `None` if it is open.
     #[must_use]
     pub const fn reason(&self) -> Option<Reason> {
         match self.state {
@@ -65,11 +65,11 @@ pub struct LastReport {
     pub estimate: PoseEstimate,
     /// The verdict on the estimate alone, with margin and worst pose.
     pub verdict: Verdict,
-    /// What the gate answered: a denial may come from its memory.
+    /// The gate's answer: a denial may come from its memory.
     pub step: Result<(), Reason>,
 }
 
-/// A gate that takes ROS messages.
+/// A gate for ROS messages.
 #[derive(Debug)]
 pub struct PermitGate<'a> {
     gate: Gate<'a>,
@@ -81,10 +81,10 @@ pub struct PermitGate<'a> {
 }
 
 impl<'a> PermitGate<'a> {
-    /// Makes a closed gate. `gate` are the settings that [`NodeSettings::gate`] returns.
+    /// Returns a closed gate. `gate` are the settings that [`NodeSettings::gate`] returns.
     ///
     /// # Errors
-    /// [`InvalidParameter`] if a setting would switch a check off.
+    /// [`InvalidParameter`] if a setting would disable a check.
     pub fn new(
         table: &'a [u8],
         settings: &'a NodeSettings,
@@ -113,7 +113,7 @@ impl<'a> PermitGate<'a> {
         self.last.as_ref()
     }
 
-    /// Uses detections, with the tags of the settings. The topics are named in messages: detections, camera info.
+    /// Uses detections, with the tags of the settings. `topics` are the names for messages: detections, camera info.
     #[must_use]
     pub fn with_tags(mut self, topics: [String; 2]) -> Self {
         let detector = self.settings.detector.clone();
@@ -121,20 +121,20 @@ impl<'a> PermitGate<'a> {
         self
     }
 
-    /// Returns what is known of the tags, if detections are used.
+    /// Returns the state of the tags, if detections are used.
     #[must_use]
     pub fn tags(&self) -> Option<&Tags> {
         self.tags.as_deref()
     }
 
-    /// Takes a camera info; `None` if it could not be read.
+    /// Processes a camera info; `None` if it could not be decoded.
     pub fn camera_info(&mut self, message: Option<&CameraInfo>) {
         match (&mut self.tags, message) {
             (Some(tags), Some(message)) => tags.camera_info(message),
             (Some(tags), None) => tags.camera_info_lost(),
             (None, _) => return,
         }
-        // What was seen through a camera that is in doubt now is not carried on.
+        // Poses from a camera that is now in doubt are not carried on.
         if self.tags.as_ref().is_some_and(|tags| !tags.has_camera())
             && let Some(carried) = &mut self.carried
         {
@@ -142,10 +142,10 @@ impl<'a> PermitGate<'a> {
         }
     }
 
-    /// Takes the detections of an image. The gate permits only if every pose that they leave open is inside.
+    /// Processes the detections of an image. The gate permits only if every pose that fits them is inside.
     ///
-    /// Detections that say nothing of the pose are no report: a permit then ends when its time is over. Detections that contradict what
-    /// is known are a report without a pose, which is denied.
+    /// Detections without information on the pose are not a report: a permit then ends when its time is over.
+    /// Detections that contradict the site are a report without a pose, which is denied.
     pub fn detections(
         &mut self,
         now: Now,
@@ -181,10 +181,10 @@ impl<'a> PermitGate<'a> {
             let (step, verdict) = self.take_report(now_ms, &report, has_time);
             (report.belief, step, verdict)
         } else {
-            // One pose of several cannot be carried, and none after a contradiction.
+            // A single pose can be carried: not one of several, and none after a contradiction.
             if let Some(carried) = &mut self.carried {
                 carried.tracker.drop_fix();
-                // The gate's source has no inflation of its own: the tracker applies it.
+                // The gate's source has no inflation: the tracker applies it.
                 for pose in &mut poses {
                     *pose = inflated(pose, self.settings.trust.inflation);
                 }
@@ -215,7 +215,7 @@ impl<'a> PermitGate<'a> {
         answer(now, step)
     }
 
-    /// Takes a pose with its covariance.
+    /// Processes a pose with its covariance.
     pub fn pose(
         &mut self,
         now: Now,
@@ -225,7 +225,7 @@ impl<'a> PermitGate<'a> {
         let now_ms = now.ms();
         let (sequence, has_changed) = self.poses.next(origin);
         if has_changed {
-            // Two publishers that alternate end every permit of each other.
+            // Two alternating publishers end every permit of each other.
             let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
         }
         let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
@@ -247,8 +247,8 @@ impl<'a> PermitGate<'a> {
         answer(now, step)
     }
 
-    /// Returns a stamp on the gate's clock, and whether it is a time. A stamp that is not on that clock counts as older than every
-    /// permitted one.
+    /// Returns a stamp on the gate's clock, and `true` if it is a time. A stamp that is not on that clock counts as
+    /// older than every permitted one.
     fn stamp(&self, now: Now, stamp: Time) -> (u32, bool) {
         let known = now.stamp_ms(stamp);
         let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
@@ -259,7 +259,8 @@ impl<'a> PermitGate<'a> {
     }
 
     fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> (Step, Verdict) {
-        // A pose of no known time cannot be carried: where the odometry was then is not known either. Its stamp is one that the gate denies.
+        // A pose without a known time cannot be carried, because the odometry at that time is not known either. The
+        // gate denies its stamp.
         if let Some(carried) = self.carried.as_mut().filter(|_| !has_time) {
             carried.tracker.drop_fix();
         }
@@ -268,7 +269,7 @@ impl<'a> PermitGate<'a> {
             return (step, self.gate.examine(report));
         };
         if let Err(reason) = carried.tracker.fix(report) {
-            // What is carried stays as it was.
+            // The carried pose is unchanged.
             let step = self.gate.tick(now_ms);
             let step = Step {
                 verdict: Err(reason),
@@ -286,7 +287,7 @@ impl<'a> PermitGate<'a> {
         }
     }
 
-    /// Takes a pose of the odometry. Without a tracker it is ignored.
+    /// Processes a pose of the odometry. Without a tracker it is ignored.
     pub fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer {
         let Some(carried) = &mut self.carried else {
             return self.tick(now);
@@ -298,7 +299,7 @@ impl<'a> PermitGate<'a> {
         self.tick(now)
     }
 
-    /// Ends the way of the odometry: a message of it could not be read.
+    /// Ends the path of the odometry: a message of it could not be decoded.
     pub fn odometry_lost(&mut self, now: Now) -> Answer {
         if let Some(carried) = &mut self.carried {
             carried.restart();
@@ -332,7 +333,7 @@ impl<'a> PermitGate<'a> {
         answer(now, step)
     }
 
-    /// Compares the next part of the table with its checksum from the start: all of it every few seconds.
+    /// Compares the next part of the table with its checksum from the start: the complete table every few seconds.
     pub fn scrub(&mut self) {
         let _ = self.gate.scrub(SCRUBBED);
     }
@@ -342,10 +343,10 @@ impl<'a> PermitGate<'a> {
         answer(now, self.gate.inhibit(now.ms(), reason))
     }
 
-    /// Restarts the gate, closed. A manual action: the only way out of a latched fault.
+    /// Restarts the gate, closed. This manual action is the only exit from a latched fault.
     ///
     /// # Errors
-    /// [`InvalidParameter`] if the settings have become invalid; the gate stays as it was.
+    /// [`InvalidParameter`] if the settings have become invalid; the gate is then unchanged.
     pub fn reset(&mut self, now: Now) -> Result<(), InvalidParameter> {
         if let Some(carried) = &mut self.carried {
             carried.restart();
@@ -373,7 +374,7 @@ fn inflated(pose: &PoseEstimate, inflation: Inflation) -> PoseEstimate {
         Some(Uncertainty::Gaussian(rows)) => Some(Uncertainty::Gaussian(
             rows.map(|row| row.map(|entry| entry * factor)),
         )),
-        // No other one comes from corners.
+        // Corners give no other kind of uncertainty.
         _ => None,
     };
     PoseEstimate { spread, ..*pose }
@@ -387,7 +388,7 @@ fn answer(now: Now, step: Step) -> Answer {
     }
 }
 
-/// Returns the estimate of a message, by the core's own conversion.
+/// Returns the estimate of a message by the core's conversion.
 #[must_use]
 pub fn estimate(message: &PoseWithCovariance) -> PoseEstimate {
     PoseEstimate::from(&ros::PoseWithCovariance {
@@ -397,7 +398,8 @@ pub fn estimate(message: &PoseWithCovariance) -> PoseEstimate {
     })
 }
 
-/// The sequence numbers of a topic: one more for each message of one publisher, more if messages were lost.
+/// The sequence numbers of a topic: incremented by one for each message of one publisher, by more if messages were
+/// lost.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Order {
     last: Option<Origin>,
@@ -405,7 +407,7 @@ pub(crate) struct Order {
 }
 
 impl Order {
-    /// Returns the sequence number of the next message, and whether its publisher is another one than before.
+    /// Returns the sequence number of the next message, and `true` if its publisher has changed.
     pub(crate) fn next(&mut self, origin: Origin) -> (u32, bool) {
         let last = self.last.replace(origin);
         let is_same = last.is_none_or(|last| last.publisher == origin.publisher);
@@ -413,7 +415,7 @@ impl Order {
             Some(last) if is_same => origin.number.wrapping_sub(last.number),
             _ => 1,
         };
-        // Zero stands for the same number again. Every other number that is not the next one is a gap.
+        // Zero means that a number is repeated. Every other number that is not the next one is a gap.
         let steps = if (0..=1).contains(&steps) {
             steps as u32
         } else {
@@ -423,7 +425,7 @@ impl Order {
         (self.sequence, !is_same)
     }
 
-    /// Leaves the last message out: it was no report. A message that was lost before it stays a gap.
+    /// Omits the last message, which was not a report. A message that was lost before it is still a gap.
     pub(crate) fn leave_out(&mut self) {
         self.sequence = self.sequence.wrapping_sub(1);
     }
@@ -448,7 +450,7 @@ impl Carried {
         })
     }
 
-    /// Forgets the way and the fix.
+    /// Forgets the path and the fix.
     fn restart(&mut self) {
         if let Some(tracker) = Tracker::new(self.settings) {
             self.tracker = tracker;
@@ -456,7 +458,8 @@ impl Carried {
         self.before = None;
     }
 
-    /// Takes a pose of the odometry. After an error the way is broken: it begins again, and waits for a newer fix.
+    /// Processes a pose of the odometry. After an error the path is broken: a new one starts, and waits for a newer
+    /// fix.
     fn take(&mut self, now: Now, message: &Odometry, origin: Origin) -> Result<(), Reason> {
         let taken = self.try_take(now, message, origin);
         if taken.is_err() {
@@ -467,7 +470,7 @@ impl Carried {
 
     fn try_take(&mut self, now: Now, message: &Odometry, origin: Origin) -> Result<(), Reason> {
         let (_, has_changed) = self.order.next(origin);
-        // Increments are movements of one point of the robot: a pose of another one is no step from the pose before.
+        // Increments are movements of one point of the robot: a pose of another point does not continue the path.
         let frames =
             [&message.header.frame_id, &message.child_frame_id].map(|name| FrameId::of(name));
         if has_changed || self.before.is_some_and(|(_, before, _)| before != frames) {

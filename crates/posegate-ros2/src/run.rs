@@ -1,6 +1,6 @@
 //! The control loop of the node.
 //!
-//! One thread reads, decides and publishes the heartbeat, so a loop that hangs sends none, and consumers deny.
+//! One thread reads, decides and publishes the heartbeat. A loop that is blocked sends no heartbeat, and consumers deny.
 
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
@@ -29,13 +29,13 @@ const PERMIT_PERIOD: Duration = Duration::from_millis(100);
 const SLOW_PERIOD: Duration = Duration::from_millis(1_000);
 /// The shortest time between two heartbeats that report a pose; a change is published at once.
 const SHORTEST: Duration = Duration::from_millis(2);
-/// Messages of a topic that are taken before the rest of the cycle is done.
+/// The most messages of a topic that are processed before the rest of the cycle.
 const BATCH: usize = 64;
 
-/// As [`BATCH`], of detections: each takes some milliseconds.
+/// Like [`BATCH`], for detections: each takes some milliseconds.
 const DETECTIONS: usize = 4;
 
-/// A node that runs.
+/// A running node.
 pub struct Runner<'a, D> {
     graph: Graph,
     environment: Environment,
@@ -61,7 +61,8 @@ struct Sent {
     slow: Option<Instant>,
 }
 
-/// Takes the messages of a topic that have arrived, at most `most`, and counts them. `take` gets `None` for one that cannot be read.
+/// Processes the messages of a topic that have arrived, at most `most`, and counts them. `take` gets `None` for a
+/// message that cannot be decoded.
 fn drain<M: DeserializeOwned + 'static>(
     topic: &Subscription<M>,
     most: usize,
@@ -91,7 +92,7 @@ fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
 }
 
 impl<'a, D: Decider> Runner<'a, D> {
-    /// Makes a node and joins a graph.
+    /// Creates a node and joins a graph.
     ///
     /// # Errors
     /// [`GraphError`]
@@ -140,7 +141,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                 received.peers = again.peers;
             }
         }
-        // What has no threads cannot leave in order.
+        // A graph without threads cannot leave in order.
         std::mem::forget(std::mem::replace(&mut self.graph, graph));
         self.sent = Sent::default();
         Ok(())
@@ -154,7 +155,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         let mut events = Events::with_capacity(16);
         let cycle = Duration::from_millis(u64::from(self.settings.cycle_ms));
         while !stop.load(Ordering::Relaxed) {
-            // A report that came right after a heartbeat waits no longer than it must.
+            // A report that came directly after a heartbeat waits no longer than necessary.
             let timeout = if self.has_report { SHORTEST } else { cycle };
             let timeout = self
                 .gate
@@ -251,7 +252,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
     }
 
-    /// Publishes what is due. Publications that fail are not repeated: silence denies.
+    /// Publishes the messages that are due. Failed publications are not repeated: silence denies.
     fn publish(&mut self, answer: &Answer, now: Instant, is_last: bool) {
         let has_changed = answer.is_open != self.was_open || is_last;
         self.was_open = answer.is_open;

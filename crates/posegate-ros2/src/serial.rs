@@ -1,4 +1,4 @@
-//! A serial line: opened raw, read and written without waiting, opened again after it was lost.
+//! A serial line: opened raw, read and written without blocking, and opened again after a loss.
 
 use rustix::fs::{Mode, OFlags};
 use rustix::termios::{ControlModes, OptionalActions};
@@ -7,12 +7,12 @@ use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How long to wait before a lost line is opened again.
+/// The time before a lost line is opened again.
 const RETRY: Duration = Duration::from_secs(1);
-/// Most bytes that are read in a cycle: a line that sends without end does not stop the node.
+/// The most bytes that are read in a cycle: a line that sends without end does not stop the node.
 const MOST: usize = 1 << 16;
 
-/// A line that cannot be opened.
+/// The reason why a line cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
     /// The operating system refuses.
@@ -20,7 +20,7 @@ pub enum SerialError {
         "cannot open the serial line {0}: {1}; expected the device of the controller, such as /dev/ttyUSB0, and the right to use it (on Debian and Ubuntu: the group dialout)"
     )]
     Open(String, std::io::Error),
-    /// A file, or another device.
+    /// The path is a file, or another device.
     #[error("{0} is not a serial line: expected a device such as /dev/ttyUSB0")]
     NotATerminal(String),
     /// The driver refuses the speed.
@@ -36,14 +36,14 @@ pub struct Port {
     path: PathBuf,
     baud: u32,
     file: Option<File>,
-    /// What did not fit yet.
+    /// The bytes that did not fit yet.
     pending: Vec<u8>,
     lost_at: Option<Instant>,
     problem: Option<String>,
 }
 
 impl Port {
-    /// Opens a line: raw, 8 bits, no flow control, for this program alone.
+    /// Opens a line: raw, 8 bits, no flow control, exclusive for this program.
     ///
     /// # Errors
     /// [`SerialError`]
@@ -52,14 +52,14 @@ impl Port {
             path: path.into(),
             baud,
             file: Some(open(path, baud)?),
-            // Ends what a program before this one has left unfinished.
+            // Ends a frame that an earlier program left unfinished.
             pending: vec![0],
             lost_at: None,
             problem: None,
         })
     }
 
-    /// Reads what has arrived. Returns `None` if the line is lost; then it is opened again after a time.
+    /// Reads the bytes that have arrived. Returns `None` if the line is lost; it is then opened again after a time.
     pub fn read(&mut self, now: Instant) -> Option<Vec<u8>> {
         if self.file.is_none() {
             let is_due = self
@@ -90,9 +90,10 @@ impl Port {
         Some(all)
     }
 
-    /// Writes a whole frame, later if it must be. Returns `false` if the line takes nothing: then the frame is dropped.
+    /// Writes a complete frame, later if necessary. Returns `false` if the line accepts no bytes: the frame is then
+    /// dropped.
     pub fn write(&mut self, frame: &[u8], now: Instant) -> bool {
-        // The rest of the frame before this one.
+        // The rest of the previous frame.
         self.flush(now);
         if self.file.is_none() || self.pending.len() > 1 {
             return false;
@@ -102,7 +103,7 @@ impl Port {
         true
     }
 
-    /// Writes what did not fit before.
+    /// Writes the bytes that did not fit before.
     pub fn flush(&mut self, now: Instant) {
         let Some(file) = &mut self.file else {
             return;
@@ -135,7 +136,7 @@ impl Port {
         }
     }
 
-    /// Returns why the line is lost, or `None` if it is open.
+    /// Returns the reason why the line is lost; `None` if it is open.
     #[must_use]
     pub fn problem(&self) -> Option<&str> {
         self.problem.as_deref()
@@ -164,7 +165,7 @@ fn open(path: &Path, baud: u32) -> Result<File, SerialError> {
     modes.control_modes &= !(ControlModes::CRTSCTS | ControlModes::CSTOPB | ControlModes::PARENB);
     let slow = |error: rustix::io::Errno| SerialError::Speed(name(), baud, error.into());
     modes.set_speed(baud).map_err(slow)?;
-    // Drops what arrived before: it is of another time.
+    // Drops the bytes that arrived before: their time is not known.
     rustix::termios::tcsetattr(&fd, OptionalActions::Flush, &modes).map_err(slow)?;
     Ok(File::from(fd))
 }
@@ -186,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn every_byte_passes_both_ways() {
+    fn every_byte_passes_in_both_directions() {
         let (mut far, path) = line();
         let mut port = Port::open(&path, 115_200).unwrap();
         let all: Vec<u8> = (0..=255).collect();
@@ -197,12 +198,12 @@ mod tests {
         assert!(port.write(&all, now));
         let mut received = [0; 257];
         far.read_exact(&mut received).unwrap();
-        // A zero first, which ends what was there before.
+        // The first byte is zero, which ends an earlier frame.
         assert_eq!((received[0], &received[1..]), (0, &all[..]));
     }
 
     #[test]
-    fn a_line_that_takes_nothing_drops_whole_frames() {
+    fn blocked_line_drops_complete_frames() {
         let (mut far, path) = line();
         let mut port = Port::open(&path, 115_200).unwrap();
         let now = Instant::now();
@@ -212,7 +213,7 @@ mod tests {
             taken += 1;
             assert!(taken < 1000, "the line takes everything");
         }
-        // The frames that were taken arrive whole once there is room again.
+        // The accepted frames arrive completely when there is space again.
         let mut received = vec![0; 1 + taken * frame.len()];
         let mut at = 0;
         while at < received.len() {
@@ -224,14 +225,14 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_line_is_noticed_and_opened_again() {
+    fn lost_line_is_detected_and_opened_again() {
         let (far, path) = line();
         let mut port = Port::open(&path, 115_200).unwrap();
         let now = Instant::now();
         drop(far);
         assert_eq!(port.read(now), None);
         assert!(port.problem().is_some() && !port.write(&[1], now));
-        // Not before its time; and then the path may be another line's.
+        // Not before its time; the path may then be that of another line.
         let (mut far, other) = line();
         port.path = other;
         assert_eq!(port.read(now), None);
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn files_and_missing_devices_are_refused_with_words() {
+    fn files_and_missing_devices_have_their_own_errors() {
         let error = |path: &str| Port::open(Path::new(path), 9600).unwrap_err().to_string();
         assert!(error("/no/such/tty").contains("cannot open the serial line /no/such/tty"));
         assert!(error("/dev/null").contains("is not a serial line"));

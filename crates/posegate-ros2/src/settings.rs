@@ -13,12 +13,12 @@ use std::path::PathBuf;
 
 mod reader;
 
-/// How a subscription receives.
+/// The quality of service of a subscription.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivery {
-    /// Reliable, or best effort.
+    /// `true` for reliable, `false` for best effort.
     pub reliable: bool,
-    /// Also messages that were published before the node started, or later ones only.
+    /// `true` if messages from before the node's start are also received.
     pub transient_local: bool,
 }
 
@@ -27,25 +27,26 @@ pub struct Delivery {
 pub struct Serial {
     /// The device.
     pub path: PathBuf,
-    /// Its speed, bits per second.
+    /// The speed, bits per second.
     pub baud: u32,
     /// A state of the controller counts only if it is certainly younger than this, milliseconds.
     pub link_timeout_ms: u32,
 }
 
-/// The settings of a node. With a serial line, those of the gate decide nothing: the controller has its own.
+/// The settings of a node. With a serial line, the controller's own settings decide instead of those of the gate
+/// here.
 #[derive(Clone, Debug)]
 pub struct NodeSettings {
     task: String,
     site_digest: [u8; 32],
-    /// Whether the digest of the site file was given, or taken from the table.
+    /// `true` if the digest of the site file was given, `false` if it was taken from the table.
     pub site_is_checked: bool,
     sources: [Source; 1],
-    /// The frame in which poses must be.
+    /// The required frame of poses.
     pub frame: String,
-    /// How far the covariances are trusted.
+    /// The trust in the covariances.
     pub trust: Trust,
-    /// How fast the robot moves at most.
+    /// The largest speeds of the robot.
     pub bounds: MotionBounds,
     maximum_age_ms: u32,
     report_period_ms: u32,
@@ -58,51 +59,51 @@ pub struct NodeSettings {
     pub cycle_ms: u32,
     /// The period of the permission's heartbeat, milliseconds.
     pub heartbeat_ms: u32,
-    /// For how long a consumer may use a permission after its stamp, milliseconds.
+    /// The time after its stamp for which a consumer may use a permission, milliseconds.
     pub valid_ms: u32,
-    /// How poses are received.
+    /// The quality of service of the poses.
     pub pose_delivery: Delivery,
-    /// How odometry is received.
+    /// The quality of service of the odometry.
     pub odom_delivery: Delivery,
-    /// The tags and the camera, if detections are used in place of poses.
+    /// The tags and the camera, if detections are used instead of poses.
     pub detector: Option<Detector>,
-    /// How detections are received.
+    /// The quality of service of the detections.
     pub detections_delivery: Delivery,
-    /// How the camera info is received.
+    /// The quality of service of the camera info.
     pub camera_info_delivery: Delivery,
     /// The tracker, if odometry is used.
     pub tracker: Option<TrackerSettings>,
-    /// Whether markers are published.
+    /// `true` if markers are published.
     pub markers: bool,
-    /// The line to the controller that decides. Without one, the node decides.
+    /// The line to the controller that decides; `None` if the node decides.
     pub serial: Option<Serial>,
 }
 
-/// Parameters that are refused.
+/// The reason why parameters are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsError {
-    /// A name that no parameter has.
+    /// There is no parameter with this name.
     #[error("{place}: there is no parameter `{name}`{hint}; the parameters are: {all}")]
     Unknown {
         /// The name.
         name: String,
-        /// Where it was given.
+        /// The source: the file or the argument.
         place: String,
-        /// A similar name, in words.
+        /// A similar name, as text.
         hint: String,
         /// All names.
         all: String,
     },
-    /// A value of the wrong type or beyond its range.
+    /// A value has the wrong type or is beyond its range.
     #[error("{place}: the parameter `{name}` is {given}: expected {expected}")]
     Invalid {
         /// The name.
         name: &'static str,
-        /// Where it was given.
+        /// The source: the file or the argument.
         place: String,
-        /// What was given.
+        /// The given value.
         given: String,
-        /// What is expected.
+        /// The expected value.
         expected: &'static str,
     },
     /// The robot's speed is not stated.
@@ -110,66 +111,66 @@ pub enum SettingsError {
         "nothing states how fast the robot moves: give max_speed (m/s) and max_yaw_rate_deg (degrees/s), the fastest that its drives can move it; or stands_still:=true if something else, such as brakes, keeps it in place while it is permitted"
     )]
     NoMotionBounds,
-    /// The robot stands still, and moves.
+    /// Both a standstill and a speed are stated.
     #[error("stands_still is true and a speed is given: give one or the other")]
     TwoMotionBounds,
-    /// Odometry without its errors.
+    /// Odometry is used without its errors.
     #[error(
         "use_odometry is true and `{0}` is not given: state the errors of the odometry, odometry_m_per_sqrt_m, odometry_rad_per_sqrt_rad, odometry_rad_per_sqrt_m and odometry_slip (docs/for-ros.md says how they are measured)"
     )]
     NoOdometryErrors(&'static str),
-    /// Simulated time.
+    /// Simulated time is requested.
     #[error(
         "use_sim_time is true: the gate needs a clock that cannot stop, so this node uses the system's clock; set use_sim_time to false for it, and play recordings with `posegate replay`"
     )]
     SimulatedTime,
-    /// A setting of the gate, which is on the controller.
+    /// The parameter is a setting of the gate, which is on the controller.
     #[error(
         "{place}: the parameter `{name}` is a setting of the gate, and with --serial the controller's gate decides by its own settings: leave it out"
     )]
     OfTheController {
         /// The name.
         name: String,
-        /// Where it was given.
+        /// The source: the file or the argument.
         place: String,
     },
-    /// A setting of a line without one.
+    /// A setting of a line is given without a line.
     #[error(
         "link_timeout_ms is given without --serial: it is for a controller on a serial line; give --serial DEV, or leave it out"
     )]
     NoSerial,
-    /// Detections without a site file.
+    /// Detections are used without a site file.
     #[error(
         "use_detections is true and no site file is given: give --site FILE, the file that the table was made from; it has the tags and the camera"
     )]
     NoSite,
-    /// A site file that cannot be used.
+    /// The site file cannot be used.
     #[error("the site file cannot be used: {0}")]
     Site(String),
-    /// A site without the camera or a tag.
+    /// The camera or a tag is missing from the site.
     #[error("{0}; the parameter `camera` names the camera")]
     Detector(#[from] DetectorError),
-    /// A parameter of detections without them, or of poses with detections.
+    /// A parameter of detections is given without detections, or one of poses with detections.
     #[error(
         "{place}: the parameter `{name}` is for {of}: leave it out, or set use_detections to {instead}"
     )]
     OtherInput {
         /// The name.
         name: String,
-        /// Where it was given.
+        /// The source: the file or the argument.
         place: String,
-        /// What it is for.
+        /// The subject of the parameter.
         of: &'static str,
-        /// The value of `use_detections` with which it would count.
+        /// The value of `use_detections` with which the parameter is allowed.
         instead: bool,
     },
-    /// Times that do not fit each other.
+    /// Times contradict each other.
     #[error("{0}")]
     Times(&'static str),
-    /// A setting that the gate refuses.
+    /// The gate refuses a setting.
     #[error("{0}")]
     Gate(#[from] InvalidParameter),
-    /// Not a table.
+    /// The bytes are not a table.
     #[error("the table is not one: {0}; build it again with `posegate table build`")]
     Table(#[from] TableError),
     /// The table of another task.
@@ -179,30 +180,30 @@ pub enum SettingsError {
     WrongTask {
         /// The task of the table.
         found: String,
-        /// The task that was asked for.
+        /// The requested task.
         expected: String,
     },
-    /// The table of another site.
+    /// The table is of another site.
     #[error(
         "the table was made from another site file: its digest is {found}, and {expected} was given; build the table from the site file that is in use (`posegate table info` prints a table's digest)"
     )]
     WrongSite {
         /// The digest of the table.
         found: String,
-        /// The digest that was given.
+        /// The given digest.
         expected: String,
     },
 }
 
-/// By how much the ROS clocks of the node and of a consumer may differ, milliseconds. Consumers refuse heartbeats from farther in the
-/// future.
+/// The ROS clocks of the node and of a consumer may differ by this, milliseconds. Consumers refuse heartbeats from
+/// farther in the future.
 pub const CLOCKS_MS: u32 = 20;
 
 impl NodeSettings {
-    /// Makes the settings from the arguments and the bytes of the table.
+    /// Creates the settings from the arguments and the bytes of the table.
     ///
     /// # Errors
-    /// [`SettingsError`]. No accepted value switches a check off.
+    /// [`SettingsError`]. No accepted value disables a check.
     pub fn new(arguments: &Arguments, table: &[u8]) -> Result<Self, SettingsError> {
         let reader = Reader(&arguments.parameters);
         reader.check_names()?;
@@ -308,8 +309,8 @@ impl NodeSettings {
         Ok(self.gate().check()?)
     }
 
-    /// Returns the longest time from a step until every consumer has followed the answer of the next one: a cycle, the time for
-    /// which consumers use a permission when nothing follows it, and the difference of their clocks.
+    /// Returns the longest time from a step until every consumer has followed the answer of the next one. It is the
+    /// sum of a cycle, the time for which consumers use the last permission, and the difference of their clocks.
     #[must_use]
     pub const fn response_ms(&self) -> u32 {
         self.cycle_ms + self.valid_ms + CLOCKS_MS

@@ -1,7 +1,7 @@
-//! Detections of tags become poses: one, or two if a tag is seen head-on. No DDS in here.
+//! Converts detections of tags to poses: one, or two if a tag is seen head-on. Without DDS.
 //!
-//! The geometry is in [`posegate_host::log::detector`]. [`Tags`] keeps the camera that the camera info describes, and what became of the
-//! last detections, in words.
+//! The geometry is in [`posegate_host::log::detector`]. [`Tags`] keeps the camera that the camera info describes, and
+//! the result of the last detections as text.
 
 use crate::message::{
     AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, OK, WARN,
@@ -11,33 +11,34 @@ use posegate::set::{Estimate, Uncertainty};
 use posegate_host::log::corners::{Fix, MountedCamera};
 use posegate_host::log::detector::{self, Detector, FoundTag};
 
-/// What one message of detections gives.
+/// The result of one message of detections.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Look {
-    /// The poses at one of which the robot is, best first: one or two.
+    /// The possible poses of the robot, best first: one or two.
     Poses(Vec<PoseEstimate>),
-    /// No pose. An earlier one is still right.
+    /// No pose. An earlier pose is still valid.
     Nothing,
-    /// No pose, and the message contradicts what is known: an earlier pose must not be used.
+    /// No pose, and the message contradicts the site: an earlier pose must not be used.
     Contradiction,
 }
 
-/// Makes poses from detections.
+/// Computes poses from detections.
 #[derive(Clone, Debug)]
 pub struct Tags {
     detector: Detector,
     topics: [String; 2],
     info: Option<CameraInfo>,
     camera: Option<MountedCamera>,
-    /// Why the camera info is not used.
+    /// The reason why the camera info is not used.
     refused: Option<String>,
-    /// Why the last detections gave no pose.
+    /// The reason why the last detections gave no pose.
     unused: Option<String>,
     counts: [u64; 4],
 }
 
 impl Tags {
-    /// Makes one without a camera info; the topics are those of the detections and of the camera info, for messages.
+    /// Returns a converter without a camera info; the topics are those of the detections and of the camera info, for
+    /// messages.
     #[must_use]
     pub const fn new(detector: Detector, topics: [String; 2]) -> Self {
         Self {
@@ -51,7 +52,8 @@ impl Tags {
         }
     }
 
-    /// Takes a camera info. One that is not that of the site's camera is refused, and the one before is then not used either.
+    /// Processes a camera info. If it is not that of the site's camera it is refused, and the earlier one is not used
+    /// any more.
     pub fn camera_info(&mut self, message: &CameraInfo) {
         let is_same = self
             .info
@@ -68,7 +70,8 @@ impl Tags {
         };
     }
 
-    /// Takes a camera info that could not be read: what it said is not known, so the one before is not used.
+    /// Processes a camera info that could not be decoded: its content is not known, so the earlier one is not used
+    /// any more.
     pub fn camera_info_lost(&mut self) {
         (self.info, self.camera) = (None, None);
         self.refused = Some(format!("a message of {} could not be read", self.topics[1]));
@@ -80,7 +83,7 @@ impl Tags {
         self.camera.is_some()
     }
 
-    /// Takes detections.
+    /// Processes detections.
     pub fn look(&mut self, message: &AprilTagDetectionArray) -> Look {
         let (look, unused) = self.looked(message);
         self.unused = unused;
@@ -95,7 +98,7 @@ impl Tags {
     }
 
     fn looked(&self, message: &AprilTagDetectionArray) -> (Look, Option<String>) {
-        // Without a camera info nothing is known of the camera: see `problem`.
+        // Without a camera info the camera is not known: see `problem`.
         let (Some(info), Some(camera)) = (&self.info, &self.camera) else {
             return (Look::Nothing, None);
         };
@@ -126,7 +129,7 @@ impl Tags {
         }
     }
 
-    /// Returns why detections give no pose, in words; `None` if the last ones gave one.
+    /// Returns the reason, as text, why detections give no pose; `None` if the last ones gave a pose.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let [detections, camera_info] = &self.topics;

@@ -1,5 +1,5 @@
-//! Damaged payloads at the boundary where CDR becomes a message: no panic, and no permit that another reader of the same bytes, and
-//! the plain definition of the success set, would not give.
+//! Damaged payloads at the boundary where CDR becomes a message: no panic, and no permit that an independent reader
+//! of the same bytes and the plain definition of the success set contradict.
 
 use damage::{Random, damage};
 use posegate_ros2::arguments::Command;
@@ -51,12 +51,12 @@ fn read(payload: &[u8]) -> Option<(i32, u32, Vec<u8>, [f64; 43])> {
         let bytes = payload.get(begin + 8 * k..begin + 8 * k + 8)?;
         *number = f64::from_le_bytes(bytes.try_into().ok()?);
     }
-    // The byte that ends the text is not compared with zero, as other readers of CDR do.
+    // The byte that ends the text is not compared with zero; other readers of CDR do not compare it either.
     let (_, name) = text.split_last()?;
     Some((word(0)? as i32, word(4)?, name.to_vec(), numbers))
 }
 
-/// Whether the dock of the example could permit these numbers: a necessary condition, in plain floats.
+/// Returns `true` if the dock of the example could permit these numbers: a necessary condition, in plain floats.
 fn may_permit((sec, nanosec, frame, numbers): &(i32, u32, Vec<u8>, [f64; 43])) -> bool {
     let [x, y, _, qx, qy, qz, qw] = *numbers.first_chunk::<7>().unwrap();
     let covariance = &numbers[7..];
@@ -129,6 +129,6 @@ fn damaged_payloads_never_permit_wrongly() {
         "\n{{\"name\": \"ros2: damaged payloads\", \"value\": {PAYLOADS}, \"parsed\": {parsed}, \"permits\": {permits}, \"wrong\": {wrong}}}"
     );
     assert_eq!(wrong, 0);
-    // The test would show nothing if all were refused, or all were harmless.
+    // The test shows nothing if all payloads are refused, or if all are harmless.
     assert!(parsed > PAYLOADS / 4 && permits > PAYLOADS / 20 && permits < parsed);
 }

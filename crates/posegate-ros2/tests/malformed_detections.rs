@@ -1,5 +1,5 @@
-//! Damaged detections and camera infos at the boundary where CDR becomes a message: no panic, and no permit that a plain pinhole camera
-//! and another reader of the same bytes contradict.
+//! Damaged detections and camera infos at the boundary where CDR becomes a message: no panic, and no permit that a
+//! plain pinhole camera and an independent reader of the same bytes contradict.
 
 use damage::{Random, damage};
 use posegate::bake::BakeInput;
@@ -121,7 +121,7 @@ impl Cdr<'_> {
         let length = self.word()? as usize;
         let text = self.payload.get(self.at..self.at + length)?;
         self.at += length;
-        // Some writers leave the zero of an empty text out.
+        // Some writers omit the zero of an empty text.
         Some(
             text.split_last()
                 .map_or(Vec::new(), |(_, text)| text.to_vec()),
@@ -133,7 +133,7 @@ impl Cdr<'_> {
     }
 }
 
-/// Whether detections with these bytes could permit at a pose: a necessary condition, in plain floats.
+/// Returns `true` if detections with these bytes could permit at a pose: a necessary condition, in plain floats.
 fn may_permit(payload: &[u8], pose: [f64; 3]) -> Option<bool> {
     let mut cdr = Cdr { payload, at: 0 };
     let (sec, nanosec, frame) = cdr.header()?;
@@ -165,7 +165,8 @@ fn may_permit(payload: &[u8], pose: [f64; 3]) -> Option<bool> {
     Some(is_fresh && is_inside && frame == b"front" && used > 0 && fits)
 }
 
-/// Whether a camera info with these bytes could be that of the site's camera: a necessary condition, in plain floats.
+/// Returns `true` if a camera info with these bytes could be that of the site's camera: a necessary condition, in
+/// plain floats.
 fn may_be_the_camera(payload: &[u8]) -> Option<bool> {
     let mut cdr = Cdr { payload, at: 0 };
     let (_, _, frame) = cdr.header()?;
@@ -223,7 +224,8 @@ fn table() -> Vec<u8> {
     posegate::verify::build(&order, &|| ()).unwrap().0
 }
 
-/// Damages one of the two messages of a look, and counts the payloads that are read, those that permit, and those that must not.
+/// Damages one of the two messages of a look. Counts the payloads that are decoded, those that permit, and those that
+/// must not.
 fn count(
     original: &[u8],
     damaged: impl Fn(&[u8]) -> Option<(CameraInfo, AprilTagDetectionArray)>,
@@ -263,7 +265,7 @@ fn report(what: &str, [parsed, permits, wrong]: [u64; 3]) {
         "\n{{\"name\": \"ros2: damaged {what}\", \"value\": {PAYLOADS}, \"parsed\": {parsed}, \"permits\": {permits}, \"wrong\": {wrong}}}"
     );
     assert_eq!(wrong, 0);
-    // The test would show nothing if all were refused, or all were harmless.
+    // The test shows nothing if all payloads are refused, or if all are harmless.
     assert!(parsed > PAYLOADS / 4 && permits > PAYLOADS / 20 && permits < parsed);
 }
 

@@ -17,11 +17,11 @@ pub struct CoverOptions {
     pub method: Method,
     /// Allowed relative gap between the cost and the bound, at least 0.
     pub gap: f64,
-    /// The search ends after this time, seconds, but not before the greedy choice is complete. (With a limit, the answer
-    /// may depend on the machine.)
+    /// The search ends after this time, seconds, but not before the greedy choice is complete. (With a limit, the
+    /// answer may depend on the machine.)
     pub time_limit: Option<f64>,
-    /// A task's chain may look only from places at most this far from the straight line between its start and its goal,
-    /// metres.
+    /// The looks of a task's chain are from places at most this far from the straight line between its start and its
+    /// goal, metres.
     pub beside: f64,
     /// The largest allowed probability that a plan fails although no step does.
     pub most_risk: f64,
@@ -89,13 +89,13 @@ impl Incumbent {
     }
 }
 
-/// What a caller sees of a running cover, and how it ends one.
+/// Callbacks of a running cover, and the signal that ends it.
 pub struct Watch<'a> {
     /// Called for each step of a stage, with the number of steps if it is known.
     pub tick: &'a (dyn Fn(Stage, Option<usize>) + Sync),
     /// Called when the choice or its bound has improved.
     pub improved: &'a (dyn Fn(Incumbent) + Sync),
-    /// Ends the search for a cheaper choice when it is set.
+    /// Ends the search for a cheaper choice if it is set.
     pub stop: Arc<AtomicBool>,
 }
 
@@ -126,7 +126,7 @@ pub enum Stage {
 pub struct ChosenTag {
     /// The candidate's name.
     pub name: String,
-    /// The tag. Its id is the candidate's, or the least one that is free in its family.
+    /// The tag. Its id is the candidate's, or the least free id of its family.
     pub tag: SiteTag,
     /// The cost of the tag.
     pub cost: f64,
@@ -146,9 +146,9 @@ pub struct ChosenTag {
 pub struct Polished {
     /// Displacement from the candidate's place, along its own y and z axes, metres.
     pub moved: [f64; 2],
-    /// The reserve before the move, and on the whole polished site. The reserve is the largest factor for the errors of
-    /// all starts and all looks with which each task that looks at the tag still has a plan, using only the chosen tags
-    /// that its plan looked at. At least 1; searched in steps of 2 %, rounded down.
+    /// The reserve before the move, and on the complete polished site. The reserve is the largest factor for the
+    /// errors of all starts and all looks with which each task that looks at the tag still has a plan. Such a plan
+    /// uses only the chosen tags that the task's plan looked at. At least 1; searched in steps of 2 %, rounded down.
     pub reserve: [f64; 2],
 }
 
@@ -157,11 +157,11 @@ pub struct Polished {
 pub struct TaskCoverage {
     /// The name of the work task.
     pub task: String,
-    /// The chain from whose start it begins.
+    /// The chain from whose start the task begins.
     pub from: String,
-    /// The number of candidates that can be of use for it.
+    /// The number of candidates that are useful for the task.
     pub in_reach: usize,
-    /// The number of candidates that serve it alone.
+    /// The number of candidates that serve the task alone.
     pub alone: usize,
     /// The plan on the site with the chosen tags, or the reason why there is none.
     pub planned: PlanResult,
@@ -181,11 +181,11 @@ pub struct Cover {
     /// Lower bound: no choice that serves these tasks by chains within [`CoverOptions::beside`] costs less (see
     /// [`language`](super::language) for the assumptions).
     pub bound: f64,
-    /// The same bound by arithmetic alone, without relying on a solver's answer.
+    /// The same bound, computed without a solver's answer.
     pub bound_checked: f64,
-    /// Largest distance from the straight line from which the chains of the bound look, metres.
+    /// Largest distance from the straight line of the looks of the bound's chains, metres.
     pub beside: f64,
-    /// `true` if the method ended by itself, not by its time limit.
+    /// `true` if the method was completed before its time limit.
     pub is_finished: bool,
     /// The number of rounds of choosing tags and checking tasks.
     pub rounds: usize,

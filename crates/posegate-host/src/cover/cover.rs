@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::exact::{Progress, Terms, bounded, first_cuts, mended, search};
-use super::hung::{hung, with_tags};
+use super::clearance::{on_a_keep_out, overlap};
+use super::exact::{Progress, Terms, bounded, completed, first_cuts, search};
 use super::missing::{unreinforced, unserved};
+use super::mounted::{mounted_tags, with_tags};
 use super::oracle::{Oracle, Robustness};
-use super::room::{on_a_keep_out, overlap};
 use super::tags::Tags;
 use super::value::value;
 use super::{
@@ -22,14 +22,14 @@ use crate::site::{Site, SiteTag, TaskKind};
 /// Chooses the cheapest candidates with which every work task has a plan. `tick` is called for each step of a stage,
 /// with the number of its steps if that is known.
 ///
-/// No two chosen tags may overlap, nor a chosen tag and a mounted one. If the cheapest choice has such an overlap, one
-/// of the tags is removed from the candidates, and the choice is made again. The bound remains that of the first choice
-/// as long as the same tasks are served. Otherwise it is 0, because no bound is known for those tasks alone.
+/// No two chosen tags may overlap, nor a chosen tag and a mounted one. If the cheapest choice has such an overlap,
+/// one of the tags is removed from the candidates, and the choice is made again. The bound remains that of the first
+/// choice if the same tasks are served. Otherwise it is 0, because no bound is known for those tasks only.
 ///
-/// The answer is the same for any number of threads (unless a time limit ends it).
+/// The answer is the same for any number of threads, if no time limit ends it.
 ///
 /// # Errors
-/// [`CoverError`]. A task that no candidate serves is not an error: the answer has the reason.
+/// [`CoverError`]. A task that no candidate serves is not an error: the answer contains the reason.
 pub fn cover(
     site: &Site,
     order: &CoverOptions,
@@ -43,8 +43,8 @@ pub fn cover(
     cover_watched(site, order, &watch)
 }
 
-/// As [`cover`]. Reports each improvement of the choice and of the bound. Stops when [`Watch::stop`] is set or the time
-/// is over: the answer is then the best choice so far, which costs no more than the greedy one.
+/// Like [`cover`]. Reports each improvement of the choice and of the bound. Stops if [`Watch::stop`] is set or the
+/// time is over: the answer is then the best choice so far, which costs no more than the greedy one.
 ///
 /// # Errors
 /// As [`cover`].
@@ -92,7 +92,7 @@ pub fn cover_watched(
     }
 }
 
-/// Returns a cover whose tags may overlap.
+/// Returns a cover with tags that may overlap.
 fn chosen(
     site: &Site,
     order: &CoverOptions,
@@ -145,14 +145,14 @@ fn chosen(
     let (mut served, mut gone) = apart(oracles, &lost);
     let mut cuts = first_cuts(&mut served, terms.demand())?;
     let none = Tags::none(costs.len());
-    let mut chosen = mended(&mut served, &none, &terms)?;
+    let mut chosen = completed(&mut served, &none, &terms)?;
     let also = unreinforced(&mut served, &chosen, &terms)?;
     if !also.is_empty() {
         lost.extend(also);
         let (rest, more) = apart(served, &lost);
         (served, gone) = (rest, gone.into_iter().chain(more).collect());
         cuts = first_cuts(&mut served, terms.demand())?;
-        chosen = mended(&mut served, &none, &terms)?;
+        chosen = completed(&mut served, &none, &terms)?;
     }
     let mut at = Progress {
         chosen,
@@ -179,7 +179,7 @@ fn chosen(
         }
     }
 
-    let hung = hung(site, &names, &at.chosen)?;
+    let chosen_tags = mounted_tags(site, &names, &at.chosen)?;
     let tag = |(number, (name, tag)): (&usize, &(String, SiteTag))| ChosenTag {
         name: name.clone(),
         tag: tag.clone(),
@@ -189,8 +189,8 @@ fn chosen(
         second_of: vec![],
         polished: None,
     };
-    let tags = hung.iter().map(tag).collect();
-    let site = with_tags(site, &hung);
+    let tags = chosen_tags.iter().map(tag).collect();
+    let site = with_tags(site, &chosen_tags);
     let plans = served.iter().chain(&gone).map(|oracle| oracle.asked).sum();
     let mut cover = Cover {
         tags,
@@ -206,13 +206,13 @@ fn chosen(
         site,
     };
     let count = starts.len();
-    cover.tasks = told(&cover.site, &served, &terms, &options, &|| {
+    cover.tasks = final_plans(&cover.site, &served, &terms, &options, &|| {
         tick(Stage::Check, Some(count));
     })?;
     for oracle in &gone {
         cover.tasks.push(TaskCoverage {
             reason: lost.get(&oracle.task).cloned(),
-            ..told_of(oracle, oracle.plan(&oracle.reach, terms.kind)?)
+            ..coverage(oracle, oracle.plan(&oracle.reach, terms.kind)?)
         });
     }
     cover.tasks.sort_by(|a, b| a.task.cmp(&b.task));
@@ -235,13 +235,13 @@ fn chosen(
     Ok(cover)
 }
 
-/// Returns a chosen tag that overlaps another chosen or a mounted tag. Of two chosen tags it is the more expensive one;
-/// if they cost the same, the last.
+/// Returns a chosen tag that overlaps another chosen or a mounted tag: of two chosen tags the more expensive one, or
+/// the last if they cost the same.
 fn overlapping(found: &Cover) -> Option<String> {
     let chosen = |name: &str| found.tags.iter().any(|tag| tag.name == name);
     for (at, tag) in found.tags.iter().enumerate() {
-        let mut hanging = found.site.tags.iter().filter(|(name, _)| !chosen(name));
-        if hanging.any(|(_, other)| overlap(&tag.tag, other)) {
+        let mut mounted = found.site.tags.iter().filter(|(name, _)| !chosen(name));
+        if mounted.any(|(_, other)| overlap(&tag.tag, other)) {
             return Some(tag.name.clone());
         }
         let others = found.tags[at + 1..].iter();
@@ -249,8 +249,8 @@ fn overlapping(found: &Cover) -> Option<String> {
             .into_iter()
             .find(|other| overlap(&tag.tag, &other.tag))
         {
-            let dearer = if other.cost >= tag.cost { other } else { tag };
-            return Some(dearer.name.clone());
+            let costlier = if other.cost >= tag.cost { other } else { tag };
+            return Some(costlier.name.clone());
         }
     }
     None
@@ -310,7 +310,7 @@ fn apart<'a>(
         .partition(|oracle| !lost.contains_key(&oracle.task))
 }
 
-fn told_of(oracle: &Oracle<'_>, planned: PlanResult) -> TaskCoverage {
+fn coverage(oracle: &Oracle<'_>, planned: PlanResult) -> TaskCoverage {
     TaskCoverage {
         task: oracle.task.clone(),
         from: oracle.from.clone(),
@@ -322,7 +322,7 @@ fn told_of(oracle: &Oracle<'_>, planned: PlanResult) -> TaskCoverage {
 }
 
 /// Returns the plans on the site with the chosen tags, as `posegate plan` finds them.
-fn told(
+fn final_plans(
     site: &Site,
     served: &[Oracle<'_>],
     terms: &Terms<'_>,
@@ -334,7 +334,7 @@ fn told(
     for oracle in served {
         let planned = match plans.plan(&oracle.from, &oracle.task, options)? {
             Some(planned) => planned,
-            // The site has no looks, so no tag was needed.
+            // The site has no looks, so no tag is needed.
             None => oracle.plan(&Tags::none(terms.costs.len()), terms.kind)?,
         };
         let reason = planned.plan.is_none().then(|| {
@@ -346,7 +346,7 @@ fn told(
         tick();
         tasks.push(TaskCoverage {
             reason,
-            ..told_of(oracle, planned)
+            ..coverage(oracle, planned)
         });
     }
     Ok(tasks)

@@ -2,7 +2,7 @@
 
 use crate::plan::PlanError;
 
-/// The reason why a cover is not searched, or not found.
+/// The reason why no cover is searched or found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoverError {
@@ -11,7 +11,7 @@ pub enum CoverError {
         "the site has no candidates: add [candidate.NAME] tables, written like tags, or [candidates.NAME] tables with `wall`, `every` and `z`"
     )]
     NoCandidates,
-    /// The site does not say how a candidate is seen.
+    /// The site does not define the looks at candidates.
     #[error(
         "the site does not say from where a candidate is seen: add [planner] look = {{...}} and r = [[...]]"
     )]
@@ -25,7 +25,7 @@ pub enum CoverError {
     /// The chain does not exist.
     #[error("the site has no chain `{0}`")]
     NoChain(String),
-    /// A candidate on a keep-out.
+    /// A candidate is on a keep-out.
     #[error(
         "the candidate `{candidate}` is on a keep-out of wall `{wall}`, where no tag may be mounted: remove the candidate or the keep-out"
     )]
@@ -35,7 +35,7 @@ pub enum CoverError {
         /// The wall's name.
         wall: String,
     },
-    /// All tags of a family are taken.
+    /// All ids of a family are in use.
     #[error(
         "no id is left for the candidate `{0}`: all tags of its family are mounted or chosen already; choose a larger family"
     )]

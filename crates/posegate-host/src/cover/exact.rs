@@ -4,13 +4,13 @@
 use rayon::prelude::*;
 
 use super::CoverError;
-use super::greedy::{complete, drop_needless, reinforce};
+use super::greedy::{complete, drop_unneeded, reinforce};
 use super::master::{Cut, cheapest};
 use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
 use crate::plan::{PlanError, StopSignal};
 
-/// Cuts. A cut is sure if no search for it ended at its limit.
+/// Cuts. A cut is certain if no search for it ended at its limit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cuts {
     pub sure: Vec<Cut>,
@@ -62,7 +62,7 @@ pub(super) struct Terms<'a> {
 }
 
 impl Terms<'_> {
-    /// Returns the number of candidates that a cut demands of those missing from a set.
+    /// Returns the number of candidates that a cut demands of those outside of a set.
     pub const fn demand(&self) -> usize {
         match self.kind {
             Robustness::Plain => 1,
@@ -71,17 +71,18 @@ impl Terms<'_> {
     }
 }
 
-/// Returns the cut of a set that does not serve: at least `demand` of the candidates missing from the set are needed.
+/// Returns the cut of a set that does not serve the task: at least `demand` of the candidates outside of the set are
+/// needed.
 fn cut(oracle: &Oracle<'_>, not: &Tags, demand: usize, sure: bool) -> (Cut, bool) {
     let of = oracle.reach.minus(not);
-    // With fewer candidates than the demand, it is only known that all of them are needed.
+    // If there are fewer candidates than the demand, it is only known that all of them are needed.
     let short = of.len() < demand;
     let demand = demand.min(of.len());
     (Cut { of, demand }, sure && !short)
 }
 
 /// Returns the initial cuts of each task. If the candidates that do not serve alone do not serve together either, the
-/// task needs one that serves alone, and nothing more: that cut is exact.
+/// task needs one candidate that serves alone, and no others: that cut is exact.
 pub(super) fn first_cuts(oracles: &mut [Oracle<'_>], demand: usize) -> Result<Cuts, PlanError> {
     let found = oracles
         .par_iter_mut()
@@ -121,7 +122,7 @@ fn violated(
         let lost = own.iter().map(|tag| own.without(tag));
         for less in lost.chain([own.clone()]) {
             if !oracle.serves(&less, Robustness::Plain)? {
-                // If one more tag were added, its loss would leave this set.
+                // If one more tag were added, its loss would result in this set.
                 let (not, sure) = oracle.grow(&less, Robustness::Plain)?;
                 cuts.push(cut(oracle, &not, 2, sure));
                 if cuts.len() == MOST {
@@ -135,7 +136,7 @@ fn violated(
         }
         return Ok(cuts);
     }
-    // Disjoint cuts, until the choice with all of their candidates would serve.
+    // Disjoint cuts, until the choice with all of their candidates would serve the task.
     let mut with = chosen.clone();
     while cuts.len() < MOST && !oracle.serves(&with, kind)? {
         let (not, sure) = oracle.grow(&with, kind)?;
@@ -150,16 +151,16 @@ fn violated(
 }
 
 /// Completes a choice so that it serves every task, then drops tags that no task needs.
-pub(super) fn mended(
+pub(super) fn completed(
     oracles: &mut [Oracle<'_>],
     chosen: &Tags,
     terms: &Terms<'_>,
 ) -> Result<Tags, PlanError> {
-    let mut whole = complete(oracles, chosen, terms.demand(), terms.costs);
+    let mut all = complete(oracles, chosen, terms.demand(), terms.costs);
     if terms.kind == Robustness::Survives {
-        whole = reinforce(oracles, &whole)?;
+        all = reinforce(oracles, &all)?;
     }
-    drop_needless(oracles, &whole, terms.kind, terms.costs)
+    drop_unneeded(oracles, &all, terms.kind, terms.costs)
 }
 
 /// Alternates between choosing tags and checking tasks until the gap is small enough.
@@ -168,12 +169,12 @@ pub(super) fn search(
     mut at: Progress,
     terms: &Terms<'_>,
 ) -> Result<Progress, CoverError> {
-    let mut told = None;
+    let mut reported = None;
     loop {
         let choice = bounded(&mut at, terms.costs)?;
         let cost = at.chosen.cost(terms.costs);
-        if told != Some((cost, at.bound)) {
-            told = Some((cost, at.bound));
+        if reported != Some((cost, at.bound)) {
+            reported = Some((cost, at.bound));
             (terms.improved)(cost, at.bound);
         }
         if cost - at.bound <= terms.gap * cost + 1e-7 * cost {
@@ -191,7 +192,7 @@ pub(super) fn search(
             .collect::<Result<_, PlanError>>()?;
         let found: Vec<(Cut, bool)> = found.into_iter().flatten().collect();
         if terms.stop.is_set() {
-            // Tasks may have been left unchecked.
+            // Tasks may be unchecked.
             continue;
         }
         if found.is_empty() {
@@ -202,18 +203,18 @@ pub(super) fn search(
             return Ok(at);
         }
         at.cuts.add(found);
-        let mended = mended(oracles, &choice, terms)?;
+        let completed = completed(oracles, &choice, terms)?;
         let serves = oracles
             .par_iter_mut()
-            .map(|oracle| oracle.serves(&mended, terms.kind))
+            .map(|oracle| oracle.serves(&completed, terms.kind))
             .collect::<Result<Vec<bool>, PlanError>>()?;
-        if serves.into_iter().all(|serves| serves) && mended.cost(terms.costs) < cost {
-            at.chosen = mended;
+        if serves.into_iter().all(|serves| serves) && completed.cost(terms.costs) < cost {
+            at.chosen = completed;
         }
     }
 }
 
-/// Returns the cheapest choice that satisfies all cuts. Raises the bound to that of the sure cuts.
+/// Returns the cheapest choice that satisfies all cuts. Raises the bound to that of the certain cuts.
 pub(super) fn bounded(at: &mut Progress, costs: &[f64]) -> Result<Tags, CoverError> {
     let choice = cheapest(&at.cuts.all(), costs).map_err(CoverError::Solver)?;
     let sure = if at.cuts.unsure.is_empty() {

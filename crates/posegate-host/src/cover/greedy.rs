@@ -1,4 +1,4 @@
-//! Greedy choice: the most newly served tasks per cost first, then without tags that no task needs.
+//! Greedy choice: adds the tags that serve the most new tasks per cost, then drops tags that no task needs.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use super::oracle::{Oracle, OracleAnswer, Robustness};
 use super::tags::Tags;
 use crate::plan::PlanError;
 
-/// Returns how many more tags a task needs, out of those that serve it alone. If no tag serves it alone, counts sets
+/// Returns how many more tags a task needs, from those that serve it alone. If no tag serves it alone, counts sets
 /// that serve it.
 fn short(oracle: &Oracle<'_>, set: &Tags, demand: usize) -> usize {
     if oracle.serving().iter().any(Tags::is_empty) {
@@ -21,8 +21,8 @@ fn short(oracle: &Oracle<'_>, set: &Tags, demand: usize) -> usize {
     demand.saturating_sub(alone)
 }
 
-/// Completes a choice so that every task has a plan, by the known sets that serve. With a `demand` of two, a task that
-/// single tags serve gets two of these, if there are two.
+/// Completes a choice so that every task has a plan, by the known sets that serve. With a `demand` of two, a task
+/// that single tags serve gets two of these, if there are two.
 pub(super) fn complete(oracles: &[Oracle<'_>], from: &Tags, demand: usize, costs: &[f64]) -> Tags {
     let mut chosen = from.clone();
     let wanted = |oracle: &Oracle<'_>| {
@@ -59,7 +59,7 @@ pub(super) fn complete(oracles: &[Oracle<'_>], from: &Tags, demand: usize, costs
         };
         let moves: Vec<Tags> = moves.into_iter().collect();
         let worths: Vec<f64> = moves.par_iter().map(worth).collect();
-        // If several are equal, the first.
+        // The first, if several are equal.
         let best = worths
             .iter()
             .enumerate()
@@ -97,7 +97,7 @@ pub(super) fn reinforce(oracles: &mut [Oracle<'_>], from: &Tags) -> Result<Tags,
 }
 
 /// Drops tags that no task needs, the most expensive first.
-pub(super) fn drop_needless(
+pub(super) fn drop_unneeded(
     oracles: &mut [Oracle<'_>],
     chosen: &Tags,
     kind: Robustness,
@@ -105,7 +105,7 @@ pub(super) fn drop_needless(
 ) -> Result<Tags, PlanError> {
     let mut kept = chosen.clone();
     let mut order: Vec<usize> = chosen.iter().collect();
-    // If costs are equal, the tag that is in reach of the fewest tasks comes first.
+    // Of tags with equal costs, the tag in reach of the fewest tasks comes first.
     let near = |tag: usize| {
         oracles
             .iter()
@@ -122,13 +122,13 @@ pub(super) fn drop_needless(
     });
     for (tag, _) in keyed {
         let less = kept.without(tag);
-        // If the chosen tags do not serve a task at all, the task needs none of them.
-        let needless = oracles
+        // If the chosen tags do not serve a task, the task needs none of them.
+        let is_unneeded = oracles
             .par_iter_mut()
             .filter(|oracle| oracle.reach.has(tag))
             .map(|oracle| Ok(oracle.serves(&less, kind)? || !oracle.serves(&kept, kind)?))
             .collect::<Result<Vec<bool>, PlanError>>()?;
-        if needless.into_iter().all(|needless| needless) {
+        if is_unneeded.into_iter().all(|is_unneeded| is_unneeded) {
             kept = less;
         }
     }

@@ -89,7 +89,8 @@ fn steps(plan: &Plan) -> Vec<String> {
 }
 
 impl TaskCoverage {
-    /// Returns the steps of its plan in short form: `look TASK`, `drive PLACE`, `work TASK`; empty if it has no plan.
+    /// Returns the steps of the task's plan in short form: `look TASK`, `drive PLACE`, `work TASK`; empty if it has
+    /// no plan.
     #[must_use]
     pub fn steps(&self) -> Vec<String> {
         self.planned.plan.as_ref().map(steps).unwrap_or_default()

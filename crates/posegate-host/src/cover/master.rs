@@ -1,13 +1,14 @@
 //! The cheapest set of candidates that satisfies the cuts: one integer program per component, solved by branch and
 //! bound.
 //!
-//! Cuts that share no candidate are independent: each component is a program of its own. Candidate `a` dominates `b` if
-//! `a` costs no more and is in every cut that `b` is in. A candidate is left out if as many others dominate it as the
-//! largest demand of its cuts. In a cheapest set it could be replaced by one of them, or be left out.
+//! Cuts that share no candidate are independent: each component is a program of its own. Candidate `a` dominates `b`
+//! if `a` costs no more and is in every cut that `b` is in. A candidate is omitted if the number of others that
+//! dominate it is at least the largest demand of its cuts. In a cheapest set it could be replaced by one of them, or
+//! be omitted.
 //!
 //! The solver's answer is not trusted. Its choice is checked against every cut. The bound that is reported as checked
-//! is computed from prices of the cuts, and holds for any prices that are at least 0: no choice that satisfies the cuts
-//! costs less than `sum(demand price) - sum(max(0, prices of the candidate's cuts - its cost))`.
+//! is computed from prices of the cuts, and is valid for any prices that are at least 0: no choice that satisfies the
+//! cuts costs less than `sum(demand price) - sum(max(0, prices of the candidate's cuts - its cost))`.
 
 use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOptions, Variable};
 use rayon::prelude::*;
@@ -34,7 +35,7 @@ pub(super) struct MasterSolution {
 /// Largest number of branch-and-bound nodes per component.
 const NODES: u64 = 200_000;
 
-/// By how much a bound is lowered, to allow for the rounding of floats.
+/// A bound is lowered by this, to allow for the rounding of floats.
 const SLACK: f64 = 1e-9;
 
 /// Returns the cheapest choice that satisfies the cuts.
@@ -111,17 +112,17 @@ fn columns(cuts: &[Cut], costs: &[f64]) -> Vec<Column> {
     all.iter().map(|number| (number, rows(number))).collect()
 }
 
-/// Returns the candidates that too few others dominate.
+/// Returns the candidates that are not dominated by enough others.
 fn needed(all: &[Column], cuts: &[Cut], costs: &[f64]) -> Vec<Column> {
-    // Of equal candidates the earlier dominates the later.
-    let stands_in = |a: &Column, b: &Column| {
+    // Of two equal candidates the earlier dominates the later.
+    let dominates = |a: &Column, b: &Column| {
         let within = b.1.iter().all(|row| a.1.binary_search(row).is_ok());
         let equal = costs[a.0] == costs[b.0] && a.1.len() == b.1.len();
         a.0 != b.0 && within && costs[a.0] <= costs[b.0] && (!equal || a.0 < b.0)
     };
     let is_needed = |column: &&Column| {
         let demand = column.1.iter().map(|row| cuts[*row].demand).max();
-        let others = all.iter().filter(|other| stands_in(other, column));
+        let others = all.iter().filter(|other| dominates(other, column));
         others.count() < demand.unwrap_or(0)
     };
     all.iter().filter(is_needed).cloned().collect()
@@ -170,8 +171,8 @@ fn component(cuts: &[Cut], costs: &[f64]) -> Result<MasterSolution, String> {
     })
 }
 
-/// Returns a bound by prices: the prices are those of the linear relaxation, from a solver. It is valid for any prices
-/// that are at least 0.
+/// Returns a bound by prices. The prices are those of the linear relaxation, from a solver. The bound is valid for
+/// any prices that are at least 0.
 fn dual_bound(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64]) -> f64 {
     let mut dual = Problem::new(OptimizationDirection::Maximize);
     let prices: Vec<Variable> = cuts
@@ -216,8 +217,8 @@ fn dual_bound(cuts: &[Cut], (columns, all): (&[Column], &[Column]), costs: &[f64
         .sum();
     let bound = paid - above;
     // Integer costs have an integer sum.
-    let whole = all.iter().all(|(number, _)| costs[*number] % 1.0 == 0.0);
-    if whole {
+    let is_whole = all.iter().all(|(number, _)| costs[*number] % 1.0 == 0.0);
+    if is_whole {
         libm::ceil(bound - 1e-6).max(0.0)
     } else {
         bound.max(0.0)
@@ -239,22 +240,22 @@ mod tests {
 
     /// Random cuts of ten candidates: the choice is the cheapest of all 1,024, and no bound is above it.
     #[test]
-    fn no_choice_that_keeps_to_the_cuts_is_cheaper() {
+    fn choice_is_the_cheapest_that_satisfies_the_cuts() {
         const COUNT: usize = 10;
         let mut apart = 0;
         for seed in 0..crate::rounds(300, 2) {
             let mut state = u64::from(seed);
-            let whole = next(&mut state).is_multiple_of(2);
+            let is_whole = next(&mut state).is_multiple_of(2);
             let costs: Vec<f64> = (0..COUNT)
                 .map(|_| {
                     let part = (next(&mut state) % 5 + 2) as f64;
-                    if whole { part } else { part / 3.0 }
+                    if is_whole { part } else { part / 3.0 }
                 })
                 .collect();
             let cuts: Vec<Cut> = (0..next(&mut state) % 7 + 1)
                 .map(|_| {
                     let mut of = Tags::none(COUNT);
-                    // Near each other, so that some cuts share nothing.
+                    // Neighbours, so that some cuts share no candidate.
                     let first = next(&mut state) as usize % COUNT;
                     for step in 0..next(&mut state) as usize % 4 + 2 {
                         of.insert((first + step) % COUNT);

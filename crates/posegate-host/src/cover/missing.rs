@@ -10,7 +10,7 @@ use super::tags::Tags;
 use crate::plan::{PlanError, PlanResult};
 use crate::site::{GeneratedLook, Site};
 
-/// Returns the tasks that nothing serves, with the reasons.
+/// Returns the tasks that no choice serves, with the reasons.
 pub(super) fn unserved(
     oracles: &mut [Oracle<'_>],
     site: &Site,
@@ -29,7 +29,7 @@ pub(super) fn unserved(
     Ok(why.into_iter().flatten().collect())
 }
 
-/// Returns the reason why nothing serves a task.
+/// Returns the reason why no choice serves a task.
 fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
     let start = oracle.endpoint.start().pose;
     let goal = site.tasks[&oracle.task].success.goal;
@@ -42,9 +42,9 @@ fn why_not(oracle: &Oracle<'_>, planned: &PlanResult, site: &Site) -> String {
         })
     };
     let offers = site.planner.offers.values().filter(near);
-    let hung: BTreeSet<&String> = offers.map(|made| &made.tag).collect();
+    let offered: BTreeSet<&String> = offers.map(|made| &made.tag).collect();
     if oracle.reach.is_empty() {
-        return match hung.len() {
+        return match offered.len() {
             0 => "no candidate is in reach: none is near enough to the start or the goal".into(),
             near => format!(
                 "no candidate is in reach: {near} are near enough to the start or the goal, \
@@ -85,7 +85,7 @@ pub(super) fn unreinforced(
             }
             let all = oracle.reach.clone();
             let why = match oracle.ask(&all, terms.kind)? {
-                // (The choice was completed without it: an internal error that ends here.)
+                // (The choice was completed without this task: an internal error that ends here.)
                 OracleAnswer::Served(_) => return Ok(None),
                 OracleAnswer::Unknown => "no plan within the limit of the search",
                 OracleAnswer::Not => "every plan has a tag whose loss it does not survive",

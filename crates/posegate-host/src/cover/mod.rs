@@ -21,28 +21,28 @@
 pub use self::answer::{
     ChosenTag, Cover, CoverOptions, Incumbent, Method, Polished, Stage, TaskCoverage, Watch,
 };
+pub(crate) use self::clearance::{on_a_keep_out, overlap};
 pub use self::cover::{cover, cover_watched};
 pub use self::error::CoverError;
 pub use self::polish::polished;
-pub(crate) use self::room::{on_a_keep_out, overlap};
 pub use self::written::written;
 
 #[doc = include_str!("language.md")]
 pub mod language {}
 
 mod answer;
+mod clearance;
 #[allow(clippy::module_inception)]
 mod cover;
 mod error;
 mod exact;
 mod greedy;
-mod hung;
 mod json;
 mod master;
 mod missing;
+mod mounted;
 mod oracle;
 mod polish;
-mod room;
 mod tags;
 mod value;
 mod written;

@@ -1,4 +1,4 @@
-//! Answers for one work task which sets of candidates serve it, by planning.
+//! Answers, by planning, which sets of candidates serve one work task.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +25,8 @@ pub(super) enum OracleAnswer {
     Unknown,
 }
 
-/// Cached answers. A superset of a serving set serves; a subset of a set that does not serve does not serve.
+/// Cached answers. A superset of a set that serves also serves; a subset of a set that does not serve does not serve
+/// either.
 #[derive(Clone, Debug, Default)]
 struct OracleCache {
     served: Vec<Tags>,
@@ -37,12 +38,12 @@ struct OracleCache {
 #[derive(Debug)]
 pub(super) struct Oracle<'a> {
     pub task: String,
-    /// The chain from whose start it begins.
+    /// The chain from whose start the task begins.
     pub from: String,
     pub endpoint: TaskPlanner<'a>,
-    /// The candidates that can be of use for it.
+    /// The candidates that are useful for the task.
     pub reach: Tags,
-    /// The candidates that serve it alone (with the tags mounted already).
+    /// The candidates that serve the task alone (with the tags that are already mounted).
     pub singles: Tags,
     number: &'a BTreeMap<String, usize>,
     options: Options,
@@ -84,7 +85,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Returns the plan with these candidates and the tags mounted already.
+    /// Returns the plan with these candidates and the tags that are already mounted.
     pub fn plan(&self, set: &Tags, kind: Robustness) -> Result<PlanResult, PlanError> {
         let has = |tag: &str| self.number.get(tag).is_none_or(|number| set.has(*number));
         self.endpoint.plan(has, &self.options(kind))
@@ -163,9 +164,8 @@ impl<'a> Oracle<'a> {
         })
     }
 
-    /// Returns the candidates needed for a plan without any one tag that `planned` uses. A tag known to be lost also
-    /// removes the places that were made for it. Returns `None` if there is no such plan, with the status of that
-    /// search.
+    /// Returns the candidates needed for a plan without any one tag that `planned` uses. The places that were made
+    /// for a lost tag are also removed. Returns `None` if there is no such plan, with the status of that search.
     fn without_each(
         &mut self,
         set: &Tags,
@@ -179,13 +179,13 @@ impl<'a> Oracle<'a> {
                 OracleAnswer::Unknown => return Ok((None, Status::Limit)),
             }
         }
-        // Tags mounted already can be lost as well.
+        // Tags that are already mounted can also be lost.
         let steps = planned.plan.iter().flat_map(|plan| &plan.steps);
-        let hanging: BTreeSet<&String> = steps
+        let looked_at: BTreeSet<&String> = steps
             .flat_map(|step| &step.tags)
             .filter(|tag| !self.number.contains_key(*tag))
             .collect();
-        for lost in hanging {
+        for lost in looked_at {
             let has = |tag: &str| {
                 tag != lost && self.number.get(tag).is_none_or(|number| set.has(*number))
             };
@@ -262,8 +262,8 @@ impl<'a> Oracle<'a> {
         Ok(())
     }
 
-    /// Returns a maximal superset of `from` that does not serve, and `true` if that is sure. Begins with all candidates
-    /// in reach. While the set serves, removes the most used candidate that is not in `from`.
+    /// Returns a maximal superset of `from` that does not serve the task, and `true` if that is certain. Begins with
+    /// all candidates in reach. While the set serves, removes the most used candidate that is not in `from`.
     pub fn grow(&mut self, from: &Tags, kind: Robustness) -> Result<(Tags, bool), PlanError> {
         let from = from.and(&self.reach);
         if kind == Robustness::Survives {
@@ -280,7 +280,7 @@ impl<'a> Oracle<'a> {
                         set.remove(number);
                         out.push(number);
                     }
-                    // `from` alone serves, so there is no such set.
+                    // `from` alone serves the task, so there is no such set.
                     None => return Ok((from, false)),
                 },
             }
@@ -304,7 +304,7 @@ impl<'a> Oracle<'a> {
             .max_by_key(|tag| (uses(tag), core::cmp::Reverse(*tag)))
     }
 
-    /// Like `grow`, from below, for plans that survive a loss: with few tags their search is much faster.
+    /// Like `grow`, by adding candidates, for plans that survive a loss: with few tags their search is much faster.
     fn grow_up(&mut self, from: Tags) -> Result<(Tags, bool), PlanError> {
         let sure = self.ask(&from, Robustness::Survives)? == OracleAnswer::Not;
         let rest: Vec<usize> = self.reach.minus(&from).iter().collect();

@@ -1,9 +1,10 @@
-//! The last step of a cover: moves each chosen tag a little, to where the tasks that look at it have the most reserve.
+//! The last step of a cover: moves each chosen tag a little, to the place at which the tasks that look at it have the
+//! most reserve.
 
 use rayon::prelude::*;
 
+use super::clearance::Place;
 use super::oracle::Robustness;
-use super::room::Place;
 use super::value::value;
 use super::written::with_tags;
 use super::{ChosenTag, Cover, CoverError, CoverOptions, Polished, Stage, TaskCoverage};
@@ -13,19 +14,19 @@ use posegate::shape::{Pose3Deg, rotation};
 
 /// The shortest step that is tried, relative to the reach.
 const FINEST: f64 = 0.125;
-/// The factor between tried reserves: the true reserve may be larger by this factor.
+/// The ratio of consecutive reserves that are tried: the true reserve may be larger by this factor.
 const WORTH: f64 = 1.02;
 /// The largest reserve that is tried.
 const MOST: f64 = 4.0;
 
 /// Moves the chosen tags of a cover by up to `reach` metres along their own y and z axes (sideways and upwards on a
-/// wall). The tags are moved one after the other, in the order of their names, as long as that raises the tag's
+/// wall). The tags are moved one after the other, in the order of their names, if that raises the tag's
 /// [reserve](Polished::reserve). A tag on a wall stays on its face, including its white border, and off the wall's
-/// keep-outs. A free tag stays clear of walls and floor. No tag covers another. Then every task is planned again on the
-/// whole site. If a task lost its plan, the tags that it looked at are moved back.
+/// keep-outs. A free tag stays clear of walls and floor. No tag covers another. Then every task is planned again on
+/// the complete site. If a task has no plan any more, the tags that it looked at are moved back.
 ///
-/// `text` is the text of the site file that was covered. Returns `None` if candidates cannot be removed from it, as for
-/// [`written`](super::written()).
+/// `text` is the text of the site file that was covered. Returns `None` if candidates cannot be removed from it, as
+/// for [`written`](super::written()).
 ///
 /// # Errors
 /// [`CoverError`].
@@ -59,9 +60,9 @@ pub fn polished(
         }
         tick(Stage::Polish, Some(tags.len()));
     }
-    // Undo moves that remove a plan on the whole site.
+    // Reverts moves after which a task has no plan on the complete site.
     let mut found = loop {
-        let Some(found) = polish.told(&tags, tick)? else {
+        let Some(found) = polish.replanned(&tags, tick)? else {
             return Ok(None);
         };
         let lost = |task: &&TaskCoverage| {
@@ -124,8 +125,8 @@ impl Polish<'_> {
         })
     }
 
-    /// Returns the cover with the given tags, with every served task planned again on the whole site.
-    fn told(
+    /// Returns the cover with the given tags, with every served task planned again on the complete site.
+    fn replanned(
         &self,
         tags: &[ChosenTag],
         tick: &(dyn Fn(Stage, Option<usize>) + Sync),
@@ -165,7 +166,7 @@ impl Polish<'_> {
             .collect()
     }
 
-    /// Returns the tag at the place with the most reserve; `None` if it stays.
+    /// Returns the tag at the place with the most reserve; `None` if it is not moved.
     fn moved(&self, tags: &[ChosenTag], number: usize) -> Result<Option<ChosenTag>, PlanError> {
         let tag = &tags[number];
         let group = self.group(tag);
@@ -187,13 +188,13 @@ impl Polish<'_> {
             let ways = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
             let trials: Vec<([f64; 2], f64)> = ways
                 .into_par_iter()
-                .map(|way| {
-                    let to = [at[0] + step * way[0], at[1] + step * way[1]];
+                .map(|direction| {
+                    let to = [at[0] + step * direction[0], at[1] + step * direction[1]];
                     let beyond = to.iter().any(|by| by.abs() > self.reach * (1.0 + 1e-9));
                     let pose = along(first, to);
                     let chosen = |name: &str| tags.iter().any(|tag| tag.name == name);
-                    let hanging = self.cover.site.tags.iter();
-                    let hanging = hanging
+                    let mounted = self.cover.site.tags.iter();
+                    let mounted = mounted
                         .filter(|(name, _)| !chosen(name))
                         .map(|(_, tag)| tag);
                     let others = tags
@@ -201,7 +202,7 @@ impl Polish<'_> {
                         .enumerate()
                         .filter(|(other, _)| *other != number);
                     let others = others.map(|(_, tag)| &tag.tag);
-                    if beyond || !place.holds(pose, hanging.chain(others)) {
+                    if beyond || !place.holds(pose, mounted.chain(others)) {
                         return Ok((to, 0.0));
                     }
                     let mut tags = tags.to_vec();
@@ -209,7 +210,7 @@ impl Polish<'_> {
                     Ok((to, self.reserve(&tags, &group, best * WORTH)?))
                 })
                 .collect::<Result<_, PlanError>>()?;
-            // If several are equal, the first.
+            // The first, if several are equal.
             let better = trials
                 .into_iter()
                 .reduce(|a, b| if b.1 > a.1 { b } else { a });

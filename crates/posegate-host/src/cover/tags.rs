@@ -64,7 +64,7 @@ impl Tags {
 
     /// Returns the total cost, added up in the order of the numbers.
     pub fn cost(&self, costs: &[f64]) -> f64 {
-        // (`sum` of no floats would be -0.)
+        // (`sum` without floats would be -0.)
         self.iter().fold(0.0, |sum, number| sum + costs[number])
     }
 }

@@ -1,4 +1,4 @@
-//! Evaluates each chosen tag: the tasks that need it.
+//! Finds the tasks that need each chosen tag.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use super::{Cover, TaskCoverage};
 use crate::plan::{Library, Options, PlanError, TaskPlanner};
 
 impl TaskCoverage {
-    /// Returns `true` if its plan, or one of its contingencies, looks at a tag.
+    /// Returns `true` if the task's plan, or one of its contingencies, looks at a tag.
     pub(super) fn looks_at(&self, tag: &str) -> bool {
         let others = self.planned.contingencies.iter().map(|other| &other.plan);
         let plans = self.planned.plan.iter().chain(others);
@@ -16,8 +16,8 @@ impl TaskCoverage {
     }
 }
 
-/// Finds for each chosen tag the tasks that look at it, and which of them have no plan, or no surviving plan,
-/// without it.
+/// Finds for each chosen tag the tasks that look at it, and which of them have no plan, or no surviving plan, without
+/// it.
 pub(super) fn value(
     cover: &mut Cover,
     options: &Options,
@@ -35,7 +35,7 @@ pub(super) fn value(
         ..options.clone()
     };
     // A task does not need a tag that it does not look at.
-    let lacks = |task: &TaskCoverage| {
+    let effects_of = |task: &TaskCoverage| {
         let looked = tags.iter().copied().filter(|tag| task.looks_at(tag));
         let looked: Vec<&str> = looked.filter(|_| task.reason.is_none()).collect();
         if looked.is_empty() {
@@ -44,7 +44,7 @@ pub(super) fn value(
         let start = &site.chains[&task.from].start;
         let (from, all) = (Some(task.from.as_str()), f64::INFINITY);
         let endpoint = TaskPlanner::of(site, &library, start, &task.task, from, all)?;
-        let lack = |tag: &str| {
+        let effect_of = |tag: &str| {
             let has = |other: &str| other != tag;
             if endpoint.plan(has, &options(false))?.plan.is_none() {
                 return Ok(LossEffect::Plan);
@@ -58,11 +58,14 @@ pub(super) fn value(
                 },
             )
         };
-        let lack = |tag: &str| Ok((tag.to_owned(), task.task.clone(), lack(tag)?));
-        looked.into_iter().map(lack).collect::<Result<Vec<_>, _>>()
+        let effect = |tag: &str| Ok((tag.to_owned(), task.task.clone(), effect_of(tag)?));
+        looked
+            .into_iter()
+            .map(effect)
+            .collect::<Result<Vec<_>, _>>()
     };
-    let lacking = cover.tasks.par_iter().map(lacks);
-    let lacking: Vec<_> = lacking.collect::<Result<Vec<_>, PlanError>>()?;
+    let effects = cover.tasks.par_iter().map(effects_of);
+    let effects: Vec<_> = effects.collect::<Result<Vec<_>, PlanError>>()?;
     for tag in &mut cover.tags {
         for list in [
             &mut tag.looked_at_by,
@@ -72,11 +75,11 @@ pub(super) fn value(
             list.clear();
         }
     }
-    for (name, task, lack) in lacking.into_iter().flatten() {
+    for (name, task, effect) in effects.into_iter().flatten() {
         let own = cover.tags.iter_mut().find(|tag| tag.name == name);
         if let Some(tag) = own {
             tag.looked_at_by.push(task.clone());
-            match lack {
+            match effect {
                 LossEffect::Plan => tag.needed_by.push(task),
                 LossEffect::Second => tag.second_of.push(task),
                 LossEffect::Nothing => {}

@@ -4,16 +4,16 @@ use super::{ChosenTag, Cover};
 use crate::printable::toml_string;
 use crate::site::{Site, pose_line};
 
-/// Returns the text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its `[candidate.NAME]`
-/// and `[candidates.NAME]` tables. Everything else stays as written. Returns `None` if the file writes candidates in another form (one inline
-/// table, or dotted keys), so that they cannot be removed.
+/// Returns the text of a site file with a cover's chosen tags as `[tag.NAME]` tables and without its
+/// `[candidate.NAME]` and `[candidates.NAME]` tables. All other text is unchanged. Returns `None` if the file has
+/// candidates in another form (one inline table, or dotted keys), so that they cannot be removed.
 ///
-/// The returned text was parsed again: it is a valid site with the cover's tags, tasks and chains. Files that it names
-/// are searched next to `file_name`.
+/// The returned text was parsed again: it is a valid site with the cover's tags, tasks and chains. Files that it
+/// names are searched next to `file_name`.
 #[must_use]
 pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
     let out = with_tags(text, &cover.tags);
-    // Any parsing error of `with_tags` would show here.
+    // Any error of `with_tags` is detected here.
     let again = Site::parse(&out, file_name).ok()?;
     let same = Site {
         digest: cover.site.digest,
@@ -63,7 +63,7 @@ pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
 }
 
 /// Returns the name in a line that begins a table, without blanks around its dots. A line of a nested array may look
-/// like one.
+/// the same.
 fn head(line: &str) -> Option<String> {
     let inner = line.trim().strip_prefix('[')?;
     let (inner, rest) = inner.split_once(']')?;

@@ -1,4 +1,4 @@
-//! Collisions of things on the floor.
+//! Collisions of walls, blocks and robots on the floor.
 
 /// Overlaps up to this depth do not count, metres: tags are mounted on walls.
 const TOUCHING: f64 = 1e-6;
@@ -6,8 +6,8 @@ const TOUCHING: f64 = 1e-6;
 /// Returns `true` if the insides of two convex outlines intersect. Each outline may be a single
 /// point, or a line of two points.
 pub(super) fn meet(a: &[[f64; 2]], b: &[[f64; 2]]) -> bool {
-    // If they do not intersect, the normal of an edge separates them, or, for lines and points, the
-    // line's own direction.
+    // If they do not intersect, they are separated by the normal of an edge, or, for lines and points, by the line's
+    // own direction.
     let directions: Vec<[f64; 2]> = edges(a).chain(edges(b)).collect();
     let of_line = |points: &[[f64; 2]]| points.len() == 2;
     let along = edges(a)
@@ -43,7 +43,7 @@ mod tests {
     use super::meet;
 
     #[test]
-    fn outlines_meet_where_their_insides_do() {
+    fn outlines_meet_if_their_insides_intersect() {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         let moved = |x: f64, y: f64| square.map(|[a, b]| [a + x, b + y]);
         assert!(meet(&square, &moved(0.9, 0.9)) && meet(&square, &square));

@@ -1,4 +1,4 @@
-//! Whether the controller has the time for each task's table.
+//! Checks that the controller has enough time for a decision on each task's table.
 
 use super::Warning;
 use super::faults::warn;
@@ -6,13 +6,13 @@ use crate::site::{Core, Site};
 use posegate::bake::{self, BakeError, BakeInput};
 use posegate::table::Table;
 
-/// Returns a warning for each task whose table may take more cycles for a decision than the site's controller has; none if the
-/// site names no controller. Bakes each table, without the proof.
+/// Returns a warning for each task whose table may take more cycles for a decision than the site's controller has; no
+/// warning if the site has no controller. Bakes each table, without the proof.
 ///
-/// The proof may leave out pieces of a table, which makes it cheaper: the bound here is that of the whole table.
+/// The proof may omit pieces of a table, which makes decisions cheaper: the bound here is that of the complete table.
 ///
 /// # Errors
-/// The name of the first task whose table cannot be baked, and why.
+/// The name of the first task whose table cannot be baked, and the error.
 pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> {
     let Some(controller) = &site.controller else {
         return Ok(Vec::new());
@@ -36,7 +36,7 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
         };
         let bytes = match bytes {
             Ok(bytes) => bytes,
-            // `doctor` warns of it.
+            // Another warning of `doctor` reports this.
             Err(BakeError::Empty { .. }) => continue,
             Err(error) => return Err((name.clone(), error)),
         };

@@ -4,12 +4,12 @@ use crate::draw::ingredients::{frame, radians};
 use crate::draw::{MinSlack, SlackEvaluator};
 use crate::site::Task;
 
-/// The pose found deepest inside a set.
+/// The deepest pose that was found in a set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deepest {
     /// The pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// Its slack; below 0 if no pose of the set was found.
+    /// The pose's slack; below 0 if no pose of the set was found.
     pub least: MinSlack,
 }
 
@@ -17,8 +17,7 @@ pub struct Deepest {
 const LOOKS: u32 = 13;
 /// Number of lattice poses from which the search continues.
 const STARTS: usize = 32;
-/// The range if the site does not say anything about a task's table: metres about the goal, and a quarter
-/// turn.
+/// The range if the site does not give one for a task's table: metres about the goal, and a quarter turn.
 const FAR: f64 = 10.0;
 
 /// Searches the deepest pose within the range that the site file gives for the task's table: its extent,
@@ -26,7 +25,7 @@ const FAR: f64 = 10.0;
 #[must_use]
 pub fn deepest(task: &Task, depth: &SlackEvaluator) -> Deepest {
     let quarter = core::f64::consts::FRAC_PI_2;
-    let about = |way: f64, turn: f64| [[-way, way], [-way, way], [-turn, turn]];
+    let about = |reach: f64, turn: f64| [[-reach, reach], [-reach, reach], [-turn, turn]];
     let ranges = match (task.wish.extent, task.wish.expected) {
         (Some(extent), _) => [extent.x, extent.y, extent.yaw_deg.map(f64::to_radians)],
         (None, Some(expected)) => {

@@ -8,7 +8,7 @@ use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use crate::site::{ErrorBound, Site, SiteTag, Task, line_of, stated_views};
 use posegate::shape::{Exclusion, Pose3Deg, Shape, Tag, Visibility};
 
-/// A warning about something that is likely wrong.
+/// A warning about a likely mistake.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// The kind of warning: a word for scripts.
@@ -21,7 +21,7 @@ pub struct Warning {
     pub message: String,
     /// Advice on what to check.
     pub help: String,
-    /// `true` if the problem leaves a task's success set empty where the task searches it.
+    /// `true` if, because of this problem, the success set is empty in the range in which the task searches it.
     pub empties: bool,
 }
 
@@ -30,7 +30,7 @@ pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
 /// The usual range of tag sizes, metres.
 pub(super) const SIZES: [f64; 2] = [0.02, 2.0];
-/// The sine of 45 degrees: a direction that rises more looks up or down.
+/// The sine of 45 degrees: a direction with a larger elevation looks up or down.
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// A wall that begins higher is above the robot, metres.
 const FLOOR: f64 = 0.05;
@@ -54,7 +54,11 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     let tags = &findings.tags;
     for (index, tag) in tags.iter().enumerate() {
         all.extend(tags[index + 1..].iter().filter_map(|b| too_near(tag, b)));
-        all.extend(tags[index + 1..].iter().filter_map(|b| alike(site, tag, b)));
+        all.extend(
+            tags[index + 1..]
+                .iter()
+                .filter_map(|b| same_number(site, tag, b)),
+        );
     }
     for camera in &findings.cameras {
         of_camera(findings, camera, &mut all);
@@ -66,8 +70,8 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     all
 }
 
-/// Returns a warning for each task, and each look of the planner, whose stated error is smaller than what the tolerances of
-/// tag and camera make alone from some of its views.
+/// Returns a warning for each task, and each look of the planner, whose stated error is smaller than the error from
+/// the tolerances of tag and camera in some of its views.
 #[must_use]
 pub fn stated_errors(site: &Site) -> Vec<Warning> {
     let tasks = site.tasks.iter().filter_map(|(name, task)| {
@@ -83,14 +87,14 @@ pub fn stated_errors(site: &Site) -> Vec<Warning> {
     tasks.chain(looks).collect()
 }
 
-/// Returns a warning for the stated error of a task if it is smaller than what the tolerances of tag and camera make alone from some of
-/// the views of a shape.
+/// Returns a warning if the stated error of a task is smaller than the error from the tolerances of tag and camera in
+/// some of the views of a shape.
 #[must_use]
 pub fn stated_error(shape: &Shape, bound: ErrorBound, task: &str) -> Option<Warning> {
     bound_without_survey(shape, bound, ["task", task])
 }
 
-/// Returns a warning for a stated error that is smaller than what the tolerances of tag and camera make alone.
+/// Returns a warning if a stated error is smaller than the error from the tolerances of tag and camera.
 fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: [&str; 2]) -> Option<Warning> {
     let views = stated_views(shape);
     let beyond = |d: fn(&Visibility) -> f64| {
@@ -129,7 +133,7 @@ fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: [&str; 2]) -> O
     ))
 }
 
-/// Returns a warning about a kind of thing and its name.
+/// Returns a warning about an entry of the site, given by its kind and its name.
 pub(super) fn warn(code: &'static str, about: [&str; 2], message: String, help: &str) -> Warning {
     Warning {
         code,
@@ -173,11 +177,13 @@ fn of_tag(site: &Site, kind: &str, finding: &TagFinding, all: &mut Vec<Warning>)
     }
     let normal = axes(&tag.pose)[0];
     if normal[2].abs() > STEEP && !is_seen {
-        let way = if normal[2] > 0.0 { "up" } else { "down" };
+        let direction = if normal[2] > 0.0 { "up" } else { "down" };
         all.push(warn(
             "tag_faces_up_or_down",
             about,
-            format!("its face looks {way} ({rises:.1} deg), and no camera sees it from any goal"),
+            format!(
+                "its face looks {direction} ({rises:.1} deg), and no camera sees it from any goal"
+            ),
             "the tag's x axis comes out of its face: a tag on a wall has roll = pitch = 0",
         ));
     } else if !looks.is_empty() && faces_away(site, tag) {
@@ -210,7 +216,7 @@ fn of_tag(site: &Site, kind: &str, finding: &TagFinding, all: &mut Vec<Warning>)
     }
 }
 
-/// Returns a warning if a candidate is where a tag is mounted.
+/// Returns a warning if a candidate overlaps a mounted tag.
 fn occupied(site: &Site, about: [&str; 2], candidate: &SiteTag) -> Option<Warning> {
     let mut tags = site.tags.iter();
     let (name, _) = tags.find(|(_, tag)| overlap(tag, candidate))?;
@@ -223,8 +229,8 @@ fn occupied(site: &Site, about: [&str; 2], candidate: &SiteTag) -> Option<Warnin
 }
 
 impl Warning {
-    /// Returns the line of a site file's text, counted from 1, to which the warning points: the key of its subject, or
-    /// the table from which the subject was made.
+    /// Returns the line of a site file's text, counted from 1, to which the warning points: the key of its subject,
+    /// or the table that generates the subject.
     #[must_use]
     pub fn line(&self, text: &str) -> usize {
         let path: Vec<&str> = self.at.iter().map(String::as_str).collect();
@@ -247,8 +253,8 @@ fn faces_away(site: &Site, tag: &Tag) -> bool {
         let goal = radians(task.success.goal);
         site.cameras.values().all(|camera| {
             let [x, y, z] = Eye::of(&camera.mount, goal).centre;
-            let way = [x - tag.pose.x, y - tag.pose.y, z - tag.pose.z];
-            (0..3).map(|i| normal[i] * way[i]).sum::<f64>() <= 0.0
+            let offset = [x - tag.pose.x, y - tag.pose.y, z - tag.pose.z];
+            (0..3).map(|i| normal[i] * offset[i]).sum::<f64>() <= 0.0
         })
     })
 }
@@ -284,7 +290,7 @@ fn too_near(a: &TagFinding, b: &TagFinding) -> Option<Warning> {
 }
 
 /// Returns a warning if two tags have the same family and number.
-fn alike(site: &Site, a: &TagFinding, b: &TagFinding) -> Option<Warning> {
+fn same_number(site: &Site, a: &TagFinding, b: &TagFinding) -> Option<Warning> {
     let [family, other] = [a, b].map(|finding| site.tags.get(&finding.name).map(|tag| &tag.family));
     (a.tag.id == b.tag.id && family == other).then(|| {
         let warning = warn(
@@ -412,7 +418,7 @@ fn short_by(slack: f64) -> String {
     }
 }
 
-/// Warns of walls that hide a tag from everywhere, because its tolerance reaches into them.
+/// Warns of walls that hide a tag from all poses because its tolerance extends into them.
 fn hidden(shape: &Shape, task: &Task, about: [&str; 2], all: &mut Vec<Warning>) {
     match shape {
         Shape::Any(sets) | Shape::All(sets) => {

@@ -1,4 +1,4 @@
-//! Checks of a site: what its cameras see, and what is likely a wrong convention.
+//! Checks of a site: the views of its cameras, and likely mistakes.
 //!
 //! ```
 //! use posegate_host::doctor::examine;
@@ -49,9 +49,9 @@ pub struct Findings {
 /// The findings about a tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagFinding {
-    /// Its name.
+    /// The tag's name.
     pub name: String,
-    /// Its number, size and pose.
+    /// The tag's number, size and pose.
     pub tag: Tag,
     /// The heading of its face, degrees in (-180, 180], and its elevation.
     pub faces_deg: [f64; 2],
@@ -76,24 +76,24 @@ pub struct Look {
 /// The findings about a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraFinding {
-    /// Its name.
+    /// The camera's name.
     pub name: String,
-    /// Its pose on the robot.
+    /// The camera's pose on the robot.
     pub mount: Pose3Deg,
-    /// Its viewing direction on the robot: the heading, degrees in (-180, 180], and the elevation.
+    /// The camera's viewing direction on the robot: the heading, degrees in (-180, 180], and the elevation.
     pub looks_deg: [f64; 2],
-    /// The z components of its unit axes forward, left and up.
+    /// The z components of the camera's unit axes forward, left and up.
     pub rises: [f64; 3],
 }
 
 /// The findings about a task.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaskFinding {
-    /// Its name.
+    /// The task's name.
     pub name: String,
-    /// The least slack at its goal.
+    /// The least slack at the task's goal.
     pub at_goal: MinSlack,
-    /// The deepest pose found in its set.
+    /// The deepest pose found in the task's set.
     pub deepest: Deepest,
 }
 
@@ -122,7 +122,7 @@ pub fn examine(site: &Site) -> Findings {
         let depth = SlackEvaluator::of(&task.success);
         TaskFinding {
             name: name.clone(),
-            at_goal: told(&task.success),
+            at_goal: slack_at_goal(&task.success),
             deepest: deepest(task, &depth),
         }
     });
@@ -191,15 +191,15 @@ fn seen(site: &Site, task: &Task, view: Visibility) -> MinSlack {
             wall: wall.clone(),
         })
     }));
-    told(&SuccessSet {
+    slack_at_goal(&SuccessSet {
         goal: task.success.goal,
         shape: Shape::All(all),
     })
 }
 
-/// Returns the least slack of a set at a task's goal. The slack of a wall that hides nothing is ignored:
-/// the distance to its planes has no meaning.
-fn told(set: &SuccessSet) -> MinSlack {
+/// Returns the least slack of a set at a task's goal. The slack of a wall that hides no tag is ignored: the distance
+/// to its planes has no meaning.
+fn slack_at_goal(set: &SuccessSet) -> MinSlack {
     let slack = set.membership(radians(set.goal)).slack;
     let known = slack
         .iter()

@@ -1,4 +1,4 @@
-//! Warnings about how tags and candidates are mounted: on which walls, which way, and of which family.
+//! Warnings about the mounting of tags and candidates: walls, directions and families.
 
 use super::collisions::meet;
 use super::faults::{SIZES, Warning, warn};
@@ -7,11 +7,11 @@ use crate::draw::ingredients::{Eye, axes, radians};
 use crate::site::{FAMILIES, Site, SiteTag, question};
 use posegate::shape::{Family, Tag, Wall};
 
-/// A wall nearer than this before a tag's face cannot be seen past, metres.
+/// A wall closer than this in front of a tag's face hides the tag from all poses, metres.
 const NEAR: f64 = 0.05;
-/// A wall that carries the tag is no farther than this behind its middle, metres.
+/// The wall on which a tag is mounted is at most this far behind its centre, metres.
 const MOUNTED: f64 = 1e-3;
-/// Walls farther from a tag are not named as the one that hides it, metres.
+/// Walls farther from a tag than this are not named as hiding it, metres.
 const FAR: f64 = 3.0;
 
 /// Returns warnings of a tag or candidate. `about` is its kind and its name in the site file.
@@ -65,7 +65,8 @@ fn wall(site: &Site, about: [&str; 2], tag: &Tag) -> Option<Warning> {
     ))
 }
 
-/// Returns `true` if some camera at some goal is in front of a tag, and walls are between the tag and each of these.
+/// Returns `true` if at least one camera at a goal is in front of a tag, and walls are between the tag and all of
+/// these cameras.
 fn is_hidden(site: &Site, tag: &Tag) -> bool {
     let pose = tag.pose;
     let normal = axes(&pose)[0];
@@ -77,8 +78,8 @@ fn is_hidden(site: &Site, tag: &Tag) -> bool {
     });
     let mut is_before = false;
     let all = seers.all(|[x, y, z]| {
-        let way = [x - pose.x, y - pose.y, z - pose.z];
-        if (0..3).map(|i| normal[i] * way[i]).sum::<f64>() <= 0.0 {
+        let offset = [x - pose.x, y - pose.y, z - pose.z];
+        if (0..3).map(|i| normal[i] * offset[i]).sum::<f64>() <= 0.0 {
             return true;
         }
         is_before = true;
@@ -94,7 +95,7 @@ fn is_hidden(site: &Site, tag: &Tag) -> bool {
 }
 
 fn kept_out(site: &Site, about: [&str; 2], tag: &SiteTag) -> Option<Warning> {
-    // A tag in millimetres fits on no wall; that is another warning.
+    // A tag in millimetres fits on no wall, which another warning reports.
     if tag.tag.size > SIZES[1] {
         return None;
     }

@@ -41,7 +41,7 @@ fn sound_sites_have_no_warnings() {
 }
 
 #[test]
-fn a_tag_turned_by_half_a_turn_is_seen() {
+fn tag_turned_by_half_a_turn_causes_a_warning() {
     let yaw = ("yaw_deg = 180.0 }", "yaw_deg = 0.0 }");
     let findings = changed(DOCK, &[yaw]);
     assert_eq!(codes(&findings), ["tag_faces_away", "set_empty"]);
@@ -54,7 +54,7 @@ fn a_tag_turned_by_half_a_turn_is_seen() {
     );
     assert!(empty.empties && empty.about == "task see-t7");
     assert!(empty.message.contains("`psi`"), "{}", empty.message);
-    // Also without any table in the site: the part of the set behind the tag is not in the range of the search.
+    // The same without any table in the site: the part of the set behind the tag is not in the range of the search.
     let nowhere = [
         yaw,
         (
@@ -68,9 +68,9 @@ fn a_tag_turned_by_half_a_turn_is_seen() {
     );
 }
 
-/// Each warning occurs, and no others except its consequences.
+/// Each warning occurs, without others except its consequences.
 #[test]
-fn every_warning_is_provoked() {
+fn each_fault_causes_its_warning() {
     let seen = "x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0";
     let mount = "z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0";
     let second = "[task.dock]\n";
@@ -168,7 +168,7 @@ fn every_warning_is_provoked() {
 
 /// Tags mounted back to back, and a tag on the face of a block, cause no warning of a fault.
 #[test]
-fn what_is_sound_is_not_warned_of() {
+fn valid_mounting_causes_no_warning() {
     let back = "[tag.t8]\nid = 8\nfamily = \"tag36h11\"\nsize = 0.30\npose = { x = 4.01, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n[task.dock]\n";
     let findings = changed(DOCK, &[("[task.dock]\n", back)]);
     assert_eq!(codes(&findings), ["tag_faces_away"]);
@@ -177,9 +177,9 @@ fn what_is_sound_is_not_warned_of() {
     assert_eq!(codes(&changed(DOCK, &[("[task.dock]\n", block)])), [""; 0]);
 }
 
-/// A tag that is surveyed onto a wall with a tolerance may be behind the wall: the set is empty.
+/// A tag that is mounted on a wall with a tolerance may be behind the wall: the set is empty.
 #[test]
-fn a_tolerance_that_reaches_into_a_wall_is_told() {
+fn tolerance_into_a_wall_causes_a_warning() {
     let walls = (", walls = [\"rack\"]", "");
     let findings = changed(BAY, &[walls]);
     assert_eq!(
@@ -189,9 +189,9 @@ fn a_tolerance_that_reaches_into_a_wall_is_told() {
     assert!(findings.warnings[2].message.contains("never fulfilled"));
 }
 
-/// A stated error is the whole error: a warning is given if the tolerances alone exceed it.
+/// A stated error includes the survey's error: a warning is given if the tolerances alone exceed it.
 #[test]
-fn a_stated_error_below_what_the_tolerances_make_is_told() {
+fn stated_error_below_that_of_the_tolerances_causes_a_warning() {
     let stated = "error_bound = { translation = 0.08";
     let smaller = "error_bound = { translation = 0.05";
     let findings = changed(BAY, &[(stated, smaller)]);
@@ -211,7 +211,7 @@ fn a_stated_error_below_what_the_tolerances_make_is_told() {
         "yaw_deg = 2.0 }       # with",
         "yaw_deg = 0.6 }       # with",
     );
-    // From no place the error is smaller than the tolerances of yaw.
+    // The error from the tolerances of yaw exceeds it at every place.
     assert_eq!(codes(&changed(BAY, &[yaw])), [IMPOSSIBLE_ERROR]);
     let survey = ("tolerance = { translation = 0.01, yaw_deg = 0.5 }", "");
     let mount = (
@@ -222,7 +222,7 @@ fn a_stated_error_below_what_the_tolerances_make_is_told() {
 }
 
 #[test]
-fn a_goal_outside_of_its_set_is_told() {
+fn goal_outside_of_its_set_causes_a_warning() {
     let success = "yaw_deg = 0.0 }\nsuccess = { shape = \"visibility\"";
     let turned = "yaw_deg = 35.0 }\nsuccess = { shape = \"visibility\"";
     let findings = changed(
@@ -236,7 +236,7 @@ fn a_goal_outside_of_its_set_is_told() {
     assert!(!findings.warnings[0].empties);
 }
 
-/// A set much smaller than its table's extent is found, even if its goal is not in it.
+/// A set much smaller than its table's extent is found, even if its goal is not in the set.
 #[test]
 fn small_sets_are_found() {
     let small = "x = [0.7, 0.72], y = [-0.61, -0.6], yaw_deg = [3.0, 3.2]";
@@ -256,7 +256,7 @@ fn small_sets_are_found() {
     assert_eq!(codes(&findings), ["goal_outside"]);
 }
 
-/// A hall with a thin wall in the north and a rack in the south, and a candidate or tag in it.
+/// A hall with a thin wall in the north and a rack in the south, and a candidate or tag.
 fn hall(tag: &str) -> String {
     let walls = "[wall.north]\nfrom = [0.0, 2.0]\nto = [6.0, 2.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [4.0, 5.0], z = [0.0, 2.1] }]\n[wall.rack]\ncorners = [[0.0, -3.0], [6.0, -3.0], [6.0, -2.0], [0.0, -2.0]]\nz = [0.0, 2.5]\n";
     let dock = "[task.other]\nkind = \"work\"\ngoal = { x = 3.0, y = 1.0, yaw_deg = 90.0 }\nsuccess = { shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }\n[task.third]\nkind = \"work\"\ngoal = { x = 3.0, y = -1.0, yaw_deg = -90.0 }\nsuccess = { shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }\n";
@@ -274,7 +274,7 @@ fn candidates_are_examined_as_tags() {
     let cases: [(String, &[&str]); 10] = [
         (one(3.0, 2.0, -90.0), &[]),
         (one(3.0, -2.0, 90.0), &[]),
-        // In front of the rack, but its face looks into it; within it; and behind the wall.
+        // In front of the rack with its face towards it; within the rack; and behind the wall.
         (one(3.0, -2.0, -90.0), &["tag_faces_away", "tag_faces_wall"]),
         (one(3.0, 1.99, 90.0), &["tag_faces_away", "tag_faces_wall"]),
         (one(3.0, -2.5, 90.0), &["tag_in_block"]),

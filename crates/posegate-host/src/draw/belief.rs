@@ -21,7 +21,7 @@ const RINGS: u32 = 4;
 const DIRECTIONS: u32 = 480;
 
 impl PoseSetF64 {
-    /// Returns the pose-set as the gate takes it.
+    /// Returns the pose-set in the gate's form.
     ///
     /// # Errors
     /// [`InputError`] if it is not a valid pose-set.
@@ -39,7 +39,7 @@ impl PoseSetF64 {
         }
     }
 
-    /// Returns its extents along x, y and yaw: m, m, rad.
+    /// Returns the set's extents along x, y and yaw: m, m, rad.
     #[must_use]
     pub fn extents(&self) -> [f64; 3] {
         match self.spread {
@@ -70,7 +70,7 @@ impl PoseSetF64 {
             [libm::cos(angle), libm::sin(angle)]
         });
         match self.spread {
-            // The tolerance keeps a heading that is written as the end of the arc.
+            // The tolerance includes a heading that is written as the end of the arc.
             Uncertainty::Bounded {
                 translation_m: r,
                 yaw_rad,
@@ -108,7 +108,7 @@ impl PoseSetF64 {
         poses
     }
 
-    /// Returns poses on its border.
+    /// Returns poses on the set's border.
     #[must_use]
     pub fn border(&self) -> Vec<[f64; 3]> {
         let [x, y, yaw] = self.estimate;
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// Returns `e' P^-1 e` by Cramer's rule: another method than the drawing's.
+    /// Returns `e' P^-1 e` by Cramer's rule: a method that the drawing does not use.
     fn squared(e: [f64; 3], p: [[f64; 3]; 3]) -> f64 {
         let det = |m: [[f64; 3]; 3]| {
             m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bounded_set_is_a_cylinder() {
+    fn bounded_set_is_a_cylinder() {
         let belief = PoseSetF64 {
             estimate: [1.0, 2.0, 0.0],
             spread: Uncertainty::Bounded {

@@ -11,12 +11,12 @@ const LEFT: f64 = 66.0;
 const TOP: f64 = 84.0;
 /// The largest panel, pixels.
 const LARGEST: [f64; 2] = [190.0, 190.0];
-/// Space between panels, pixels: beside each other and below each other.
+/// Space between panels, pixels: horizontal and vertical.
 const GAP: [f64; 2] = [40.0, 62.0];
-/// Panels in a row: with three, a page of A4 shows them at their own size.
+/// Panels in a row: with three, A4 paper shows them at their own size.
 const COLUMNS: usize = 3;
 
-/// Draws the borders at up to five headings, about evenly spaced and the goal's among them. `sections` has headings
+/// Draws the borders at up to five headings, about evenly spaced, including the goal's. `sections` has headings
 /// relative to the goal's in degrees, with closed polygons in metres of the goal frame.
 #[must_use]
 pub fn borders_picture(
@@ -30,7 +30,7 @@ pub fn borders_picture(
     let mut at: Vec<usize> = (0..most)
         .map(|k| k * last / most.saturating_sub(1).max(1))
         .collect();
-    // The goal's own heading is always one of them.
+    // Always includes the goal's own heading.
     let goal = sections.iter().position(|(yaw_deg, _)| *yaw_deg == 0.0);
     if let Some(goal) = goal
         && let Some(near) = at.iter_mut().min_by_key(|k| k.abs_diff(goal))

@@ -21,14 +21,14 @@ const TOP: f64 = 84.0;
 const ACROSS: f64 = EDGE + 50.0;
 const DOWN: f64 = EDGE + 96.0;
 
-/// Every pose with which a step must be able to begin: the estimate's spread plus its error.
+/// Every pose from which a step must be possible: the estimate's spread plus its error.
 const NEEDED: Style = Style::outlined("#444444", 1.2).dashed("2 3");
 
 /// The largest panel of the hall, pixels.
 const HALL: [f64; 2] = [600.0, 420.0];
 
-/// Draws a chain; `success` returns the success set of a task by its name. With a site, its hall comes first, with the route and
-/// where the robot looks.
+/// Draws a chain; `success` returns the success set of a task by its name. With a site, its hall comes first, with
+/// the route and the poses at which the robot looks.
 #[must_use]
 pub fn chain_picture<'s>(
     name: &str,
@@ -40,7 +40,7 @@ pub fn chain_picture<'s>(
     let rows = report.steps.len().div_ceil(COLUMNS).max(1);
     let width = LEFT + columns as f64 * ACROSS + 10.0;
     let title = format!("Chain {}", literal(name));
-    // The hall decides how far down the steps begin: draw it once for its size.
+    // The height of the hall determines where the steps begin: draw it once for its size.
     let with_hall = |picture: &mut Picture| {
         let site = site?;
         let panel = hall(
@@ -110,9 +110,9 @@ fn panel(
         let [rho, alpha] = belief.enclosing();
         [rho + belief.spread[0], alpha + belief.spread[1]]
     };
-    let way = libm::hypot(to.pose[0] - from.pose[0], to.pose[1] - from.pose[1]);
+    let length = libm::hypot(to.pose[0] - from.pose[0], to.pose[1] - from.pose[1]);
     let half = if drive {
-        0.5 * way + whole(from)[0].max(whole(to)[0]) + 0.1
+        0.5 * length + whole(from)[0].max(whole(to)[0]) + 0.1
     } else {
         2.2 * whole(shown)[0] + 0.05
     };
@@ -139,7 +139,7 @@ fn panel(
     let what = match (&step.task, step.kind) {
         (Some(task), StepKind::Localization) => format!("{}. look: {}", index + 1, literal(task)),
         (Some(task), _) => format!("{}. work: {}", index + 1, literal(task)),
-        (None, _) => format!("{}. navigate, {way:.2} m", index + 1),
+        (None, _) => format!("{}. navigate, {length:.2} m", index + 1),
     };
     let heading = shown.pose[2];
     panel.draw(picture, &what, tick_at_scale(scale, 60.0), |inside| {

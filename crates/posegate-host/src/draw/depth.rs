@@ -1,4 +1,4 @@
-//! The least slack of a success set at many poses. What does not depend on the pose is computed once.
+//! The least slack of a success set at many poses. Values that do not depend on the pose are computed once.
 
 use posegate::shape::{Line, Planar, PoseDeg, Resolved, Shape, SuccessSet, is_seen, seen};
 
@@ -15,7 +15,7 @@ enum Node {
     Plain(Box<SuccessSet>),
     /// A view.
     View(Box<Resolved<f64>>),
-    /// The outside of something: the pose must be on the outer side of at least one line.
+    /// The outside of a convex set: the pose must be on the outer side of at least one line.
     Sides(&'static str, Vec<Line<f64>>),
     Any(Vec<Self>),
     All(Vec<Self>),
@@ -130,13 +130,13 @@ impl Node {
     }
 }
 
-/// The slack of no alternative at all.
+/// The slack of an empty union.
 const NOTHING: MinSlack = MinSlack {
     slack: f64::NEG_INFINITY,
     name: "any",
 };
 
-/// The slack of no constraint at all.
+/// The slack of an empty list of constraints.
 const ALL_HOLD: MinSlack = MinSlack {
     slack: f64::INFINITY,
     name: "all",
@@ -159,7 +159,7 @@ mod tests {
 
     /// At random poses of every task of some sites, the numbers equal those of membership.
     #[test]
-    fn the_depth_is_the_least_slack_of_membership() {
+    fn slack_equals_the_least_slack_of_membership() {
         let bay = include_str!("../../../../examples/sites/loading-bay.toml");
         let lens = include_str!("../../../../examples/sites/lens.toml");
         let mut random = crate::draw::tests::Random(7);

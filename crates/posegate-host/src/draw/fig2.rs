@@ -15,7 +15,7 @@ use posegate::shape::SuccessSet;
 const EDGE: f64 = 230.0;
 const LEFT: f64 = 66.0;
 const TOP: f64 = 104.0;
-/// From a panel to that after its task, and to that before the next task.
+/// Distances from a panel to the one after its task, and to the one before the next task.
 const PITCH: [f64; 2] = [EDGE + 118.0, EDGE + 64.0];
 
 /// Draws the pose-sets before and after the look and the work, with each task's success set: each task begins with the estimate at

@@ -1,4 +1,4 @@
-//! Fig. 4 of the paper: the tag at a bad place, and at its best ones.
+//! Fig. 4 of the paper: the tag at a bad place, and at the best places.
 
 use super::placement::{Column, placement_picture};
 use super::study::{CaseStudy, SEE, StudyError};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// Standard deviation of x and y, metres; the heading's is one degree.
 pub const SIGMA: f64 = 0.3;
 
-/// The tag before the search: far from the robot, oblique, and such that the goal is near the border of S_l.
+/// The tag before the search: far from the robot, oblique, and placed so that the goal is near the border of S_l.
 const START: Pose3Deg = Pose3Deg {
     x: 5.1,
     y: 2.1,
@@ -30,17 +30,18 @@ const FREE: [Option<[f64; 2]>; 4] = [
     Some([0.0, 360.0]),
 ];
 
-/// Number of places evaluated by the search for an exactly known pose: each evaluation is quick.
+/// Number of places evaluated by the search for an exactly known pose, whose evaluations are fast.
 const EVALUATIONS_EXACT: u64 = 2_000;
 
 /// Number of places evaluated by a search for an uncertain pose.
 const EVALUATIONS: u64 = 300;
 
-/// Returns the tag at the start, at its best place for an exactly known pose, and at its best places for an uncertain pose: the least
-/// E[c], and the least E[c] where the whole pose-set sees the tag. `progress` is called after each search.
+/// Returns the tag at the start, at its best place for an exactly known pose, and at two best places for an uncertain
+/// pose. These have the least E\[c\], and the least E\[c\] if the complete pose-set must see the tag. `progress` is
+/// called after each search.
 ///
 /// # Errors
-/// [`StudyError`] if the study lacks the task, or its tag a best place.
+/// [`StudyError`] if the study does not have the task, or its tag no best place.
 pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Column>, StudyError> {
     let set = site.task(SEE)?.success.clone();
     let shape = || StudyError::Shape(SEE.into());
@@ -49,7 +50,7 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
         set,
         tag,
         wall: None,
-        // The figure is about the planned place.
+        // The figure shows the planned place.
         reserve: Tolerance::NONE,
     };
     let cost = Cost::default();
@@ -114,11 +115,9 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
             found.map_err(failed)?.best,
         ))
     };
-    let (start, found): (_, Result<Vec<_>, StudyError>) = rayon::join(
-        start,
-        || // One after the other is not fast enough: each is a task of its own.
-            cases.into_par_iter().with_max_len(1).map(best).collect(),
-    );
+    let (start, found): (_, Result<Vec<_>, StudyError>) =
+        rayon::join(start, || // In sequence the searches are too slow.
+            cases.into_par_iter().with_max_len(1).map(best).collect());
     let mut columns = std::vec![start?];
     columns.extend(found?);
     Ok(columns)

@@ -60,7 +60,7 @@ impl Inside<'_> {
         }
     }
 
-    /// Draws a name some pixels from a point of the floor, moved so that all of it is in the panel.
+    /// Draws a name some pixels from a point of the floor, moved into the panel.
     pub fn name(&mut self, at: [f64; 2], [dx, dy]: [f64; 2], text: &str) {
         self.in_pixels(|picture, panel| {
             let width = 6.4 * text.chars().count() as f64;
@@ -103,19 +103,19 @@ fn kept_out(wall: &Wall) -> Vec<[[f64; 2]; 2]> {
 /// Names on a floor plan that do not overlap.
 #[derive(Debug, Default)]
 pub struct Labels {
-    /// Left, top, right, bottom in the picture, pixels, and how bad it is to cover them.
+    /// Left, top, right, bottom in the picture, pixels, and the penalty for covering this box.
     boxes: Vec<([f64; 4], u32)>,
-    /// Lines from names to what they name, pixels.
+    /// Lines from names to the named points, pixels.
     leaders: Vec<[[f64; 2]; 2]>,
 }
 
-/// Returns the line from a point to the nearest edge of a name's box, if the name is too far away to do without.
+/// Returns the line from a point to the nearest edge of a name's box; `None` if the name is near the point.
 fn leader(at: [f64; 2], [left, top, right, bottom]: [f64; 4]) -> Option<[[f64; 2]; 2]> {
     let near = [at[0].clamp(left, right), at[1].clamp(top, bottom)];
     (libm::hypot(near[0] - at[0], near[1] - at[1]) > 16.0).then_some([at, near])
 }
 
-/// Returns `true` if a line crosses a box: every second pixel of the line is compared.
+/// Returns `true` if a line crosses a box: tests every second pixel of the line.
 fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: [f64; 4]) -> bool {
     let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
     let count = libm::ceil(0.5 * length).clamp(1.0, 1000.0) as u32;
@@ -128,11 +128,11 @@ fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: [f64; 4]) -> b
 
 impl Labels {
     const SIZE: f64 = 11.0;
-    /// How bad it is to cover a name, and a part of the drawing.
+    /// Penalties for covering a name, and a part of the drawing.
     const NAME: u32 = 1000;
     const DRAWN: u32 = 1;
 
-    /// Keeps names off the pixels about a point of the floor.
+    /// Reserves the pixels about a point of the floor, so that names avoid them.
     pub fn avoid(&mut self, inside: &mut Inside<'_>, at: [f64; 2], reach: f64) {
         inside.in_pixels(|_, panel| {
             let [x, y] = panel.at(at);
@@ -141,8 +141,8 @@ impl Labels {
         });
     }
 
-    /// Draws a name near a point of the floor, at the first of several places where it overlaps no other name; at the first one
-    /// if there is no such place.
+    /// Draws a name near a point of the floor, at the first of several places where it overlaps no other name, or at
+    /// the first place if there is no such place.
     pub fn place(&mut self, inside: &mut Inside<'_>, at: [f64; 2], text: &str) {
         inside.in_pixels(|picture, panel| {
             let text = fitted(text, Self::SIZE, true, panel.width() - 8.0);
@@ -183,7 +183,8 @@ impl Labels {
                 met.map(|(_, bad)| *bad).sum::<u32>() + Self::NAME * under.count() as u32
             };
             let all = offsets.into_iter().map(|[dx, dy]| place(dx, dy));
-            // The first of those that cover the least; no name covers another one where there is another place.
+            // The first place with the least penalty. A name covers another name only at a point without a better
+            // place.
             let chosen = all.min_by_key(overlaps);
             let Some([left, top, right, bottom]) = chosen else {
                 return;
@@ -248,9 +249,10 @@ mod tests {
         assert_eq!(kept_out(&line), [[[7.5, 3.0], [10.5, 3.0]]]);
     }
 
-    /// A row of docks below a wall of tags, with drawn parts everywhere about them: names cover those rather than each other.
+    /// A row of docks below a wall of tags, with drawn parts everywhere around them: a name covers these parts before
+    /// it covers another name.
     #[test]
-    fn names_do_not_cover_each_other() {
+    fn names_do_not_overlap() {
         let panel = Panel {
             window: Window {
                 x: [0.0, 24.0],
@@ -291,7 +293,7 @@ mod tests {
                 );
             }
         }
-        // No line to a name runs through another one.
+        // No leader crosses another name.
         assert!(!labels.leaders.is_empty());
         for line in &labels.leaders {
             assert!(!names.iter().any(|name| crosses(*line, **name)), "{line:?}");

@@ -1,4 +1,5 @@
-//! The hall from above: walls, tags, the goals of its tasks, the routes of robots, and where they look at which tag.
+//! The hall from above: walls, tags, the goals of its tasks, the routes of robots, and the places of the looks at
+//! tags.
 
 use super::floor::Labels;
 use super::ingredients::{Eye, Ingredients, radians};
@@ -40,7 +41,7 @@ fn looks<'r>(routes: &[&'r ChainReport]) -> Vec<&'r StepReport> {
         .collect()
 }
 
-/// Returns the corners of all that is drawn, in the world.
+/// Returns the corners of all drawn parts, in the world.
 fn points(site: &Site, routes: &[&ChainReport]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     points.extend(site.tags.values().map(|t| [t.tag.pose.x, t.tag.pose.y]));
@@ -176,7 +177,7 @@ pub(super) fn hall(
             }
         }
         for wall in &site.walls {
-            // At a corner of the hall, a name would be beside two walls.
+            // At a corner of the hall, a name would be next to two walls.
             if let Some(at) = inside.middle(&wall.corners) {
                 labels.place(inside, at, &literal(&wall.name));
             }
@@ -185,7 +186,8 @@ pub(super) fn hall(
     panel
 }
 
-/// Draws the legend of a hall in two columns, for what is drawn; the point is the upper left corner. Returns its height, pixels.
+/// Draws the legend of a hall in two columns, with an entry for each kind of drawn part; the point is the upper left
+/// corner. Returns its height, pixels.
 pub(super) fn hall_legend(
     picture: &mut Picture,
     site: &Site,

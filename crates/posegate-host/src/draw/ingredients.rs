@@ -96,9 +96,9 @@ impl Eye {
     /// Converts a point of the world to the camera's frame: forward, left, up.
     #[must_use]
     pub fn sees(&self, point: [f64; 3]) -> [f64; 3] {
-        let way = [0, 1, 2].map(|i| point[i] - self.centre[i]);
+        let offset = [0, 1, 2].map(|i| point[i] - self.centre[i]);
         self.axes
-            .map(|axis| axis[0] * way[0] + axis[1] * way[1] + axis[2] * way[2])
+            .map(|axis| axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2])
     }
 }
 
@@ -112,8 +112,7 @@ pub fn corners(tag: &posegate::shape::Tag) -> [[f64; 3]; 4] {
         .map(|(y, z)| [0, 1, 2].map(|i| pose[i] + y * across[i] + z * up[i]))
 }
 
-/// Returns a direction's heading and elevation, degrees, rounded to the millionth, so that 180 in the site
-/// file is 180 here.
+/// Returns a direction's heading and elevation, degrees, rounded to 1e-6, so that 180 in the site file is 180 here.
 #[must_use]
 pub fn heading([x, y, z]: [f64; 3]) -> [f64; 2] {
     let heading = libm::atan2(y, x).to_degrees();

@@ -1,4 +1,4 @@
-//! Legends, and lines that state if a pose-set is inside.
+//! Legends, and lines with the result of a containment test.
 
 use super::palette;
 use super::panel::hatching;
@@ -18,7 +18,7 @@ pub enum Sample {
     Hatched(Style),
     /// A success set of the paper's figures.
     SuccessSet,
-    /// Nothing: the text continues the line above.
+    /// No sample: the text continues the line above.
     Words,
 }
 
@@ -69,11 +69,11 @@ pub fn words(answer: &Answer, set_name: &str) -> String {
     )
 }
 
-/// Draws the heading of a row of panels, its baseline at `top`, with the row's answers next to it.
-pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, beside: &[(&Answer, &str)]) {
+/// Draws the heading of a row of panels, its baseline at `top`, followed by the row's answers.
+pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, answers: &[(&Answer, &str)]) {
     let font = Font::new(15.0, palette::INK).bold();
     picture.text([24.0, top], heading, &font);
-    for (index, (answer, set_name)) in beside.iter().enumerate() {
+    for (index, (answer, set_name)) in answers.iter().enumerate() {
         let font = Font::new(13.0, palette::of_words(answer.holds())).bold();
         let at = [560.0 + 310.0 * index as f64, top];
         picture.text(at, &words(answer, set_name), &font);

@@ -2,11 +2,11 @@
 
 use super::svg::number;
 
-/// Stands for an underscore that does not begin a subscript.
+/// Replaces an underscore that does not begin a subscript.
 pub(super) const UNDERSCORE: char = '\u{1}';
 
-/// Returns a name for literal use in texts and titles: its underscores do not begin subscripts. Control
-/// characters, which XML does not have, are replaced by U+FFFD.
+/// Returns a name for literal use in texts and titles: its underscores do not begin subscripts. Control characters,
+/// which XML does not allow, are replaced by U+FFFD.
 #[must_use]
 pub fn literal(name: &str) -> String {
     name.chars()
@@ -25,9 +25,9 @@ pub(super) fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Returns text with the letter after each underscore as a subscript. Shifts are given as `dy`, which
-/// every reader of SVG supports; the text after it is shifted back. (The picture preserves space: some
-/// readers drop it where an element begins.)
+/// Returns text with the letter after each underscore as a subscript. Shifts are given as `dy`, which every SVG
+/// reader supports; the text after the subscript is shifted back. (The picture preserves space: some readers drop it
+/// where an element begins.)
 pub(super) fn lowered(text: &str, size: f64) -> String {
     let mut parts = text.split('_');
     let mut out = escaped(parts.next().unwrap_or_default());

@@ -26,7 +26,7 @@ const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
 /// Draws Fig. 3: sections of S_l and S_w with the pose-sets before and after the localization.
 ///
 /// # Errors
-/// [`StudyError`] if the study lacks one of the tasks.
+/// [`StudyError`] if one of the tasks is missing from the study.
 pub fn fig3_sections(study: &CaseStudy) -> Result<String, StudyError> {
     let title = "Fig. 3: which containments hold: pose-sets in S_l and in S_w";
     let mut picture = Picture::new(WIDTH, HEIGHT, title);

@@ -1,7 +1,7 @@
-//! Upper bounds of the widths of texts, so that nothing overlaps whatever font a reader's `sans-serif` is.
+//! Upper bounds of the widths of texts, so that texts do not overlap in any `sans-serif` font.
 
-/// Returns a bound on the width of a text, in units of the font size. The bound holds for DejaVu Sans, one of the widest fonts
-/// that systems use as `sans-serif`.
+/// Returns an upper bound on the width of a letter, in units of the font size. The bound is valid for DejaVu Sans,
+/// one of the widest fonts that systems use as `sans-serif`.
 fn ems(letter: char) -> f64 {
     match letter {
         'i' | 'j' | 'l' | '\'' | '|' | '.' | ',' | ':' | ';' | 'I' | ' ' => 0.34,
@@ -15,7 +15,7 @@ fn ems(letter: char) -> f64 {
     }
 }
 
-/// The widest bold letter in units of the same letter that is not bold.
+/// The largest ratio of the widths of a bold letter and the same regular letter.
 const BOLD: f64 = 1.13;
 
 /// Returns an upper bound on the width of a text, pixels.

@@ -1,4 +1,4 @@
-//! One of several small panels: a success set and pose-sets about the goal, at one heading.
+//! One of several small panels: a success set, and pose-sets about the goal, at one heading.
 
 use super::palette;
 use super::panel::{Inside, Panel, signed};

@@ -23,7 +23,7 @@ pub const PIECE: Style = Style::filled("#a9d7f2").with_outline("#4a86a8", 0.8);
 pub const BORDER: Style = Style::outlined("#0072b2", 1.6);
 /// A pose-set that is inside.
 pub const INSIDE: Style = Style::outlined("#009e73", 2.0).with_fill_opacity("#009e73", 0.28);
-/// A pose-set that is not inside: dashed, to be distinguished without colour.
+/// A pose-set that is not inside: dashed, so that it is recognizable without colour.
 pub const NOT_INSIDE: Style = Style::outlined("#d55e00", 2.0)
     .with_fill_opacity("#d55e00", 0.12)
     .dashed("6 3");

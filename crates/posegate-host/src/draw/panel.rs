@@ -168,7 +168,7 @@ impl Inside<'_> {
         self.polygons(polygons, &palette::PAPER_BORDER);
     }
 
-    /// Draws a convex polygon with a hatched inside.
+    /// Draws a convex polygon with hatching inside.
     pub fn hatched(&mut self, polygon: &[[f64; 2]], style: &Style) {
         let points: Vec<_> = polygon.iter().map(|p| self.panel.at(*p)).collect();
         let panel = &self.panel;
@@ -182,14 +182,14 @@ impl Inside<'_> {
         self.polygons(&[polygon.to_vec()], style);
     }
 
-    /// Returns `true` if a point of the floor is in the panel, or at most `room` metres outside.
+    /// Returns `true` if a point of the floor is in the panel or at most `margin` metres outside.
     #[must_use]
-    pub fn shows(&self, [x, y]: [f64; 2], room: f64) -> bool {
+    pub fn shows(&self, [x, y]: [f64; 2], margin: f64) -> bool {
         let Window {
             x: [left, right],
             y: [low, high],
         } = self.panel.window;
-        (left - room..=right + room).contains(&x) && (low - room..=high + room).contains(&y)
+        (left - margin..=right + margin).contains(&x) && (low - margin..=high + margin).contains(&y)
     }
 
     /// Returns the middle of the corners of the visible part of a convex polygon or line; `None` if nothing of it is
@@ -257,7 +257,7 @@ pub(super) fn hatching(polygon: &[[f64; 2]]) -> String {
                 crossed.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
             }
         }
-        // Along a line the inside begins and ends in turn.
+        // Along a line, points of entry and exit alternate.
         if crossed.len() > 2 {
             crossed.sort_by(|a, b| a[0].total_cmp(&b[0]));
         }
@@ -277,11 +277,11 @@ fn clipped(polygon: &[[f64; 2]], x: [f64; 2], y: [f64; 2]) -> Vec<[f64; 2]> {
         (1, 1.0, y[0]),
         (1, -1.0, y[1]),
     ] {
-        let room = |p: &[f64; 2]| sign * (p[axis] - end);
+        let margin = |p: &[f64; 2]| sign * (p[axis] - end);
         let ends = left.iter().cycle().skip(1);
         let mut cut = Vec::new();
         for (a, b) in left.iter().zip(ends) {
-            let (ra, rb) = (room(a), room(b));
+            let (ra, rb) = (margin(a), margin(b));
             if ra >= 0.0 {
                 cut.push(*a);
             }
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_is_hatched_where_it_is_shown() {
+    fn only_the_visible_part_of_a_wall_is_hatched() {
         let wall = [[-900.0, 10.0], [900.0, 10.0], [900.0, 30.0], [-900.0, 30.0]];
         let shown = clipped(&wall, [0.0, 100.0], [0.0, 100.0]);
         let mut corners = shown.clone();

@@ -15,7 +15,7 @@ const HEIGHT: f64 = 1110.0;
 /// The headings of the sections, degrees.
 const YAWS_DEG: [f64; 7] = [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0];
 
-/// Draws Fig. 1: the errors with which the car is still in its space, and the parking success set at several headings.
+/// Draws Fig. 1: the errors at which the car is still in its space, and the parking success set at several headings.
 ///
 /// # Errors
 /// [`StudyError`] if the study has no parking task.
@@ -32,7 +32,7 @@ pub fn fig1_parking(study: &CaseStudy) -> Result<String, StudyError> {
     single_errors(&mut picture, 76.0, success, shape);
     let sets = [PoseSetSpec::TEN_CENTIMETRES, PoseSetSpec::ONE_METRE];
     yaw_over_x(&mut picture, [66.0, 376.0], success, &sets);
-    beside(&mut picture, [520.0, 376.0], &small, &large);
+    text(&mut picture, [520.0, 376.0], &small, &large);
     let heading = "The success set S, heading by heading: where the car's centre may be";
     row_heading(&mut picture, 766.0, heading, &[]);
     let row = Row {
@@ -58,7 +58,7 @@ pub fn fig1_parking(study: &CaseStudy) -> Result<String, StudyError> {
 }
 
 /// Draws the text next to the car: the pose-sets that fit, and the legend.
-fn beside(picture: &mut Picture, [left, top]: [f64; 2], small: &Answer, large: &Answer) {
+fn text(picture: &mut Picture, [left, top]: [f64; 2], small: &Answer, large: &Answer) {
     let heading = Font::new(15.0, palette::INK).bold();
     picture.text(
         [left, top + 4.0],

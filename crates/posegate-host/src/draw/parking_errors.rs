@@ -1,5 +1,5 @@
-//! The parts of Fig. 1 about single errors: how far off the car may be along, across and in its heading; and all three at once, yaw
-//! over x with y as the colour.
+//! The parts of Fig. 1 about errors of the car's pose: along, across and in heading, each alone. A further panel
+//! shows all three: yaw over x, with y as the colour.
 
 use super::palette;
 use super::panel::{Inside, Panel, Window};
@@ -8,7 +8,7 @@ use super::study::PoseSetSpec;
 use super::svg::{Anchor, Font, Picture, Style, number};
 use posegate::shape::{Footprint, Planar, SuccessSet};
 
-/// An error: its name, its pose at size 1 (m, m, rad), the largest one that is tried, and how it is written.
+/// An error: its name, its pose at size 1 (m, m, rad), the largest size that is tried, and its notation.
 struct PoseError {
     name: &'static str,
     unit: [f64; 3],
@@ -33,7 +33,7 @@ const ERRORS: [PoseError; 3] = [
     },
 ];
 
-/// A car that is off by half as much again as the largest error that fits.
+/// The ratio of the error of a car that sticks out to the largest error that fits.
 const TOO_FAR: f64 = 1.5;
 const FITS: Style = Style::outlined(palette::INK, 1.8);
 const STICKS_OUT: Style = Style::outlined(palette::NO, 1.8).dashed("7 4");
@@ -79,7 +79,7 @@ pub(super) fn single_errors(picture: &mut Picture, top: f64, set: &SuccessSet, s
             inside.polygons(&[outline_at(shape, at(fits))], &FITS);
             inside.polygons(&[outline_at(shape, at(TOO_FAR * fits))], &STICKS_OUT);
         });
-        let told = |size: f64| {
+        let size_text = |size: f64| {
             if error.unit[2] > 0.0 {
                 format!("{}°", number(size.to_degrees()))
             } else {
@@ -88,8 +88,8 @@ pub(super) fn single_errors(picture: &mut Picture, top: f64, set: &SuccessSet, s
         };
         let text = format!(
             "fits up to {}; dashed: off by {}, sticks out",
-            told(fits),
-            told(TOO_FAR * fits)
+            size_text(fits),
+            size_text(TOO_FAR * fits)
         );
         let below = [panel.left, panel.bottom() + 50.0];
         picture.text(below, &text, &Font::new(12.0, palette::INK));
@@ -108,7 +108,8 @@ pub(super) fn outline_at(shape: &Footprint, [x, y, yaw]: [f64; 3]) -> Vec<[f64; 
     corners.map(|corner| pose.to_goal(*corner)).collect()
 }
 
-/// How far y may be off, metres, and the colour of the poses that allow as much: darker and with a number.
+/// Limits of y, metres, and the colour of the poses at which y may be off this far: darker for larger limits, with a
+/// number.
 const ALLOWED: [(f64, &str); 4] = [
     (0.0, "#fde3dd"),
     (0.2, "#f6b0a4"),
@@ -116,7 +117,7 @@ const ALLOWED: [(f64, &str); 4] = [
     (0.6, "#cf4a40"),
 ];
 
-/// Draws S with yaw over x; the colour shows how far y may be off. The point is the upper left corner of the panel.
+/// Draws S with yaw over x; the colour shows the largest error of y. The point is the upper left corner of the panel.
 pub(super) fn yaw_over_x(
     picture: &mut Picture,
     [left, top]: [f64; 2],

@@ -109,12 +109,12 @@ fn image(picture: &mut Picture, left: f64, column: &Column, view: &Visibility) {
             .sight
             .map_or([None; 4], |sight| sight.corners_px)
     };
-    let room = 12.0;
+    let margin = 12.0;
     let around = [
-        edges[0] - room,
-        edges[1] - room,
-        edges[2] + 2.0 * room,
-        edges[3] + 2.0 * room,
+        edges[0] - margin,
+        edges[1] - margin,
+        edges[2] + 2.0 * margin,
+        edges[3] + 2.0 * margin,
     ];
     picture.clipped(around, |picture| {
         picture.rectangle(
@@ -161,7 +161,7 @@ fn floor(
     let scale = IMAGE[0] / (reach + 1.6);
     let half = 0.5 * FLOOR_HEIGHT / scale;
     let toward = direction(column, goal);
-    // The tag is in front of the goal: centre the panel between the two.
+    // The tag is in front of the goal: centre the panel between them.
     let middle = [
         goal.x + 0.5 * (reach - 1.6) * toward[0],
         goal.y + 0.5 * (reach - 1.6) * toward[1],
@@ -202,8 +202,8 @@ fn direction(column: &Column, goal: PoseDeg) -> [f64; 2] {
     }
 }
 
-/// Returns the distance from the goal to the nearest border of the set at the goal's heading, metres, for a picture: along 120
-/// directions, by steps of 2 cm and then halving. `None` if the goal is not in the set.
+/// Returns the distance from the goal to the nearest border of the set at the goal's heading, metres, for a picture.
+/// It searches 120 directions in steps of 2 cm, then by bisection. `None` if the goal is not in the set.
 fn to_border(set: &SuccessSet) -> Option<f64> {
     let [x, y, heading] = radians(set.goal);
     let holds = |angle: f64, far: f64| {

@@ -20,7 +20,7 @@ const Z: Style = Style::outlined("#0072b2", 2.2).dashed("2 2");
 const AXES: [(&str, Style); 3] = [("x", X), ("y", Y), ("z", Z)];
 const FACE: Style = Style::outlined(palette::INK, 2.4).with_fill_opacity("#999999", 0.25);
 
-/// A direction of view: what is to the right and what is up.
+/// A direction of view: the directions to the right and up.
 struct Side {
     title: &'static str,
     names: [&'static str; 2],
@@ -30,7 +30,7 @@ struct Side {
     numbers: bool,
 }
 
-/// The thing to draw.
+/// The tag or camera to draw.
 struct Body {
     centre: [f64; 3],
     axes: [[f64; 3]; 3],
@@ -109,7 +109,7 @@ fn draw(title: &str, note: &str, body: &Body, plane: [&'static str; 2], from: &s
     picture.text([24.0, 54.0], note, &Font::new(12.0, palette::FAINT));
     let [nx, ny, _] = body.axes[0];
     let level = libm::hypot(nx, ny);
-    // A vertical direction has no heading: any will do.
+    // A vertical direction has no heading: use any.
     let ahead = if level > 1e-6 {
         [nx / level, ny / level, 0.0]
     } else {
@@ -162,13 +162,13 @@ fn draw(title: &str, note: &str, body: &Body, plane: [&'static str; 2], from: &s
 
 fn one(picture: &mut Picture, left: f64, side: &Side, body: &Body) {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    // In the side and front views, coordinates are relative to the thing itself.
-    let from_itself = side.title != "from above";
+    // In the side and front views, coordinates are relative to the tag or camera.
+    let is_relative = side.title != "from above";
     let centre = body.centre;
     let at = |p: [f64; 3]| {
-        let way = [p[0] - centre[0], p[1] - centre[1], p[2]];
-        if from_itself {
-            [dot(way, side.right), dot(way, side.up)]
+        let offset = [p[0] - centre[0], p[1] - centre[1], p[2]];
+        if is_relative {
+            [dot(offset, side.right), dot(offset, side.up)]
         } else {
             [p[0], p[1]]
         }

@@ -1,4 +1,4 @@
-//! The lanes of a replay's picture: what the gate, the interlock and the rules in use today did over time.
+//! The lanes of a replay's picture: the states of the gate, the interlock and the rules in use today over time.
 
 use super::palette;
 use super::svg::{Anchor, Font, Picture, Style, number};
@@ -12,7 +12,7 @@ const LANE: f64 = 26.0;
 const BETWEEN: f64 = 10.0;
 /// Height of the ticks of estimates.
 const TICKS: f64 = 10.0;
-/// Space between what the gate did and what the rules would have done.
+/// Space between the gate's lanes and the rules' lanes.
 const APART: f64 = 8.0;
 /// Height of all lanes.
 pub(super) const HEIGHT: f64 = TICKS + 6.0 + 2.0 * APART + 6.0 * (LANE + BETWEEN);
@@ -36,7 +36,7 @@ const REASONS: [Style; 6] = [
 ];
 const OTHERS: Style = Style::filled("#999999");
 
-/// Time, as places of a picture.
+/// Converts times to x coordinates of a picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axis {
     pub start_s: f64,
@@ -44,7 +44,7 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Returns the axis of all that is known of a replay.
+    /// Returns the axis of all times of a replay.
     pub fn of(replay: &Replay<'_>) -> Self {
         let (timeline, lanes) = (replay.timeline(), &replay.interlock().lanes);
         let ends = [
@@ -75,7 +75,7 @@ impl Axis {
         }
     }
 
-    /// Returns the place of a time, pixels.
+    /// Returns the x coordinate of a time, pixels.
     pub fn x(&self, time_s: f64) -> f64 {
         if !(self.span_s > 0.0) {
             return LEFT;
@@ -84,7 +84,8 @@ impl Axis {
     }
 }
 
-/// A reason with its colour and the time for which it kept the interlock shut, seconds. `None` stands for all other reasons.
+/// A reason with its colour and the time for which it kept the interlock shut, seconds. `None` means all other
+/// reasons.
 pub(super) type Shade = (Option<Reason>, Style, f64);
 
 /// Returns the reasons that kept the interlock shut, the commonest first.
@@ -102,20 +103,20 @@ pub(super) fn shades(replay: &Replay<'_>) -> Vec<Shade> {
     shades
 }
 
-/// A stretch of a lane: from and to, seconds; the share that is permitted; `true` if a permit of it was false.
+/// An interval of a lane: start and end, seconds; the share that is permitted; `true` if a permit in it was false.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Stretch {
+struct Interval {
     from_s: f64,
     to_s: f64,
     share: f64,
     wrong: bool,
 }
 
-/// Returns the stretches of a rule: each estimate stands until the next one.
-fn stretches(replay: &Replay<'_>, counts: impl Fn(&Bucket) -> RuleCounts) -> Vec<Stretch> {
+/// Returns the intervals of a rule: each estimate is valid until the next one.
+fn intervals(replay: &Replay<'_>, counts: impl Fn(&Bucket) -> RuleCounts) -> Vec<Interval> {
     let timeline = replay.timeline();
     let at = |index: usize| timeline.start_s() + index as f64 * timeline.width_s();
-    let mut all: Vec<Stretch> = Vec::new();
+    let mut all: Vec<Interval> = Vec::new();
     for (index, bucket) in timeline.buckets().iter().enumerate() {
         if bucket.estimates == 0 {
             continue;
@@ -124,27 +125,27 @@ fn stretches(replay: &Replay<'_>, counts: impl Fn(&Bucket) -> RuleCounts) -> Vec
             before.to_s = at(index);
         }
         let rule = counts(bucket);
-        all.push(Stretch {
+        all.push(Interval {
             from_s: at(index),
             to_s: at(index + 1),
             share: rule.permits as f64 / rule.judged as f64,
             wrong: rule.false_permits > 0,
         });
     }
-    // Equal neighbours are drawn as one.
+    // Equal neighbours are joined.
     all.dedup_by(|next, before| {
-        let alike = next.share == before.share && next.wrong == before.wrong;
-        if alike {
+        let is_equal = next.share == before.share && next.wrong == before.wrong;
+        if is_equal {
             before.to_s = next.to_s;
         }
-        alike
+        is_equal
     });
-    // What was not judged has no share.
-    all.retain(|stretch| stretch.share.is_finite());
+    // An interval without judged estimates has no share.
+    all.retain(|interval| interval.share.is_finite());
     all
 }
 
-/// Draws the lanes from `top` on; they end [`HEIGHT`] below.
+/// Draws the lanes from `top` on; their height is [`HEIGHT`].
 pub(super) fn lanes(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) {
     let mut top = ticks(picture, replay, axis, top);
     top = verdicts(picture, replay, axis, top);
@@ -159,16 +160,16 @@ pub(super) fn lanes(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top:
     {
         names(picture, top, &[name, &limit]);
         let counts = |bucket: &Bucket| bucket.rules.get(rule).copied().unwrap_or_default();
-        let all = stretches(replay, counts);
+        let all = intervals(replay, counts);
         if all.is_empty() {
             let font = Font::new(11.0, palette::FAINT).anchored(Anchor::Middle);
             let words = "not judged: the estimates have no covariance";
             picture.text([LEFT + 0.5 * WIDTH, top + 0.5 * LANE + 4.0], words, &font);
         }
-        for stretch in all {
-            bar(picture, axis, top, &stretch, &PERMIT);
-            if stretch.wrong {
-                let [x, wide] = place(axis, &stretch);
+        for interval in all {
+            bar(picture, axis, top, &interval, &PERMIT);
+            if interval.wrong {
+                let [x, wide] = place(axis, &interval);
                 picture.rectangle([x, top, wide, 5.0], &WRONG);
             }
         }
@@ -177,7 +178,7 @@ pub(super) fn lanes(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top:
     }
 }
 
-/// What the rules compare, in words.
+/// Returns the limits of the rules as text.
 fn limits(thresholds: &Thresholds) -> [String; 3] {
     let degrees = number(thresholds.sigma_yaw_rad.to_degrees());
     [
@@ -192,7 +193,7 @@ fn limits(thresholds: &Thresholds) -> [String; 3] {
     ]
 }
 
-/// Writes the name of a lane, and what it compares below it.
+/// Writes the name of a lane, and its limits below it.
 fn names(picture: &mut Picture, top: f64, lines: &[&str]) {
     let heights: &[f64] = if lines.len() > 1 {
         &[11.0, 23.0]
@@ -214,15 +215,15 @@ fn frame(picture: &mut Picture, top: f64) {
     picture.rectangle([LEFT, top, WIDTH, LANE], &style);
 }
 
-/// The place of a stretch, and its width: at least a pixel.
-fn place(axis: Axis, stretch: &Stretch) -> [f64; 2] {
-    let x = axis.x(stretch.from_s);
-    [x, (axis.x(stretch.to_s) - x).max(1.0)]
+/// Returns the x coordinate of an interval and its width: at least a pixel.
+fn place(axis: Axis, interval: &Interval) -> [f64; 2] {
+    let x = axis.x(interval.from_s);
+    [x, (axis.x(interval.to_s) - x).max(1.0)]
 }
 
-fn bar(picture: &mut Picture, axis: Axis, top: f64, stretch: &Stretch, style: &Style) {
-    let [x, wide] = place(axis, stretch);
-    let high = LANE * stretch.share;
+fn bar(picture: &mut Picture, axis: Axis, top: f64, interval: &Interval, style: &Style) {
+    let [x, wide] = place(axis, interval);
+    let high = LANE * interval.share;
     picture.rectangle([x, top, wide, LANE - high], &DENIAL);
     if high > 0.0 {
         picture.rectangle([x, top + LANE - high, wide, high], style);
@@ -251,12 +252,12 @@ fn verdicts(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) ->
         permits: bucket.permits,
         false_permits: bucket.false_permits,
     };
-    for stretch in stretches(replay, counts) {
-        bar(picture, axis, top, &stretch, &OLD);
+    for interval in intervals(replay, counts) {
+        bar(picture, axis, top, &interval, &OLD);
     }
     let timeline = replay.timeline();
     let lasts = replay.maximum_age_s().max(timeline.width_s());
-    let mut moments: Vec<Stretch> = Vec::new();
+    let mut moments: Vec<Interval> = Vec::new();
     for (index, bucket) in timeline.buckets().iter().enumerate() {
         if bucket.permits == 0 {
             continue;
@@ -275,7 +276,7 @@ fn verdicts(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) ->
             {
                 before.to_s = to_s;
             }
-            _ => moments.push(Stretch {
+            _ => moments.push(Interval {
                 from_s,
                 to_s,
                 share,
@@ -295,7 +296,7 @@ fn verdicts(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) ->
     top + LANE + BETWEEN
 }
 
-/// Draws when the interlock was open, as a share of each moment.
+/// Draws the share of each moment for which the interlock was open.
 fn interlock(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -> f64 {
     let times = replay.interlock();
     let often = match times.openings {
@@ -305,7 +306,7 @@ fn interlock(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -
     let words = format!("open {:.1} s, {often}", times.open_s);
     names(picture, top, &["interlock", &words]);
     let lanes = &times.lanes;
-    let mut all: Vec<Stretch> = Vec::new();
+    let mut all: Vec<Interval> = Vec::new();
     for (index, span) in lanes.spans().iter().enumerate() {
         let from_s = lanes.start_s() + index as f64 * lanes.width_s();
         let to_s = from_s + lanes.width_s();
@@ -313,7 +314,7 @@ fn interlock(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -
         let share = (span.open_s() / span.all_s() * 1e6).round() / 1e6;
         match all.last_mut() {
             Some(before) if before.share == share => before.to_s = to_s,
-            _ => all.push(Stretch {
+            _ => all.push(Interval {
                 from_s,
                 to_s,
                 share,
@@ -321,9 +322,9 @@ fn interlock(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -
             }),
         }
     }
-    for stretch in all.iter().filter(|stretch| stretch.share.is_finite()) {
-        let [x, wide] = place(axis, stretch);
-        let high = LANE * stretch.share;
+    for interval in all.iter().filter(|interval| interval.share.is_finite()) {
+        let [x, wide] = place(axis, interval);
+        let high = LANE * interval.share;
         picture.rectangle([x, top, wide, LANE - high], &SHUT);
         if high > 0.0 {
             picture.rectangle([x, top + LANE - high, wide, high], &PERMIT);
@@ -333,7 +334,7 @@ fn interlock(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -
     top + LANE + BETWEEN
 }
 
-/// Draws why the interlock was shut, each reason as a share of each moment.
+/// Draws the reasons why the interlock was shut, each as a share of each moment.
 fn reasons(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -> f64 {
     names(picture, top, &["reasons", "why it is shut"]);
     let lanes = &replay.interlock().lanes;

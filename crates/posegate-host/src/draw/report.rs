@@ -1,4 +1,4 @@
-//! The study in words and numbers: its chain, `numbers.json`, and the summary on the terminal.
+//! The study as text and numbers: its chain, `numbers.json`, and the summary on the terminal.
 //!
 //! ```no_run
 //! use posegate_host::draw::report::summary;
@@ -216,9 +216,9 @@ pub fn numbers(study: &CaseStudy) -> Result<String, StudyError> {
 
 /// A place of Fig. 4.
 fn placement(column: &Column) -> serde_json::Value {
-    let mut told = column.placed.to_json();
-    told["case"] = serde_json::json!(column.heading);
-    told
+    let mut value = column.placed.to_json();
+    value["case"] = serde_json::json!(column.heading);
+    value
 }
 
 /// `1 m / 2° is not inside S_w (dock), margin 0.059: docking is not guaranteed: localize first`.

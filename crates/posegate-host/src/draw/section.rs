@@ -58,7 +58,7 @@ pub fn border(
     };
     let count = |[lo, hi]: [f64; 2]| libm::ceil((hi - lo) / spacing) as usize + 3;
     let (columns, rows) = (count(window.x), count(window.y));
-    // The outermost ring counts as outside, so every polygon is closed.
+    // The outermost ring is treated as outside, so every polygon is closed.
     let ring = |i, j| i == 0 || j == 0 || i + 1 == columns || j + 1 == rows;
     let nodes: Vec<bool> = (0..rows)
         .flat_map(|j| (0..columns).map(move |i| (i, j)))
@@ -308,7 +308,7 @@ mod tests {
     };
 
     #[test]
-    fn the_outline_is_the_border() {
+    fn outline_is_the_border_of_the_set() {
         let goal = PoseDeg {
             x: 3.0,
             y: -2.0,
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn no_section_has_no_outline() {
+    fn empty_section_has_no_outline() {
         let goal = PoseDeg {
             x: 0.0,
             y: 0.0,
@@ -342,14 +342,14 @@ mod tests {
     }
 
     #[test]
-    fn each_diagonal_corner_has_its_piece() {
+    fn each_diagonal_corner_has_one_piece() {
         assert_eq!(crossings([true, false, true, false]), [(0, 3), (2, 1)]);
         assert_eq!(crossings([true, true, false, false]), [(1, 3)]);
         assert!(crossings([true; 4]).is_empty() && crossings([false; 4]).is_empty());
     }
 
     #[test]
-    fn runs_in_common() {
+    fn common_runs_are_intersections() {
         let run = |first, last| Run { first, last };
         let a = [run(0, 4), run(8, 9)];
         let b = [run(3, 8)];

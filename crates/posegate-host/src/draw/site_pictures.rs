@@ -46,7 +46,7 @@ mod tests {
     const DOCK: &str = include_str!("../../../../examples/sites/dock.toml");
 
     #[test]
-    fn pictures_have_names_of_their_own() {
+    fn picture_names_are_unique() {
         let text = DOCK
             .replace("[tag.t7]", "[tag.\"a/b\"]")
             .replace("tag = \"t7\"", "tag = \"a/b\"");

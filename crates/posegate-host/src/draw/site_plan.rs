@@ -6,7 +6,7 @@ use super::svg::{Font, Picture};
 use crate::plan::ChainReport;
 use crate::site::Site;
 
-/// The largest panel, pixels: with it a page of A4 shows the plan at its own size.
+/// The largest panel, pixels: A4 paper shows the plan at its own size.
 const LARGEST: [f64; 2] = [600.0, 560.0];
 const LEFT: f64 = 66.0;
 const WIDTH: f64 = 690.0;
@@ -15,7 +15,7 @@ const WIDTH: f64 = 690.0;
 #[must_use]
 pub fn site_plan(site: &Site, routes: &[&ChainReport]) -> String {
     let title = "The site, as its file says it";
-    // The panel decides about the height: draw it once for its size.
+    // The panel determines the height: draw it once for its size.
     let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
     let bottom = hall(&mut trial, site, routes, "", [LEFT, 50.0], LARGEST).bottom();
     let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);

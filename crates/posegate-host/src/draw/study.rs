@@ -1,4 +1,4 @@
-//! The case study of the paper: its site, its proven tables, its questions and answers.
+//! The case study of the paper: site, proven tables, questions and answers.
 //!
 //! ```no_run
 //! use posegate_host::draw::study::{CaseStudy, PoseSetSpec, DOCK, SEE};
@@ -233,7 +233,7 @@ pub enum StudyError {
     /// A question about a task that the site does not have.
     #[error(transparent)]
     Task(#[from] UnknownTask),
-    /// A task without a table's extent and step.
+    /// A task's table has no extent or no step.
     #[error("the task `{0}` has no table")]
     NoTable(String),
     /// The table cannot be baked.
@@ -242,7 +242,7 @@ pub enum StudyError {
     /// The table is not proven.
     #[error("the table of `{0}` is not proven: {1}")]
     Verify(String, VerifyError),
-    /// A table that was just made cannot be parsed.
+    /// The bytes of a new table cannot be parsed.
     #[error("the table of `{0}` cannot be parsed: {1}")]
     Table(String, TableError),
     /// A pose-set is not valid.

@@ -1,4 +1,4 @@
-//! The subject of a picture: a task's set, a table of it, and pose-sets.
+//! The subject of a picture: a task's set, its table, and pose-sets.
 
 use super::belief::PoseSetF64;
 use super::depth::SlackEvaluator;
@@ -24,7 +24,7 @@ pub struct Subject<'a> {
     pub task: &'a Task,
     /// The task's set, prepared for evaluation.
     pub depth: SlackEvaluator,
-    /// A table of it.
+    /// The task's table.
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
     pub beliefs: Vec<PoseSetF64>,
@@ -39,13 +39,13 @@ pub enum DrawError {
     /// The site has no such task.
     #[error(transparent)]
     Task(#[from] UnknownTask),
-    /// A set without bounds and without an expected pose-set.
+    /// The success set is unbounded and has no expected pose-set, or it is empty.
     #[error("no extent can be chosen for the task `{0}`: its success set has no bound, or no pose")]
     NoExtent(String),
     /// The task has no expected pose-set.
     #[error("the task `{0}` has no `expected` pose-set")]
     NothingExpected(String),
-    /// None of the estimates is a pose-set.
+    /// No estimate is a valid pose-set.
     #[error("none of the {0} estimates is a pose-set: see `posegate gate` for their reasons")]
     NoPoseSet(usize),
     /// The set has no camera.
@@ -256,8 +256,8 @@ impl<'a> Subject<'a> {
             }
         }
         let [x, y] = ends.map(|[lo, hi]| {
-            let room = 0.04 * (hi - lo);
-            [lo - room, hi + room]
+            let margin = 0.04 * (hi - lo);
+            [lo - margin, hi + margin]
         });
         Ok((Window { x, y }, both(chosen.yaw_deg, own.yaw_deg)))
     }

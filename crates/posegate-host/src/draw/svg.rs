@@ -94,14 +94,14 @@ impl Style {
     }
 }
 
-/// The point of a text that lies at its coordinates.
+/// The point of a text that is at the given coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// Its start.
+    /// The start of the text.
     Start,
-    /// Its middle.
+    /// The middle of the text.
     Middle,
-    /// Its end.
+    /// The end of the text.
     End,
 }
 
@@ -114,7 +114,7 @@ pub struct Font {
     pub colour: &'static str,
     /// `true` for bold text.
     pub bold: bool,
-    /// The point of the text at its coordinates.
+    /// The point of the text that is at the given coordinates.
     pub anchor: Anchor,
 }
 
@@ -230,8 +230,7 @@ impl Picture {
         }
     }
 
-    /// Draws a text with its baseline at the point. The letter after an underscore becomes a
-    /// subscript: `S_l`.
+    /// Draws a text with its baseline at the point. The letter after an underscore is a subscript: `S_l`.
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, font: &Font) {
         self.text_turned([x, y], 0.0, text, font);
     }
@@ -326,7 +325,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short() {
+    fn numbers_have_at_most_two_decimals() {
         for (value, text) in [
             (1.0, "1"),
             (-0.001, "0"),

@@ -1,4 +1,4 @@
-//! The images of AprilTags, as they are printed.
+//! The printed images of AprilTags.
 //!
 //! The codes are those of the families' definitions in the AprilTag 3 library, one hexadecimal number per tag: the image's data
 //! bits row by row from the upper left, white is 1.
@@ -41,10 +41,10 @@ mod tests {
         pairs.filter(|(a, b)| a != b).count()
     }
 
-    /// The name of a family states the least number of bits by which any two of its tags differ, in every turn. A mistyped code
-    /// would be nearer to another one.
+    /// The name of a family states the least number of bits by which any two of its tags differ, in every rotation. A
+    /// mistyped code would be closer to another code.
     #[test]
-    fn tags_differ_by_the_distance_of_their_family() {
+    fn tags_differ_by_at_least_the_family_distance() {
         for (family, least) in [("tag16h5", 5), ("tag25h9", 9), ("tag36h11", 11)] {
             let count = Family::named(family).unwrap().tags;
             let all: Vec<Bits> = (0..count).map(|id| bits(family, id).unwrap()).collect();
@@ -67,7 +67,7 @@ mod tests {
 
     /// The first tag of the family as printed: its data bits from the upper left.
     #[test]
-    fn the_first_tag_is_the_known_one() {
+    fn first_tag_equals_the_printed_one() {
         let rows: Vec<String> = bits("tag36h11", 0)
             .unwrap()
             .iter()

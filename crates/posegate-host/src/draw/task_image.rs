@@ -112,7 +112,7 @@ impl SeenFrom {
     }
 }
 
-/// Draws the tags of a task in its camera's image: of the first camera, if there are several.
+/// Draws the tags of a task in the image of its camera, or of the first camera if there are several.
 ///
 /// # Errors
 /// [`DrawError::NoCamera`] if the success set has no camera.
@@ -120,7 +120,7 @@ pub fn task_image(subject: &Subject<'_>) -> Result<String, DrawError> {
     task_image_with_numbers(subject).map(|(picture, _)| picture)
 }
 
-/// Like [`task_image`], and returns the numbers drawn.
+/// Like [`task_image`], and also returns the drawn numbers.
 ///
 /// # Errors
 /// [`DrawError::NoCamera`] if the success set has no camera.
@@ -215,7 +215,7 @@ pub fn task_image_with_numbers(
     let mut top = TOP + entries.len() as f64 * LINE + 24.0;
     let mut letters = 'A'..='Z';
     for looks in &all {
-        tell(&frame, looks, side, &mut top, &mut letters, &mut picture);
+        write_looks(&frame, looks, side, &mut top, &mut letters, &mut picture);
     }
     let numbers = all.iter().flat_map(SeenFrom::of).collect();
     Ok((picture.finish(), numbers))
@@ -289,7 +289,7 @@ fn rectangle(camera: &Camera) -> [[f64; 2]; 4] {
     [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]]
 }
 
-/// Returns the border of the area that a camera certainly sees, in the image.
+/// Returns the border of the image area that a camera is certain to see.
 pub(super) fn window(camera: &Camera) -> Vec<[f64; 2]> {
     let corners = polygon(&camera.view());
     let ends = corners.iter().cycle().skip(1);
@@ -329,10 +329,13 @@ fn polygon(window: &Window) -> Vec<[f64; 2]> {
 fn numbered(frame: &Frame, quad: &[[f64; 2]], picture: &mut Picture) {
     let middle = middle(quad);
     for (index, corner) in quad.iter().enumerate() {
-        let way = [corner[0] - middle[0], corner[1] - middle[1]];
-        let length = libm::hypot(way[0], way[1]).max(1e-9);
+        let direction = [corner[0] - middle[0], corner[1] - middle[1]];
+        let length = libm::hypot(direction[0], direction[1]).max(1e-9);
         let [x, y] = frame.at(*corner);
-        let at = [x + 9.0 * way[0] / length, y + 9.0 * way[1] / length + 4.0];
+        let at = [
+            x + 9.0 * direction[0] / length,
+            y + 9.0 * direction[1] / length + 4.0,
+        ];
         picture.circle([x, y], 2.4, &Style::filled(palette::INK));
         let font = Font::new(11.0, palette::INK).bold();
         picture.text(at, &format!("{index}"), &font.anchored(Anchor::Middle));
@@ -387,7 +390,7 @@ fn ticks(frame: &Frame, picture: &mut Picture) {
 }
 
 /// Writes the text about each look.
-fn tell(
+fn write_looks(
     frame: &Frame,
     looks: &Looks,
     left: f64,

@@ -181,7 +181,7 @@ fn entries(subject: &Subject<'_>, own: &Ingredients) -> Vec<(Sample, &'static st
     entries
 }
 
-/// Returns the window of the world to draw: the set at the goal's heading and its parts, and the whole site if
+/// Returns the window of the world to draw: the set at the goal's heading and its parts, and the complete site if
 /// that is not much larger.
 fn window(subject: &Subject<'_>, own: &Ingredients) -> Result<Window, DrawError> {
     let (extent, _) = subject.extent()?;
@@ -232,9 +232,9 @@ pub(super) fn about(points: &[[f64; 2]]) -> Window {
         })
     };
     let ([x0, x1], [y0, y1]) = (ends(0), ends(1));
-    let room = (0.07 * (x1 - x0).max(y1 - y0)).max(0.1);
+    let margin = (0.07 * (x1 - x0).max(y1 - y0)).max(0.1);
     Window {
-        x: [x0 - room, x1 + room],
-        y: [y0 - room, y1 + room],
+        x: [x0 - margin, x1 + margin],
+        y: [y0 - margin, y1 + margin],
     }
 }

@@ -57,7 +57,7 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
         signed(goal.yaw_deg)
     );
     picture.text([24.0, 54.0], &note, &Font::new(12.0, palette::FAINT));
-    tell(subject, &held, &mut picture);
+    write_results(subject, &held, &mut picture);
 
     // A finer border than a pixel is not visible.
     let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
@@ -123,15 +123,15 @@ pub(super) fn pose_set(
     }
 }
 
-/// Writes if the pose-sets are inside.
-fn tell(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture) {
+/// Writes the results of the containment tests.
+fn write_results(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture) {
     let within = held.iter().filter(|held| held.inside).count();
     match held {
         [] => {}
         [only] => {
             let name = name_of(&subject.beliefs[0]);
             let bold = format!("The pose-set of {name}: {}", only.words);
-            verdict(picture, [24.0, 68.0], only.inside, &bold, &beside(subject));
+            verdict(picture, [24.0, 68.0], only.inside, &bold, &note(subject));
         }
         all => {
             let bold = format!("{within} of {} pose-sets are inside", all.len());
@@ -140,13 +140,13 @@ fn tell(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture
                 [24.0, 68.0],
                 within == all.len(),
                 &bold,
-                &beside(subject),
+                &note(subject),
             );
         }
     }
 }
 
-fn beside(subject: &Subject<'_>) -> String {
+fn note(subject: &Subject<'_>) -> String {
     let proven = if subject.table.is_some() {
         "by the gate, on the table"
     } else {
@@ -220,8 +220,8 @@ fn headings([lo, hi]: [f64; 2], beliefs: &[PoseSetF64], goal_deg: f64) -> Vec<f6
         }
         _ => Vec::new(),
     };
-    let room = MOST - ends.len();
-    let step = STEPS.into_iter().find(|step| at(*step).count() <= room);
+    let slots = MOST - ends.len();
+    let step = STEPS.into_iter().find(|step| at(*step).count() <= slots);
     let step = step.unwrap_or(90.0);
     let mut headings: Vec<f64> = at(step)
         // Drop headings near a pose-set's end, except the goal's.

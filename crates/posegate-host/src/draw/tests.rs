@@ -205,9 +205,9 @@ fn drawn_sections_agree_with_membership() {
     }
 }
 
-/// The drawn pieces are those of the gate: it permits poses in them, and denies poses outside of all.
+/// The drawn pieces are those of the gate: it permits poses in them, and denies poses outside of all pieces.
 #[test]
-fn drawn_pieces_are_what_the_gate_has() {
+fn drawn_pieces_equal_those_of_the_gate() {
     let turned = BAY
         .replace(
             "goal = { x = 2.2, y = 0.0, yaw_deg = 0.0 }",
@@ -288,7 +288,7 @@ fn holes_are_drawn() {
 
 /// Pictures have the same bytes each time, refer to no other files, and show their units.
 #[test]
-fn pictures_are_the_same_each_time_and_stand_alone() {
+fn pictures_are_deterministic_and_self_contained() {
     let site = site(BAY);
     let subject = || Subject::new(&site, "see-bay").unwrap().expected().unwrap();
     for (draw, units) in [
@@ -308,9 +308,9 @@ fn pictures_are_the_same_each_time_and_stand_alone() {
     }
 }
 
-/// A plan names the tags and walls that it shows, and no others.
+/// A plan names all tags and walls that it shows, and no others.
 #[test]
-fn plans_name_what_they_show() {
+fn plan_names_exactly_the_shown_parts() {
     let far = "[tag.elsewhere]\nid = 9\nfamily = \"tag36h11\"\nsize = 0.16\n\
                pose = { x = 400.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n\
                [wall.beyond]\nfrom = [400.0, -1.0]\nto = [400.0, 1.0]\nz = [0.0, 2.0]\n";
@@ -324,7 +324,7 @@ fn plans_name_what_they_show() {
 
 /// The tag is drawn where the camera projects it; the corners are numbered in AprilTag's order.
 #[test]
-fn the_image_has_the_tags_corners() {
+fn image_shows_projected_corners_in_order() {
     let site = site(BAY);
     let subject = Subject::new(&site, "see-bay").unwrap().expected().unwrap();
     let svg = task_image(&subject).unwrap();

@@ -31,7 +31,7 @@ fn end_of_file_is_a_fault_of_no_length() {
 }
 
 #[test]
-fn hostile_characters_are_escaped_and_the_fault_moves_along() {
+fn hostile_characters_are_escaped_and_the_fault_is_shifted() {
     let shown = of(
         "\u{feff}\u{1b}[31m ä = \u{202e}\"\u{9b}\" # \u{7f}\n",
         "\"\u{9b}\"",
@@ -44,7 +44,7 @@ fn hostile_characters_are_escaped_and_the_fault_moves_along() {
 }
 
 #[test]
-fn megabytes_become_a_few_hundred_characters() {
+fn megabytes_are_shortened_to_a_few_hundred_characters() {
     let many = "\u{20ac}".repeat(1 << 20);
     let text = format!("{many}\n{many}wrong{many}\n{many}\n");
     let shown = of(&text, "wrong");

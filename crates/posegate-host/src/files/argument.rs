@@ -1,4 +1,5 @@
-//! Arguments of a command that name files. Each type is one role, so that every such argument is known before the command runs.
+//! Arguments of a command that name files. Each type is one role, so every such argument is known before the command
+//! runs.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -12,13 +13,13 @@ macro_rules! role {
         pub struct $name(PathBuf);
 
         impl $name {
-            /// The path as it was given.
+            /// Returns the path as it was given.
             #[must_use]
             pub fn as_path(&self) -> &Path {
                 &self.0
             }
 
-            /// The path for messages.
+            /// Returns the path for messages.
             #[must_use]
             pub fn display(&self) -> std::path::Display<'_> {
                 self.0.display()

@@ -12,9 +12,9 @@ use super::FileError;
 /// Largest number of temporary names that are tried.
 const TRIES: u32 = 100;
 
-/// A file that is being written under a temporary name in its folder. It is removed unless [`Draft::keep`] renames it.
-/// A device, a pipe, or an output that is open already (`/dev/stdout`) is written directly. If the path is a link to a
-/// file, that file is replaced.
+/// A file that is being written under a temporary name in its folder. It is removed unless [`Draft::keep`] renames
+/// it. A device, a pipe, or an output that is already open (`/dev/stdout`) is written directly. If the path is a link
+/// to a file, that file is replaced.
 #[derive(Debug)]
 pub struct Draft {
     /// The open file.

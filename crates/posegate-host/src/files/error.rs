@@ -7,23 +7,23 @@ use std::path::Path;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// An input that cannot be read.
+    /// An input cannot be read.
     #[error("{name}: {cause}")]
     Unread {
-        /// Its name.
+        /// The file's name.
         name: String,
         /// The reason.
         cause: io::Error,
     },
-    /// An output that cannot be written.
+    /// An output cannot be written.
     #[error("{name}: {cause}")]
     Unwritten {
-        /// Its name.
+        /// The file's name.
         name: String,
         /// The reason.
         cause: io::Error,
     },
-    /// An output that is an input of the same command.
+    /// An output is an input of the same command.
     #[error("the output {output} would replace the input {input}: they are the same file")]
     ReplacesInput {
         /// The output.
@@ -31,7 +31,7 @@ pub enum FileError {
         /// The input.
         input: String,
     },
-    /// Two outputs that are the same file.
+    /// Two outputs are the same file.
     #[error("the outputs {one} and {other} are the same file")]
     OneForTwo {
         /// The first.
@@ -42,7 +42,7 @@ pub enum FileError {
     /// More than one argument is standard input.
     #[error("standard input can be read only once")]
     StandardInputTwice,
-    /// Standard output that cannot be written.
+    /// Standard output cannot be written.
     #[error("standard output cannot be written: {0}")]
     StandardOutput(io::Error),
     /// Standard output is closed: its reader has ended (`| head`).

@@ -20,7 +20,7 @@ impl Identity {
         Self::of_metadata(&std::fs::metadata(path).ok()?, path)
     }
 
-    /// Like [`Identity::of`], from metadata that was read already.
+    /// Like [`Identity::of`], from existing metadata.
     pub(super) fn of_metadata(data: &Metadata, path: &Path) -> Option<Self> {
         if !data.is_file() {
             return None;
@@ -38,7 +38,7 @@ impl Identity {
         path.canonicalize().ok().map(Self::Path)
     }
 
-    /// Returns the identity of an output file. If it does not exist, that is its folder and its name.
+    /// Returns the identity of an output file: that of an existing file, else its folder and its name.
     pub(super) fn of_target(path: &Path) -> Option<Self> {
         if path.symlink_metadata().is_ok() {
             return Self::of(path);

@@ -1,8 +1,8 @@
 //! The files of one command: every input and output is opened here.
 //!
-//! Entry points: [`Files::read`], [`Files::write`]. No output replaces an input, whatever the link or spelling of its
-//! path. Inputs are registered and outputs are declared. If an input and an output are the same file, the command ends
-//! before it has written anything.
+//! Entry points: [`Files::read`], [`Files::write`]. No output replaces an input, for any link or spelling of its
+//! path. Inputs are registered and outputs are declared. If an input and an output are the same file, the command
+//! ends before it writes any file.
 //!
 //! ```
 //! use posegate_host::files::{Files, Input, Output};
@@ -63,11 +63,11 @@ struct Named {
 
 /// An open input.
 pub struct Opened {
-    /// Its bytes.
+    /// The input's bytes.
     pub reader: Box<dyn Read + Send>,
-    /// Its name for messages.
+    /// The input's name for messages.
     pub name: String,
-    /// Its length in bytes; 0 if it is not known.
+    /// The input's length in bytes; 0 if it is not known.
     pub length: u64,
 }
 
@@ -196,7 +196,7 @@ impl Files {
         })
     }
 
-    /// Reads a whole input, up to the limit of a file. Returns its bytes and its name for messages.
+    /// Reads a complete input, up to the limit of a file. Returns its bytes and its name for messages.
     ///
     /// # Errors
     /// As [`Files::open`].
@@ -228,7 +228,7 @@ impl Files {
         if output.is_standard() {
             return print(bytes);
         }
-        whole(self.draft(output)?, bytes)
+        write_all(self.draft(output)?, bytes)
     }
 
     /// Writes files into a folder, which is created if it does not exist. All paths are checked before the first file
@@ -247,12 +247,12 @@ impl Files {
         }
         create(folder)?;
         for (name, bytes) in files {
-            whole(Draft::new(&folder.join(name))?, bytes)?;
+            write_all(Draft::new(&folder.join(name))?, bytes)?;
         }
         Ok(())
     }
 
-    /// Creates a folder for outputs, so that one that cannot be made is refused before long work begins.
+    /// Creates a folder for outputs, so that the command fails early if it cannot be created.
     ///
     /// # Errors
     /// [`FileError::Unwritten`] if it cannot be made.
@@ -260,7 +260,7 @@ impl Files {
         create(folder.as_path())
     }
 
-    /// Replaces an input by a result made from it. Only for a command whose purpose that is.
+    /// Replaces an input by a result made from it. Only for commands whose purpose is to change the input.
     ///
     /// # Errors
     /// [`FileError::Unwritten`] if writing fails.
@@ -268,10 +268,11 @@ impl Files {
         if input.is_standard() {
             return print(bytes);
         }
-        whole(Draft::new(input.as_path())?, bytes)
+        write_all(Draft::new(input.as_path())?, bytes)
     }
 
-    /// Returns an error if an input lies below one of these names in a folder, where library code will replace files.
+    /// Returns an error if an input is below one of these names in a folder, in which library code will replace
+    /// files.
     ///
     /// # Errors
     /// [`FileError::ReplacesInput`] for the first such input.
@@ -295,7 +296,7 @@ impl Files {
     }
 }
 
-/// Returns the file that an output path names now.
+/// Returns the file that an output path names at present.
 fn target(path: &Path) -> Named {
     if path == Path::new("-") {
         return Named {
@@ -321,7 +322,7 @@ fn replaces(output: &Named, input: &Named) -> Result<(), FileError> {
     })
 }
 
-fn whole(mut draft: Draft, bytes: &[u8]) -> Result<(), FileError> {
+fn write_all(mut draft: Draft, bytes: &[u8]) -> Result<(), FileError> {
     draft.write(bytes)?;
     draft.keep()
 }

@@ -14,9 +14,9 @@ fn folder(path: &Path) -> OutputFolder {
 }
 
 /// Creates a folder with the file `in` and all kinds of names for it.
-fn made() -> (tempfile::TempDir, PathBuf, Vec<PathBuf>) {
-    let made = tempfile::tempdir().unwrap();
-    let at = |name: &str| made.path().join(name);
+fn linked_file() -> (tempfile::TempDir, PathBuf, Vec<PathBuf>) {
+    let linked_file = tempfile::tempdir().unwrap();
+    let at = |name: &str| linked_file.path().join(name);
     fs::write(at("in"), "input").unwrap();
     fs::create_dir(at("sub")).unwrap();
     fs::hard_link(at("in"), at("hard")).unwrap();
@@ -25,16 +25,16 @@ fn made() -> (tempfile::TempDir, PathBuf, Vec<PathBuf>) {
     {
         std::os::unix::fs::symlink("in", at("soft")).unwrap();
         std::os::unix::fs::symlink("../soft", at("sub/twice")).unwrap();
-        std::os::unix::fs::symlink(made.path(), at("sub/up")).unwrap();
+        std::os::unix::fs::symlink(linked_file.path(), at("sub/up")).unwrap();
         names.extend([at("soft"), at("sub/twice"), at("sub/up/in")]);
     }
     let path = at("in");
-    (made, path, names)
+    (linked_file, path, names)
 }
 
 #[test]
-fn no_name_of_an_input_can_be_written() {
-    let (made, path, names) = made();
+fn input_cannot_be_written_under_any_name() {
+    let (linked_file, path, names) = linked_file();
     for name in &names {
         for other in &names {
             let files = Files::new();
@@ -61,15 +61,15 @@ fn no_name_of_an_input_can_be_written() {
     let files = Files::new();
     files.register(&path).unwrap();
     let all = [("new".into(), vec![1]), ("hard".into(), vec![2])];
-    assert!(files.write_into(&folder(made.path()), &all).is_err());
-    assert!(!made.path().join("new").exists());
+    assert!(files.write_into(&folder(linked_file.path()), &all).is_err());
+    assert!(!linked_file.path().join("new").exists());
     assert_eq!(fs::read(&path).unwrap(), b"input");
 }
 
 #[test]
-fn two_outputs_are_not_one_file() {
-    let (made, _, names) = made();
-    let at = |name: &str| made.path().join(name);
+fn one_file_for_two_outputs_is_an_error() {
+    let (linked_file, _, names) = linked_file();
+    let at = |name: &str| linked_file.path().join(name);
     let new = vec![at("new"), at("sub/../new"), at("sub/up/new")];
     for names in [names, new] {
         for other in &names[1..] {
@@ -93,7 +93,7 @@ fn two_outputs_are_not_one_file() {
 }
 
 #[test]
-fn standard_input_is_one_argument() {
+fn standard_input_is_allowed_once() {
     let files = Files::new();
     let stdin = input(Path::new("-"));
     files.declare_input(&stdin).unwrap();
@@ -104,12 +104,12 @@ fn standard_input_is_one_argument() {
 }
 
 #[test]
-fn reserved_names_hold_no_input() {
-    let (made, path, _) = made();
-    let at = |name: &str| made.path().join(name);
+fn input_below_a_reserved_name_is_an_error() {
+    let (linked_file, path, _) = linked_file();
+    let at = |name: &str| linked_file.path().join(name);
     let files = Files::new();
     files.read(&input(&path)).unwrap();
-    let folder = folder(made.path());
+    let folder = folder(linked_file.path());
     files.reserve(&folder, &["parts", "sub"]).unwrap();
     assert!(files.reserve(&folder, &["parts", "in"]).is_err());
     fs::hard_link(&path, at("sub/linked")).unwrap();
@@ -121,10 +121,10 @@ fn reserved_names_hold_no_input() {
 }
 
 #[test]
-fn drafts_leave_nothing_and_open_no_file_that_exists() {
-    let (made, path, _) = made();
+fn drafts_are_removed_and_open_no_existing_file() {
+    let (linked_file, path, _) = linked_file();
     let files = Files::new();
-    let names = || fs::read_dir(made.path()).unwrap().count();
+    let names = || fs::read_dir(linked_file.path()).unwrap().count();
     let before = names();
     drop(files.draft(&output(&path)).unwrap());
     assert_eq!(
@@ -133,9 +133,9 @@ fn drafts_leave_nothing_and_open_no_file_that_exists() {
     );
     // A file with a temporary name, as a killed process with the same id would leave.
     let taken = std::format!("out.{}-0.tmp", std::process::id());
-    let taken = made.path().join(taken);
+    let taken = linked_file.path().join(taken);
     fs::write(&taken, "taken").unwrap();
-    let out = made.path().join("out");
+    let out = linked_file.path().join("out");
     files.write(&output(&out), b"new").unwrap();
     assert_eq!(fs::read(&out).unwrap(), b"new");
     assert_eq!(fs::read(&taken).unwrap(), b"taken");

@@ -70,7 +70,7 @@ fn panic_of_any_thread_is_one_line_and_exit_code_3() {
 }
 
 #[test]
-fn backtrace_is_printed_if_it_is_asked_for() {
+fn backtrace_is_printed_if_rust_backtrace_is_set() {
     let (output, lines) = run("main", Some("1"));
     assert_eq!(output.status.code(), Some(3));
     assert!(lines.len() > 2 && lines.iter().any(|line| line.contains("stack backtrace")));

@@ -1,23 +1,23 @@
-//! Cells of distances and angles, and the place of a number among them.
+//! Cells of distances and angles, and the cell of a number.
 
 /// The most coarse cells of d, phi and psi.
 const MOST: [usize; 3] = [8, 2, 9];
 /// The number of parts of a coarse cell along d, phi and psi in files that do not state it; the shape is linear within a part.
 pub(super) const PARTS: [usize; 3] = [2, 1, 2];
-/// Coarse cells of d and psi have more parts if there are at most this many: where errors jump, as where tags flip, wide
-/// parts would carry large errors far.
+/// Coarse cells of d and psi have more parts if there are at most this many. Errors may jump, for example if tags
+/// flip, and wide parts would spread large errors far.
 const FEW: usize = 5;
-/// The fewest rows per part with which there are more parts.
+/// The fewest rows per part for which cells have more parts.
 const FILLED: usize = 30;
 /// Inverse of the unit to which edges are rounded: millimetres, hundredths of a degree.
 const ROUND: [f64; 3] = [1000.0, 100.0, 100.0];
-/// A stretch without numbers is a gap if it is wider than this share of the mean cell width and than this many mean
-/// spacings. `GAPS` is the most gaps that get a cell of their own.
+/// An interval without numbers is a gap if it is wider than this share of the mean cell width and than this many mean
+/// spacings. `GAPS` is the most gaps that are cells of their own.
 pub(super) const GAP: [f64; 3] = [0.2, 0.1, 0.2];
 const SPACINGS: f64 = 10.0;
 const GAPS: [usize; 3] = [5, 2, 5];
 /// Cells may be extended down to 0 if the smallest number is at most this. Distances are never extended. Psi is
-/// extended only from 1 degree, because a tag seen head-on differs from others.
+/// extended only from 1 degree, because tags that are seen head-on differ from others.
 const CLOSED: [f64; 3] = [0.0, 180.0, 1.0];
 
 /// The division of a number's range into cells.
@@ -115,7 +115,7 @@ pub(super) fn parts(rows: usize, coarse: [usize; 3]) -> [usize; 3] {
     if rows < FILLED * fine { PARTS } else { more }
 }
 
-/// Returns `true` if a coarse cell holds about one number rather than a range of numbers.
+/// Returns `true` if a coarse cell contains about one number rather than a range of numbers.
 pub(super) fn narrow(which: usize, [low, high]: [f64; 2]) -> bool {
     (high - low) * ROUND[which] < 2.5
 }
@@ -147,7 +147,7 @@ pub(super) fn over(numbers: &[f64], which: usize, coarse: usize, parts: usize) -
         }
         edges.extend(own);
     }
-    // Angles have no sign: views on either side of 0 are equal, so a small gap to 0 lies between neighbours.
+    // Angles have no sign: views on either side of 0 are equal, so a small gap to 0 is between neighbours.
     let low = edges[0];
     if low > 0.0 && low <= CLOSED[which] && low <= GAP[which] * edges[parts] {
         edges[0] = 0.0;
@@ -181,7 +181,7 @@ fn runs(kept: &[f64], which: usize, coarse: usize) -> Vec<&[f64]> {
 
 /// Returns the edges of coarse cells, and of their parts, for sorted numbers without a gap.
 fn cut(kept: &[f64], which: usize, coarse: usize, parts: usize) -> Option<Vec<f64>> {
-    let wanted = coarse * parts;
+    let count = coarse * parts;
     let (first, last) = (*kept.first()?, *kept.last()?);
     let unit = ROUND[which];
     let mut low = libm::floor(first * unit) / unit;
@@ -189,12 +189,12 @@ fn cut(kept: &[f64], which: usize, coarse: usize, parts: usize) -> Option<Vec<f6
         low = low.max(first.min(1.0 / unit));
     }
     let mut edges = std::vec![low];
-    for k in 1..wanted {
-        let value = kept[k * (kept.len() - 1) / wanted];
+    for k in 1..count {
+        let value = kept[k * (kept.len() - 1) / count];
         edges.push(libm::round(value * unit) / unit);
     }
     edges.push(libm::ceil(last * unit) / unit);
-    let end = edges[wanted];
+    let end = edges[count];
     edges.dedup_by(|b, a| !(*b > *a));
     while edges.last().is_some_and(|edge| *edge >= end) && edges.len() > 1 {
         edges.pop();
@@ -216,7 +216,7 @@ fn cut(kept: &[f64], which: usize, coarse: usize, parts: usize) -> Option<Vec<f6
     Some(edges)
 }
 
-/// Returns sorted numbers without the few outliers: the outer half of each outermost cell must hold at least a
+/// Returns sorted numbers without the few outliers: the outer half of each outermost cell must contain at least a
 /// twentieth of that cell's numbers.
 fn inner(sorted: &[f64], coarse: usize) -> Option<&[f64]> {
     let mut kept = sorted;
@@ -245,7 +245,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_hold_equally_many() {
+    fn cells_contain_equally_many_numbers() {
         let numbers: Vec<f64> = (0..10_000).map(|k| 0.5 + f64::from(k) * 6e-4).collect();
         let axis = over(&numbers, 0, 5, PARTS[0]).unwrap();
         assert_eq!(axis.cells(), 10);
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn stragglers_stretch_no_cell() {
+    fn outliers_do_not_widen_cells() {
         let mut numbers: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k) * 0.004).collect();
         numbers.extend([20.0, 30.0]);
         let axis = over(&numbers, 0, 4, PARTS[0]).unwrap();
@@ -284,7 +284,7 @@ mod tests {
         assert!(over(&[], 0, 3, PARTS[0]).is_none());
     }
 
-    /// A coarse cell of four parts is whole even if all of its numbers are equal or nearly so.
+    /// A coarse cell of four parts is complete even if all of its numbers are equal or nearly equal.
     #[test]
     fn repeated_numbers_fill_four_parts() {
         for numbers in [std::vec![2.0; 50], std::vec![2.0, 2.001, 2.001, 2.001]] {

@@ -53,7 +53,7 @@ pub fn clopper_pearson(k: u64, n: u64, confidence: f64) -> [f64; 2] {
     [low.max(0.0), high.min(1.0)]
 }
 
-/// Returns the point at which a test that is true at 0 and false at 1 changes.
+/// Returns the point at which a predicate that is true at 0 and false at 1 changes.
 fn bisect(holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tails_are_those_of_the_sum() {
+    fn tails_equal_the_sum_of_terms() {
         for (n, p) in [(1, 0.3), (7, 0.5), (40, 0.95), (300, 0.01)] {
             let mut term = libm::pow(1.0 - p, n as f64);
             let mut sum = 0.0;
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_of_the_literature() {
+    fn limits_equal_published_ones() {
         // Clopper and Pearson's own kind of table: 0 of 10, 1 of 10, 5 of 10 at 95 %.
         for (k, low, high) in [
             (0, 0.0, 0.308_497),
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn ranks_hold_a_quantile() {
+    fn rank_bounds_the_quantile() {
         // 59 scores are the fewest whose largest is above the 95 % quantile with 95 % confidence.
         assert_eq!(rank(58, 0.95, 0.95), None);
         assert_eq!(rank(59, 0.95, 0.95), Some(59));
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_test_takes() {
+    fn acceptance_limits_have_the_stated_level() {
         let [low, high] = acceptance(500, 0.95, 0.99);
         assert!(at_most(low - 1, 500, 0.95) <= 0.005 && at_most(low, 500, 0.95) > 0.005);
         assert!(1.0 - at_most(high, 500, 0.95) <= 0.005);

@@ -24,7 +24,7 @@ pub struct BoundsSettings {
     pub confidence: f64,
     /// The seed for splitting the detections.
     pub seed: u64,
-    /// What the detections were taken with, if it is known.
+    /// The camera and the tags of the detections, if known.
     pub taken_with: Option<TakenWith>,
 }
 
@@ -53,7 +53,7 @@ pub(super) const FEWEST_RUNS: f64 = 10.0;
 const COARSE: f64 = 8.0;
 /// The fewest rows of a cell for the share of detected views.
 const FEWEST_VIEWS: f64 = 40.0;
-/// Intermediate quantiles before the requested one. A level is used only if at least `APART` times more rows lie
+/// Intermediate quantiles before the requested one. A level is used only if at least `APART` times more rows are
 /// beyond it than beyond the requested one.
 const LEVELS: [f64; 3] = [0.7, 0.9, 0.97];
 const APART: f64 = 1.8;
@@ -65,7 +65,7 @@ const FEWEST_BEYOND: f64 = 10.0;
 /// quantiles.
 const SLOPE: f64 = 0.02;
 /// The smallest psi at which a mirrored solution is recognised, degrees.
-const SQUARE_ON: f64 = 10.0;
+const HEAD_ON: f64 = 10.0;
 
 /// A detection on one side of the split.
 #[derive(Clone, Copy, Debug)]
@@ -143,7 +143,7 @@ pub fn learn_bounds(
     };
     let mut learnt = Calibration::new(&cells, settings, &places, runs.is_some());
     learnt.run(&fitted, &calibrated, &[translation, yaw], effect);
-    if !learnt.says_something() {
+    if !learnt.has_bounds() {
         let error = too_few((seen.len() as f64 / effect) as u64);
         return Err(match error {
             LearnError::TooFew { found, needed, .. } if found >= needed => LearnError::Nowhere {
@@ -158,7 +158,7 @@ pub fn learn_bounds(
         Some(_) => libm::floor(rows.len() as f64 / learnt.effect()) as u64,
     };
 
-    let oblique = seen.iter().filter(|drawn| drawn.row.at[2] >= SQUARE_ON);
+    let oblique = seen.iter().filter(|drawn| drawn.row.at[2] >= HEAD_ON);
     let flips = oblique
         .clone()
         .filter(|drawn| {
@@ -220,8 +220,8 @@ fn samples(seen: &[Drawn], cells: &Cells, fitted: bool) -> Vec<Sample> {
         .collect()
 }
 
-/// Returns the design effect of runs, from the detections to which a coarse shape is fitted: the largest one of both
-/// errors, beyond their median and beyond the quantile.
+/// Returns the design effect of runs, from the detections to which a coarse shape is fitted: the largest design
+/// effect of both errors, beyond their median and beyond the quantile.
 fn design_effect(seen: &[Drawn], places: &[[f64; 3]], quantile: f64) -> f64 {
     let Some(cells) = Cells::over(places, (places.len() as f64 / COARSE).max(FULL)) else {
         return 1.0;
@@ -247,8 +247,8 @@ fn design_effect(seen: &[Drawn], places: &[[f64; 3]], quantile: f64) -> f64 {
     effect
 }
 
-/// Returns the shares of the errors for which shapes are fitted: the requested one, and, if there are enough independent rows,
-/// those with [`STEP`] times larger and smaller odds of an error beyond.
+/// Returns the shares of the errors for which shapes are fitted: the requested one, and, if there are enough
+/// independent rows, those with [`STEP`] times larger and smaller odds of an error beyond the shape.
 fn steps(quantile: f64, independent: f64) -> Vec<f64> {
     let odds = quantile / (1.0 - quantile);
     let share = |odds: f64| odds / (1.0 + odds);
@@ -259,8 +259,8 @@ fn steps(quantile: f64, independent: f64) -> Vec<f64> {
     std::vec![share(odds / STEP), quantile, wider]
 }
 
-/// Returns quantiles of one of the errors at the corners of the cells, with four digits, not falling with d, each above the
-/// one before. The quantiles ascend.
+/// Returns quantiles of one of the errors at the corners of the cells, with four digits. They ascend, do not decrease
+/// with d, and are above the quantile before.
 fn shapes(
     cells: &Cells,
     fitted: &[Sample],
@@ -278,8 +278,8 @@ fn shapes(
         .map(|sample| libm::log(sample.errors[which].max(LEAST_ERROR)))
         .collect();
     let folds = folds(fitted.iter().map(|sample| sample.run), in_runs);
-    // First fit the mean, for which many rows give information. Then fit the differences from quantile to quantile,
-    // for which fewer and fewer rows do.
+    // First fits the mean, for which many rows give information. Then fits the differences from quantile to quantile,
+    // for which fewer rows do.
     let mut values = fit(&lattice, Target::Mean, 0.0, &spots, &logs, &folds);
     let mut shapes: Vec<Vec<f64>> = Vec::new();
     let around = errors_around(lattice.len(), &spots, &logs);
@@ -330,7 +330,7 @@ fn shapes(
     shapes
 }
 
-/// Returns the fold of each row for cross-validation: rows that depend on each other are in the same one.
+/// Returns the fold of each row for cross-validation: dependent rows are in the same fold.
 fn folds(runs: impl Iterator<Item = u32>, in_runs: bool) -> Vec<usize> {
     runs.enumerate()
         .map(|(index, run)| if in_runs { run as usize } else { index })

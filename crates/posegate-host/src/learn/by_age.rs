@@ -1,4 +1,4 @@
-//! A learnt model as the controller has it: one factor, and smaller ones by the time since the last fix.
+//! A learnt model for the controller: one factor, and smaller ones by the time since the last fix.
 
 use super::InflationModel;
 use posegate::set::{Aging, Inflation, MOST_AGES};
@@ -42,9 +42,9 @@ impl InflationModel {
         self.condition().starts_with("since_") && self.condition().ends_with("_s")
     }
 
-    /// Returns the time since the last fix at which the data begin, seconds, if that is too late for steps: above 64 ms. A step has no lower
-    /// end, so its factor would apply to younger estimates too, of which the data tell nothing. `None` if the conditions are not times since
-    /// the last fix, or if there is only one.
+    /// Returns the time since the last fix at which the data begin, seconds, if that is too late for steps: above 64
+    /// ms. A step has no lower end, so its factor would apply to younger estimates too, which are not in the data.
+    /// `None` if the conditions are not times since the last fix, or if there is only one.
     #[must_use]
     pub fn begins_late(&self) -> Option<f64> {
         let youngest = self.parts().first()?.from;
@@ -52,11 +52,12 @@ impl InflationModel {
         is_late.then_some(youngest)
     }
 
-    /// Returns the factors for a controller. Each is at least that of [`InflationModel::inflation`] at every time since the last fix that
-    /// the data have, and none falls with the time. There are no steps if the conditions are not times since the last fix (a column
-    /// `since_..._s`), or if the data begin later than 64 ms after a fix ([`InflationModel::begins_late`]). Ages below the data are then at most
-    /// one unit of the controller, which does not tell them apart. Factors above 1023.98 have no step, since a step cannot state them. With
-    /// more conditions than steps, the one whose factor is nearest to that of the next is left out. `None` if a condition has no factor.
+    /// Returns the factors for a controller. Each is at least that of [`InflationModel::inflation`] at every time
+    /// since the last fix in the data, and the factors do not decrease with the time. There are no steps if the
+    /// conditions are not times since the last fix (a column `since_..._s`), or if the data begin later than 64 ms
+    /// after a fix ([`InflationModel::begins_late`]). The controller does not distinguish ages below the data, which
+    /// are at most one of its units. A factor above 1023.98 gets no step. If there are more conditions than steps,
+    /// the condition whose factor is nearest to the next one is removed. `None` if a condition has no factor.
     #[must_use]
     pub fn by_age(&self) -> Option<ByAge> {
         let largest = self.inflation(None)?;
@@ -66,10 +67,10 @@ impl InflationModel {
             let mut most = 1.0f64;
             for part in self.parts() {
                 most = most.max(part.inflation);
-                // On a border the next condition's factor counts too, so the step ends before it.
+                // At a border the next condition's factor also applies, so the step ends before it.
                 let units = libm::ceil(part.to * 1000.0 / UNIT_MS) - 1.0;
                 let factor = Inflation::new(most)?;
-                // Rounded up to 2^-6, it must be one that a step can have, and still be less than the source's own.
+                // Rounded up to 2^-6, the factor must fit a step and still be less than the source's own.
                 let rounded = factor.q16().div_ceil(1 << 10);
                 let is_smaller = rounded <= LARGEST && rounded << 10 < inflation.q16();
                 if !((1.0..65_536.0).contains(&units) && is_smaller) {
@@ -133,7 +134,7 @@ mod tests {
         learn_inflation(&estimates, &settings).unwrap()
     }
 
-    /// The factor of the controller at an age, from the words of the table.
+    /// The controller's factor at an age, from the words of the table.
     fn at(by_age: &ByAge, age_s: f64) -> f64 {
         let age_ms = libm::ceil(age_s * 1000.0);
         let mut steps = by_age.steps();
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_are_never_below_those_of_the_model() {
+    fn factors_are_at_least_those_of_the_model() {
         for conditions in [
             &[(0.1, 1.0), (5.0, 9.0)][..],
             &[(0.1, 9.0), (5.0, 1.0)],
@@ -172,7 +173,7 @@ mod tests {
             let model = model(conditions, "since_fix_s");
             let by_age = model.by_age().unwrap();
             let (first, last) = (conditions[0].0, conditions.last().unwrap().0);
-            // An age below one unit is not told apart from one unit.
+            // The controller does not distinguish an age below one unit from one unit.
             let unit = UNIT_MS / 1000.0;
             assert_eq!(model.parts()[0].from, first);
             let ages = (0..2000)
@@ -182,7 +183,7 @@ mod tests {
             let mut before = (0.0, 0.0);
             for age in ages.filter(|age| *age <= last).chain(borders) {
                 let used = at(&by_age, age);
-                // No row supports a smaller factor than the largest below the data.
+                // Below the data, no row supports a smaller factor than the largest one.
                 let learnt = match model.inflation(Some(age)) {
                     Some(learnt) => learnt,
                     None if first <= unit => at(&by_age, unit),
@@ -235,11 +236,11 @@ mod tests {
     }
 
     #[test]
-    fn a_fresh_estimate_has_a_smaller_factor() {
+    fn fresh_estimates_have_a_smaller_factor() {
         let by_age = model(&[(0.05, 1.0), (10.0, 9.0)], "since_fix_s").by_age();
         let by_age = by_age.unwrap();
         assert!(at(&by_age, 0.2) < 1.5 && at(&by_age, 9.0) > 8.0);
-        // The size of a covariance is no age.
+        // The size of a covariance is not an age.
         let by_size = model(&[(0.2, 1.0), (10.0, 9.0)], "log_det")
             .by_age()
             .unwrap();

@@ -12,12 +12,12 @@ use super::smooth::Lattice;
 use super::split::FITTED;
 use std::collections::BTreeSet;
 
-/// The wanted number of scores in a region is `SCORES` Q / (1 - Q): more make a bound tighter, fewer make it more
+/// The intended number of scores in a region is `SCORES` Q / (1 - Q): more make a bound tighter, fewer make it more
 /// local. `ENOUGH` is enough for any Q, unless it is below `HARDLY` Q / (1 - Q).
 const SCORES: f64 = 30.0;
 const ENOUGH: f64 = 900.0;
 const HARDLY: f64 = 6.0;
-/// With fewer scores than this, the confidence makes the bound much wider, whatever Q is.
+/// With fewer scores than this, the confidence makes the bound much wider, for any Q.
 const LEAST: f64 = 300.0;
 /// A cell is calibrated alone if the probability of so few hits is below this.
 const BY_CHANCE: f64 = 0.1;
@@ -110,8 +110,8 @@ impl<'a> Calibration<'a> {
         self.effect
     }
 
-    /// Returns `true` if any region has enough detections.
-    pub(super) fn says_something(&self) -> bool {
+    /// Returns `true` if any region has enough detections for a bound.
+    pub(super) fn has_bounds(&self) -> bool {
         self.of_cell.iter().any(|cell| cell.region.is_some())
     }
 
@@ -150,15 +150,14 @@ impl<'a> Calibration<'a> {
                 counts[number] += u64::from(self.of_cell[number].refused.is_none());
             }
         }
-        // Regions are chosen only by the places of the detections used for the fit, so they do not depend on the
-        // calibration data.
+        // Regions depend only on the places of the detections used for the fit, and not on the calibration data.
         let fewest = self.quantile / (1.0 - self.quantile);
         let scores = (SCORES * fewest)
             .min(ENOUGH.max(HARDLY * fewest))
             .max(LEAST);
-        let wanted = (effect * scores * FITTED / (1.0 - FITTED)).max(FEWEST) as u64;
-        let whole = [[0, coarse[0]], [0, coarse[1]], [0, coarse[2]]];
-        let boxes = divided(whole, coarse, &counts, wanted);
+        let needed = (effect * scores * FITTED / (1.0 - FITTED)).max(FEWEST) as u64;
+        let all = [[0, coarse[0]], [0, coarse[1]], [0, coarse[2]]];
+        let boxes = divided(all, coarse, &counts, needed);
 
         let mut scores = std::vec![Scores::default(); self.of_cell.len()];
         let lattice = Lattice::over(&self.cells.axes);
@@ -268,11 +267,11 @@ impl<'a> Calibration<'a> {
         let n = scores[0].len() as u64;
         let count = |scores: usize| libm::round(scores as f64 / effect) as u64;
         let contradicts = |which: usize| {
-            let held = scores[which]
+            let contained = scores[which]
                 .iter()
                 .filter(|score| **score <= of_region[which]);
             at_most(
-                count(held.count()),
+                count(contained.count()),
                 count(scores[which].len()),
                 self.quantile,
             ) < BY_CHANCE
@@ -333,7 +332,7 @@ fn divided(
     block: [[usize; 2]; 3],
     coarse: [usize; 3],
     counts: &[u64],
-    wanted: u64,
+    needed: u64,
 ) -> Vec<[[usize; 2]; 3]> {
     let rows = |block: [[usize; 2]; 3]| -> u64 {
         within(block)
@@ -355,10 +354,10 @@ fn divided(
             .map(cut)
             .max_by_key(|(low, high)| rows(*low).min(rows(*high)));
         if let Some((low, high)) = best
-            && rows(low).min(rows(high)) >= wanted
+            && rows(low).min(rows(high)) >= needed
         {
-            let mut blocks = divided(low, coarse, counts, wanted);
-            blocks.extend(divided(high, coarse, counts, wanted));
+            let mut blocks = divided(low, coarse, counts, needed);
+            blocks.extend(divided(high, coarse, counts, needed));
             return blocks;
         }
     }
@@ -367,20 +366,20 @@ fn divided(
 
 /// Returns the number of detections of each coarse cell, and the reason why it gets no bound.
 fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<String>)> {
-    let mut held: Vec<Vec<[f64; 3]>> = std::vec![Vec::new(); cells.each_coarse().count()];
+    let mut contained: Vec<Vec<[f64; 3]>> = std::vec![Vec::new(); cells.each_coarse().count()];
     for at in places {
         if let Some(cell) = cells.cell(*at) {
-            held[cells.number(cells.coarse_of(cell))].push(*at);
+            contained[cells.number(cells.coarse_of(cell))].push(*at);
         }
     }
     cells
         .each_coarse()
-        .zip(&held)
+        .zip(&contained)
         .map(|(coarse, places)| {
             let why = if (places.len() as f64) < fewest {
                 Some("too few detections")
             } else {
-                hollow(cells, coarse, places)
+                emptiness(cells, coarse, places)
             };
             (places.len() as u64, why.map(Into::into))
         })
@@ -388,11 +387,11 @@ fn support(cells: &Cells, places: &[[f64; 3]], fewest: f64) -> Vec<(u64, Option<
 }
 
 /// Returns the reason why the detections do not fill a coarse cell.
-fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'static str> {
+fn emptiness(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'static str> {
     const HARDLY_ONE: Option<&str> = Some("a part of it has hardly a detection");
     let n = places.len();
     let ends = cells.ends(coarse);
-    // Along an axis on which the cell holds about one number there is nothing to fill.
+    // Along an axis on which the cell contains about one number there is nothing to fill.
     let wide: Vec<usize> = (0..3).filter(|axis| !narrow(*axis, ends[*axis])).collect();
     let share = |axis: usize, at: f64| (at - ends[axis][0]) / (ends[axis][1] - ends[axis][0]);
     let part =
@@ -431,7 +430,7 @@ fn hollow(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&'st
             return Some("there is a gap in its detections");
         }
     }
-    // Boxes in each pair of d, phi and psi, so large that random places rarely leave one empty.
+    // Boxes in each pair of d, phi and psi, so large that random places rarely leave a box empty.
     let of = (libm::sqrt(n as f64 / FEWEST) as usize).min(BOXES);
     for (first, second) in [(0, 1), (0, 2), (1, 2)] {
         if !wide.contains(&first) || !wide.contains(&second) {

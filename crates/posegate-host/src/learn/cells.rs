@@ -36,7 +36,7 @@ impl Cells {
         })
     }
 
-    /// Returns the cells of a file; `None` if the edges do not ascend or do not form whole coarse cells.
+    /// Returns the cells of a file; `None` if the edges do not ascend or do not form complete coarse cells.
     pub(super) fn of(edges: &Edges, parts: [usize; 3]) -> Option<Self> {
         if parts.contains(&0) {
             return None;

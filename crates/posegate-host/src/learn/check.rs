@@ -1,4 +1,4 @@
-//! Tests whether a learnt error model still holds on new data, by bets that may be evaluated after every row.
+//! Tests whether a learnt error model is valid on new data, by bets that may be evaluated after every row.
 
 use super::LearnError;
 use super::detections::Detections;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// The settings of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckSettings {
-    /// A model that holds is ever contradicted with a probability of at most 1 - `confidence`, whatever the number of rows;
+    /// The probability that a valid model is ever contradicted is at most 1 - `confidence`, for any number of rows;
     /// above 0 and below 1.
     pub confidence: f64,
 }
@@ -20,7 +20,7 @@ impl Default for CheckSettings {
     }
 }
 
-/// A row with errors: its number from 1, its region, where it was taken, its errors, and their bounds.
+/// A row with errors: its number from 1, its region, its d, phi and psi, its errors, and their bounds.
 type RowErrors = (u64, usize, [f64; 3], [f64; 2], [f64; 2]);
 
 /// The kind of change that explains the errors since a change best.
@@ -37,7 +37,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// Returns its name: `scale`, `offset` or `calibration`.
+    /// Returns the change's name: `scale`, `offset` or `calibration`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -94,7 +94,7 @@ pub struct DetectionCheck {
 /// The result of a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckReport {
-    /// The number of rows after which the model was contradicted; `None` if it holds.
+    /// The number of rows after which the model was contradicted; `None` if it was not.
     pub after_rows: Option<u64>,
     /// New rows.
     pub rows: u64,
@@ -110,21 +110,21 @@ pub struct CheckReport {
     pub detection: DetectionCheck,
 }
 
-/// The shares of the wealth that bets stake. The best stake against a share p where m is allowed is (p - m) / (1 - m)
-/// (Kelly): small ones find a bound at 0.99 that holds for 0.985.
+/// The shares of the wealth that bets stake. The best stake against a share p, if m is allowed, is (p - m) / (1 - m)
+/// (Kelly): small stakes find a bound at 0.99 that is valid for 0.985.
 const STAKES: [f64; 9] = [0.004, 0.01, 0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 0.85];
 /// The stake of the sum whose minimum dates a change.
 const DATED: f64 = 0.35;
-/// The share of the false alarms that is for detection: one half for the limits of the shares, one for the bet.
+/// The share of the false alarms for detection: one half for the limits of the shares, one half for the bet.
 const FOR_DETECTION: f64 = 0.25;
-/// The share of the bounds' false alarms that is for all regions together.
+/// The share of the bounds' false alarms for all regions together.
 const FOR_OVERALL: f64 = 0.5;
 
-/// Another change than one of scale has a spread that is smaller by this factor.
+/// A change of another kind than scale must have a spread that is smaller by this factor.
 const CLEARLY: f64 = 0.85;
 
-/// A bet against "a share of at most m is missed". It starts at 1. It is a mean over stakes and over the row at which it
-/// starts: without a change long before, a late change is found nearly as early as one at the start.
+/// A bet against "a share of at most m is missed". It starts at 1. It is a mean over stakes and over the row at which
+/// it starts: a late change is found nearly as early as a change at the start.
 #[derive(Clone, Debug)]
 struct Bet {
     wealth: [f64; STAKES.len()],
@@ -149,8 +149,8 @@ impl Default for Bet {
 }
 
 impl Bet {
-    /// Bets on a share `missed`, of which at most `allowed` is expected; returns the value of the bet. `first` is the row
-    /// of the first of them.
+    /// Bets on a share `missed`, of which at most `allowed` is expected; returns the value of the bet. `first` is the
+    /// first row of this step.
     fn step(&mut self, missed: f64, allowed: f64, first: u64) -> f64 {
         // At step k, the part 1 / (k + 1) (k + 2) of the wealth that has not been staked starts to be staked.
         let start = 1.0 / ((self.steps + 1.0) * (self.steps + 2.0));
@@ -205,8 +205,9 @@ impl Default for BoundBet {
 }
 
 impl BoundBet {
-    /// The smaller one of two bets: valid if the model's bounds hold for the stated share, and also if the new rows are
-    /// distributed like those of the calibration, whose bounds hold for the stated share only with some confidence.
+    /// The smaller one of two bets. It is valid if the model's bounds are valid for the stated share. It is also
+    /// valid if the new rows are distributed like the calibration data, for which the stated share is reached only
+    /// with some confidence.
     fn step(&mut self, missed: f64, allowed: [f64; 2], rows: [u64; 2], weight: f64, limit: f64) {
         let stated = self.stated.step(missed, allowed[0], rows[0]);
         let calibrated = self.calibrated.step(missed, allowed[1], rows[0]);
@@ -231,13 +232,13 @@ impl BoundBet {
     }
 }
 
-/// The misses that a region's calibration leads to expect: those of a Polya urn, which is exact for the next row if it is
-/// exchangeable with the calibration data and the rows before.
+/// The expected misses according to a region's calibration: those of a Polya urn, which is exact for the next row if
+/// it is exchangeable with the calibration data and the rows before.
 #[derive(Clone, Copy, Debug)]
 struct Urn {
     missed: f64,
     all: f64,
-    /// Each row counts as one over this.
+    /// Each row counts as 1 / `effect`.
     effect: f64,
 }
 
@@ -270,13 +271,13 @@ struct View {
     least: f64,
 }
 
-/// Tests whether a model's bounds, and its shares of detected views, hold on new rows. Each row is a bet, in the order of
-/// time if the rows have times, else of the file. Of runs, each run is one bet, at its last row; of rows at video rate
-/// without names of runs, rows are used that are as far apart as runs would be.
+/// Tests whether a model's bounds, and its shares of detected views, are valid on new rows. Each row is a bet, in the
+/// order of time if the rows have times, else of the file. With runs, each run is one bet, at its last row. Rows at
+/// video rate without names of runs are thinned to the distance between runs.
 ///
 /// # Errors
-/// [`LearnError::Share`] if the confidence is not in (0, 1); [`LearnError::Poses`] if the rows have the errors of one pose and the
-/// model those of the better one of two, or the other way round.
+/// [`LearnError::Share`] if the confidence is not in (0, 1); [`LearnError::Poses`] if the rows have the errors of one
+/// pose and the model those of the better one of two, or vice versa.
 pub fn check_bounds(
     model: &ErrorModel,
     new: &Detections,
@@ -352,7 +353,7 @@ pub fn check_bounds(
         }
     }
 
-    // Counts are those of all rows, also of those that were not bet on.
+    // Counts include rows without a bet.
     let (mut without_bounds, mut all) = (0, 0);
     let mut errors: Vec<RowErrors> = Vec::new();
     for (index, row) in order.iter().map(|row| new.rows[*row]).enumerate() {
@@ -462,8 +463,8 @@ fn order(new: &Detections) -> Vec<usize> {
     order
 }
 
-/// Returns the bets, in the order of their last rows. `alpha` is the probability with which any limit of a share of
-/// detected views may be wrong.
+/// Returns the bets, in the order of their last rows. `alpha` is the probability that any limit of a share of
+/// detected views is wrong.
 fn batches(model: &ErrorModel, new: &Detections, order: &[usize], alpha: f64) -> Vec<Batch> {
     let limits = model.detection_limits(alpha);
     let mut batches: Vec<Batch> = Vec::new();
@@ -517,8 +518,9 @@ fn batches(model: &ErrorModel, new: &Detections, order: &[usize], alpha: f64) ->
     batches
 }
 
-/// Returns the kind of change whose errors vary least around it: errors in proportion to their bounds, to the distance, or
-/// constant. In a narrow region all three are similar; then it is a scale. Of each row: the distance, the error, the bound.
+/// Returns the kind of change whose errors vary least around it: errors in proportion to their bounds, to the
+/// distance, or constant. In a narrow region all three are similar; then the result is a scale. Each row has the
+/// distance, the error and the bound.
 fn change(rows: &[(f64, f64, f64)], which: usize) -> Option<Change> {
     let spread = |of: &dyn Fn(f64, f64) -> f64| -> Option<f64> {
         let mut logs: Vec<f64> = rows
@@ -577,11 +579,11 @@ mod tests {
         high
     }
 
-    /// At most 5 % of the bets ever reach 20 if the misses are exactly as frequent as allowed; 17 of 200 would be 2.3 sigma
-    /// more. ln 20 is 3.0; a bet that does not know the new share, nor when it began, takes 4 more, and chance takes or
-    /// gives 5: with 15 nats nearly all bets win.
+    /// At most 5 % of the bets ever reach 20 if the misses are exactly as frequent as allowed; 17 of 200 would be 2.3
+    /// sigma more. ln 20 is 3.0. A bet without the new share and the time of the change needs 4 more, and chance
+    /// changes this by 5: with 15 nats nearly all bets win.
     #[test]
-    fn bets_that_are_fair_rarely_win() {
+    fn fair_bets_rarely_win() {
         for allowed in [0.01, 0.1, 0.5] {
             let wins = (0..200).filter(|seed| most(*seed, allowed, allowed) >= 20.0);
             let wins = wins.count();
@@ -593,9 +595,9 @@ mod tests {
         }
     }
 
-    /// The share of an urn is that of a rank among exchangeable numbers.
+    /// The share of an urn equals that of a rank among exchangeable numbers.
     #[test]
-    fn urns_are_those_of_ranks() {
+    fn urn_share_equals_that_of_a_rank() {
         // The 9th smallest of 9 is exceeded by a tenth number with probability 1/10, then by an eleventh with 2/11.
         let mut urn = Urn {
             missed: 9.0 + 1.0 - 9.0,
@@ -608,7 +610,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_are_told_by_what_varies_least() {
+    fn kind_of_change_is_the_one_that_varies_least() {
         let noise = |k: u32| 0.8 + 0.05 * f64::from(k % 9);
         let rows = |of: &dyn Fn(f64, f64) -> f64| -> Vec<(f64, f64, f64)> {
             (0..90)

@@ -22,10 +22,10 @@ const PLACE: [&str; 3] = ["d_m", "phi_deg", "psi_deg"];
 /// One view of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// d in metres, above 0; phi and psi in degrees, 0 to 180: computed from the truth.
+    /// d in metres, above 0; phi and psi in degrees, 0 to 180; computed from the truth.
     pub at: [f64; 3],
     /// The magnitudes of the errors of the position, metres, and of the yaw, radians; `None` if the tag was
-    /// not detected. Of two poses, those of the pose whose yaw errs less.
+    /// not detected. If the detector gave two poses: those of the pose with the smaller yaw error.
     pub errors: Option<[f64; 2]>,
 }
 
@@ -34,13 +34,13 @@ pub struct Detection {
 pub struct Detections {
     /// The rows in the file's order.
     pub rows: Vec<Detection>,
-    /// Which rows depend on each other.
+    /// The runs: rows of one run depend on each other.
     pub runs: Runs,
     /// The times of the rows, seconds; empty if the file has none.
     pub times: Vec<f64>,
     /// SHA-256 of the file.
     pub sha256: [u8; 32],
-    /// The number of rows in the file if only some of them were drawn.
+    /// The number of rows in the file if only some rows were drawn; else `None`.
     pub drawn_of: Option<u64>,
     /// `true` if the errors are those of the better one of both poses that a detector gives of a tag.
     pub of_better_pose: bool,
@@ -50,13 +50,13 @@ pub struct Detections {
 pub const DRAWN: usize = 200_000;
 
 impl Detections {
-    /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty if
-    /// `detected` is 0. Rows with the same text in the column `run` depend on each other. Without that column, rows that
-    /// follow each other at video rate by `t_s` (seconds) are cut into runs at gaps ([`Runs::of_times`]).
+    /// Reads `d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad`; the errors are empty if `detected` is
+    /// 0. Rows with the same text in the column `run` depend on each other. Without that column, consecutive rows at
+    /// video rate by `t_s` (seconds) are split into runs at gaps ([`Runs::of_times`]).
     ///
-    /// The columns `second_err_translation_m, second_err_yaw_rad` are the errors of the second pose that fits a tag's image, empty
-    /// if the detector gave one pose. Then a row has the errors of the pose whose yaw errs less: bounds hold for that one, for a gate
-    /// that takes both poses as hypotheses.
+    /// The columns `second_err_translation_m, second_err_yaw_rad` are the errors of the second pose that fits a tag's
+    /// image, empty if the detector gave one pose. A row then has the errors of the pose with the smaller yaw error.
+    /// The bounds are valid for that pose, in a gate that uses both poses as hypotheses.
     ///
     /// # Errors
     /// The first invalid field, with its line and column; a file without rows.
@@ -64,10 +64,10 @@ impl Detections {
         Self::drawn(bytes, file, usize::MAX, 0)
     }
 
-    /// Reads as [`Detections::read`], from a file of any length, which is read once. Of more than [`DRAWN`] rows without `run`
-    /// and `t_s`, as many are drawn at random, by their positions in the file and the seed: memory does not grow with the file.
-    /// The guarantees are those for the drawn rows. Every row of the file is checked. Rows with `run` or `t_s` are all kept, so
-    /// such a file may have 256 MiB.
+    /// Reads like [`Detections::read`], from a file of any length, which is read once. If there are more than
+    /// [`DRAWN`] rows without `run` and `t_s`, this number is drawn at random, by their positions in the file and the
+    /// seed: memory does not grow with the file. The guarantees are those for the drawn rows. Every row of the file
+    /// is checked. All rows with `run` or `t_s` are kept, so such a file may have 256 MiB.
     ///
     /// # Errors
     /// As [`Detections::read`]; a line of more than a MiB; a file with `run` or `t_s` that is too long.
@@ -86,7 +86,7 @@ impl Detections {
             [Some(translation), Some(yaw)] => Some([translation, yaw]),
             [None, None] => None,
             [first, _] => {
-                // The other one is missing.
+                // The other column is missing.
                 let missing = SECOND[usize::from(first.is_some())];
                 return Err(sheet.needed(missing, &SECOND).map_or_else(
                     |error| error,
@@ -223,7 +223,8 @@ mod tests {
         assert_eq!(found.rows[1].errors, None);
     }
 
-    /// A row in the file's middle that is not drawn is checked all the same, and the digest is that of the whole file.
+    /// A row in the middle of the file that is not drawn is also checked, and the digest is that of the complete
+    /// file.
     #[test]
     fn long_files_are_drawn_from_and_checked() {
         let row = |k: u32| format!("{},2,3,1,0.1,0.2\n", 1 + k);
@@ -232,14 +233,14 @@ mod tests {
         let drawn = |text: &str| Detections::drawn(text.as_bytes(), "d.csv", 100, 1);
         let found = drawn(&text).unwrap();
         assert_eq!((found.rows.len(), found.drawn_of), (100, Some(1000)));
-        let whole = read(&text).unwrap();
-        assert_eq!((found.sha256, whole.drawn_of), (whole.sha256, None));
+        let complete = read(&text).unwrap();
+        assert_eq!((found.sha256, complete.drawn_of), (complete.sha256, None));
         let kept = |k: u32| found.rows.iter().any(|row| row.at[0] == f64::from(1 + k));
         let dropped = (500..1000).find(|k| !kept(*k)).unwrap();
         let error = drawn(&text.replace(&row(dropped), "nan,2,3,1,0.1,0.2\n")).unwrap_err();
         let place = format!("d.csv:{}:1: `nan`", dropped + 2);
         assert!(error.to_string().starts_with(&place), "{error}");
-        // Rows that depend on each other are all kept: a run is not thinned out.
+        // All dependent rows are kept: a run is not thinned.
         let runs = text
             .replace("rad\n", "rad,run\n")
             .replace("0.2\n", "0.2,a\n");
@@ -247,7 +248,7 @@ mod tests {
         assert_eq!((found.rows.len(), found.drawn_of), (1000, None));
     }
 
-    /// Spaces around fields and a byte-order mark are not part of them.
+    /// Spaces around fields and a byte order mark are ignored.
     #[test]
     fn fields_are_trimmed() {
         let header = HEADER.replace(',', " , ");
@@ -259,9 +260,9 @@ mod tests {
         assert_eq!(found.rows[1].errors, None);
     }
 
-    /// The errors of the better pose count, both of one pose.
+    /// Both errors are those of the better pose.
     #[test]
-    fn of_two_poses_the_better_one_counts() {
+    fn errors_are_those_of_the_better_pose() {
         let header = HEADER.replace("rad\n", "rad,second_err_translation_m,second_err_yaw_rad\n");
         let found = read(&format!(
             "{header}1,2,3,1,0.1,0.2,0.3,-0.1\n1,2,3,1,0.1,0.2,0.05,0.4\n1,2,3,1,0.1,0.2,,\n1,2,3,0,,,,\n"
@@ -300,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_rows_are_named_with_their_place() {
+    fn errors_state_file_line_and_column() {
         let good = "1,2,3,1,0.1,0.2\n";
         for (row, place) in [
             ("nan,2,3,1,0.1,0.2\n", "d.csv:3:1: `nan` in `d_m`"),

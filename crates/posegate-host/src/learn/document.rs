@@ -25,7 +25,7 @@ pub(super) struct Document {
     /// The numbers of fine cells of a coarse one along d, phi and psi; 2, 1 and 2 if missing. `p_detect` always has those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parts: Option<[usize; 3]>,
-    /// What the detections were taken with; `None` if it was not stated.
+    /// The camera and the tags of the detections; `None` if they were not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken_with: Option<super::TakenWith>,
     pub data: Data,
@@ -57,7 +57,7 @@ pub(super) struct Data {
     pub fitted: u64,
     /// Detections on which the regions were calibrated.
     pub calibrated: u64,
-    /// Detections with psi of 10 degrees or more whose yaw errs by more than psi: flips.
+    /// Detections with psi of 10 degrees or more whose yaw error is larger than psi: flips.
     pub flips: u64,
     /// Their share of the detections with psi of 10 degrees or more.
     pub flip_share: f64,
@@ -102,7 +102,7 @@ pub(super) struct Region {
     pub independent: Option<u64>,
     /// The rank, from the smallest, of the score used as the factor; 0 if there are too few.
     pub rank: u64,
-    /// The step of the translation's bounds between `narrower` and `wider`, or the factor of a shape alone.
+    /// The step of the translation's bounds between `narrower` and `wider`, or the factor of a single shape.
     pub translation: f64,
     /// The same for the yaw.
     pub yaw: f64,
@@ -120,7 +120,7 @@ pub(super) struct Cell {
     /// The index of its region, from 0; `None` if the cell has no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<usize>,
-    /// Its own steps or factors if they are larger than the region's.
+    /// The cell's own steps or factors if they are larger than the region's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<[f64; 2]>,
     /// The reason why it has no bound.

@@ -1,4 +1,4 @@
-//! Reading a long file once: its digest, and a random choice of its rows in bounded memory.
+//! Reads a long file once: computes its digest and draws a random choice of its rows in bounded memory.
 
 use super::Detection;
 use super::split::mixed;
@@ -7,10 +7,10 @@ use std::io::{self, Read};
 
 /// The longest line, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
-/// Parts the draw of a row from other uses of the seed.
+/// Separates the draw of rows from other uses of the seed.
 const PURPOSE: u64 = 0x6472_6177_6e20_6f66;
 
-/// A reader that computes the digest of what passes, and fails at a line that does not end.
+/// A reader that computes the digest of its input, and fails at a line without an end.
 pub(super) struct Digesting<R> {
     inner: R,
     digest: Sha256,
@@ -27,7 +27,7 @@ impl<R: Read> Digesting<R> {
         }
     }
 
-    /// Returns the digest of all that was read.
+    /// Returns the digest of the complete input.
     pub(super) fn sha256(self) -> [u8; 32] {
         self.digest.finalize().into()
     }
@@ -52,7 +52,8 @@ impl<R: Read> Read for Digesting<R> {
     }
 }
 
-/// The rows of a file, or as many of them as are allowed, chosen at random by their positions: each choice is equally likely.
+/// The rows of a file, or a random choice of the allowed number of them by their positions: each choice is equally
+/// likely.
 pub(super) struct Kept {
     most: usize,
     seed: u64,
@@ -144,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn few_rows_are_all_kept() {
+    fn few_rows_are_kept_completely() {
         for count in [0, 1, 99, 100] {
             let (rows, of) = drawn_of(count, 100, 1);
             assert_eq!((rows.len() as u32, of), (count, None));
@@ -169,12 +170,12 @@ mod tests {
             .iter()
             .filter(|row| known.contains(&row.at[0].to_bits()));
         assert!((170..340).contains(&both.count()));
-        // One row too many already drops one.
+        // One extra row already drops one.
         assert_eq!(drawn_of(101, 100, 1).0.len(), 100);
     }
 
     #[test]
-    fn endless_lines_fail() {
+    fn line_without_an_end_is_an_error() {
         let mut reader = Digesting::new(io::repeat(0));
         assert!(io::copy(&mut reader, &mut io::sink()).is_err());
         let mut reader = Digesting::new(b"abc".as_slice());

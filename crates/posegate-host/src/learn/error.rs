@@ -1,6 +1,6 @@
 //! Errors of learning and of models.
 
-/// The reason why nothing was learnt, or why a model cannot be used.
+/// The reason why learning failed or a model cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
@@ -16,7 +16,7 @@ pub enum LearnError {
         /// The fault and the expected value.
         what: String,
     },
-    /// What the detections were taken with is impossible.
+    /// The description of the camera and the tags is impossible.
     #[error("what the detections were taken with: {what}")]
     TakenWith {
         /// The fault.
@@ -48,7 +48,7 @@ pub enum LearnError {
         /// The smallest sufficient number.
         needed: u64,
     },
-    /// Too few robots (or runs) for a factor that holds for a new one.
+    /// There are too few robots (or runs) for a factor that is valid for a new one.
     #[error(
         "{found} groups in the column `{of}` are too few for a factor that holds for a new {of} with confidence {confidence}: {needed} are needed, with {rows} rows each"
     )]
@@ -77,25 +77,25 @@ pub enum LearnError {
     Share {
         /// The setting's name.
         name: &'static str,
-        /// Its value.
+        /// The setting's value.
         value: f64,
     },
     /// A model file whose parts do not match.
-    #[error("{file}: no model: {what}")]
+    #[error("{file}: not a model: {what}")]
     Model {
         /// The file.
         file: String,
         /// The mismatch.
         what: String,
     },
-    /// Bounds for the better one of two poses, and rows of one pose, or the other way round.
+    /// The bounds are for the better one of two poses and the rows have one pose, or vice versa.
     #[error(
         "the model's bounds hold for {model}, and the rows have the errors of {rows}: give rows with `second_err_translation_m` and `second_err_yaw_rad` exactly if the model was learnt with them"
     )]
     Poses {
-        /// What the model was learnt with.
+        /// The kind of poses in the model.
         model: &'static str,
-        /// What the rows have.
+        /// The kind of poses in the rows.
         rows: &'static str,
     },
     /// A model that could not be written.

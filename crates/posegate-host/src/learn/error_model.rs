@@ -18,7 +18,7 @@ pub struct ErrorModel {
     /// The logarithms of the two bounds at the corners of each fine cell; `None` for a cell without bounds.
     bounds: Vec<Option<[[f64; 8]; 2]>>,
     views: Option<(Cells, Vec<f64>)>,
-    /// For tags of another size than those of the data.
+    /// `true` if the model was scaled to tags of another size than those of the data.
     is_scaled: bool,
 }
 
@@ -66,13 +66,13 @@ impl ErrorModel {
         Self::new(document, file)
     }
 
-    /// Returns what the detections were taken with, if the model states it.
+    /// Returns the camera and the tags of the detections, if the model states them.
     #[must_use]
     pub const fn taken_with(&self) -> Option<&super::TakenWith> {
         self.document.taken_with.as_ref()
     }
 
-    /// Returns the text of its file.
+    /// Returns the text of the model's file.
     ///
     /// # Errors
     /// [`LearnError::Unwritten`] for a model that was scaled to other tags. It does not happen for a model that was learnt
@@ -92,7 +92,7 @@ impl ErrorModel {
             what: what.to_owned(),
         };
         if document.posegate_model != document::VERSION || document.kind != "bounds" {
-            return Err(wrong("it is no error model of version 1"));
+            return Err(wrong("it is not an error model of version 1"));
         }
         if let Some(what) = document
             .taken_with
@@ -137,27 +137,27 @@ impl ErrorModel {
         })
     }
 
-    /// Returns the share Q of the detections for which each of the two bounds holds.
+    /// Returns the share Q of the detections for which each of the two bounds is valid.
     #[must_use]
     pub fn quantile(&self) -> f64 {
         self.document.quantile
     }
 
-    /// Returns the share of the detections for which both bounds hold, however they depend on each other:
-    /// `2 Q - 1`, at least 0.
+    /// Returns the share of the detections for which both bounds are valid, for any dependence between them: `2 Q -
+    /// 1`, at least 0.
     #[must_use]
     pub fn coverage(&self) -> f64 {
         (2.0 * self.document.quantile - 1.0).max(0.0)
     }
 
-    /// Returns bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None`
-    /// where the model has no bounds. On the border between cells, the larger bounds. Takes some 150 ns.
+    /// Returns bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None` if
+    /// the model has no bounds there. On the border between cells, the larger bounds. Takes some 150 ns.
     #[must_use]
     pub fn bounds(&self, d: f64, phi: f64, psi: f64) -> Option<(f64, f64)> {
         self.bounds_deg([d, phi.to_degrees(), psi.to_degrees()])
     }
 
-    /// Returns the same with angles in degrees.
+    /// Like [`ErrorModel::bounds`], with angles in degrees: metres and radians.
     #[must_use]
     pub fn bounds_deg(&self, at: [f64; 3]) -> Option<(f64, f64)> {
         let axes = &self.cells.axes;
@@ -246,8 +246,8 @@ impl ErrorModel {
         (data.views, data.detections, data.flip_share)
     }
 
-    /// Returns `true` if the bounds hold for the better one of the two poses that fit a tag's image, not for one that a detector
-    /// chose: for a gate that takes both as hypotheses.
+    /// Returns `true` if the bounds are for the better one of the two poses that fit a tag's image, instead of the
+    /// pose that a detector chose. Such bounds are for a gate that uses both poses as hypotheses.
     #[must_use]
     pub fn is_of_better_pose(&self) -> bool {
         self.document.data.of_better_pose
@@ -272,7 +272,7 @@ impl ErrorModel {
         self.document.data.runs
     }
 
-    /// Returns its regions.
+    /// Returns the regions.
     pub fn regions(&self) -> impl Iterator<Item = RegionReport> {
         self.document.region.iter().map(|region| RegionReport {
             ends: [region.d_m, region.phi_deg, region.psi_deg],
@@ -402,8 +402,8 @@ fn steps(
     Ok(steps)
 }
 
-/// Returns the logarithms of the bounds at each fine cell's corners: shape times factor, never falling with
-/// distance at the same angles.
+/// Returns the logarithms of the bounds at each fine cell's corners: shape times factor, not decreasing with distance
+/// at the same angles.
 fn bounds(
     cells: &Cells,
     families: &[Family; 2],

@@ -47,7 +47,7 @@ pub struct ScoredEstimates {
     pub condition: String,
     /// `true` if the file has times, `t_s`.
     pub timed: bool,
-    /// The names in the column `robot`, or else in `run`: what differs as a whole. Empty without such a column.
+    /// The names in the column `robot`, or else in `run`. Empty without such a column.
     pub groups: Vec<String>,
     /// The column of the groups.
     pub grouped_by: &'static str,
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_are_mahalanobis() {
+    fn squared_distance_is_the_mahalanobis_distance() {
         let found = read(&format!(
             "robot,{HEADER}a,1,1,2,3.1,4,0,0,1,0,0.01,0,0,-3.1,0.5\na,2,0,0,0,1,2,0,1,0,1,0,0,0,1\nb,1,0,0,0,1,0,0,1,0,1,0,0,0,2\n"
         ))
@@ -262,9 +262,9 @@ mod tests {
         assert_eq!(found.condition, "since_fix_s");
     }
 
-    /// Interleaved sources are a run each, whatever the order of the rows.
+    /// Each interleaved source is a run, in any order of the rows.
     #[test]
-    fn runs_are_sources_in_the_order_of_time() {
+    fn each_source_is_a_run_in_order_of_time() {
         let row = |source: &str, t: u32| format!("{source},{t},0,0,0,1,0,0,1,0,1,0,0,0,{t}\n");
         let rows = [("b", 2), ("a", 1), ("b", 1), ("a", 3), ("a", 2)];
         let text: String = rows.iter().map(|(source, t)| row(source, *t)).collect();
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_rows_are_named_with_their_place() {
+    fn errors_state_file_line_and_column() {
         let error = read(&format!("{HEADER}1,1,2,3.1,4,0,0,1,0,nan,0,0,0,0.5\n")).unwrap_err();
         assert!(
             error.starts_with("e.csv:2:10: `nan` in `cov_yawyaw`"),

@@ -1,14 +1,14 @@
-//! Nested bounds: shapes for a smaller, the requested and a larger share of the errors, and all bounds between and beyond
-//! them. Where tags flip, errors that are twice as rare are hardly larger; elsewhere they may be several times as large. A
-//! common factor for both would be too large for one of them.
+//! Nested bounds: shapes for a smaller, the requested and a larger share of the errors, and all bounds between and
+//! beyond them. At places where tags flip, errors that are half as frequent are hardly larger; elsewhere they may be
+//! several times as large. A common factor for both would be too large for one of them.
 
 use super::smooth::InterpolationWeights;
 
-/// The smallest ratio of a shape to the one before. It keeps a step's rounding larger than the errors of logarithms.
+/// The smallest ratio of a shape to the one before. With it the rounding of a step exceeds the errors of logarithms.
 pub(super) const LEAST_RATIO: f64 = 1.002;
 
-/// Bounds by a *step*: at step i they are the i-th shape; between two shapes their logarithms are linear in the step; each
-/// further step beyond the last shape doubles it, each step below the first one halves it.
+/// Bounds by a *step*: at step i they are the i-th shape, and between two shapes their logarithms are linear in the
+/// step. Each further step beyond the last shape doubles it; each step below the first one halves it.
 #[derive(Clone, Debug)]
 pub(super) struct Family {
     /// The logarithms of the shapes at the corners: at least one shape, each above the one before.
@@ -16,8 +16,8 @@ pub(super) struct Family {
 }
 
 impl Family {
-    /// Returns `None` unless there is a shape, all have equally many corners, and at each of them a shape is at least nearly
-    /// [`LEAST_RATIO`] times the one before.
+    /// Returns `None` unless there is a shape, all shapes have equally many corners, and at each corner a shape is at
+    /// least nearly [`LEAST_RATIO`] times the one before.
     pub(super) fn new(shapes: &[Vec<f64>]) -> Option<Self> {
         let logs: Vec<Vec<f64>> = shapes
             .iter()
@@ -32,7 +32,7 @@ impl Family {
         (finite && logs.windows(2).all(ascends)).then_some(Self { logs })
     }
 
-    /// Returns the step of a file's number, which for a single shape is a factor; `None` if it is impossible.
+    /// Converts a number of a file to a step; for a single shape the number is a factor. `None` if it is impossible.
     pub(super) fn step_of(&self, number: f64) -> Option<f64> {
         let step = match self.logs.len() {
             1 => libm::log2(number),
@@ -41,8 +41,8 @@ impl Family {
         step.is_finite().then_some(step)
     }
 
-    /// Returns the score of an error, given by its logarithm: the smallest step, or for a single shape the smallest factor,
-    /// with which the bound at a place is at least the error.
+    /// Returns the score of an error, given by its logarithm: the smallest step (for a single shape the smallest
+    /// factor) with which the bound at a place is at least the error.
     pub(super) fn score(&self, spot: &InterpolationWeights, log_error: f64) -> f64 {
         match self.logs.as_slice() {
             [shape] => libm::exp(log_error - spot.value(shape)),
@@ -92,7 +92,7 @@ mod tests {
         Lattice::over(&[axis(), axis(), axis()])
     }
 
-    /// Three shapes with other ratios at each of eight corners.
+    /// Three shapes with different ratios at each of eight corners.
     fn family() -> Family {
         let corner = |k: u32| 0.01 * f64::from(1 + k);
         let of = |by: fn(u32) -> f64| (0..8).map(|k| corner(k) * by(k)).collect();

@@ -13,7 +13,7 @@ pub(super) fn fisher_quantile(p: f64, a: f64, b: f64) -> f64 {
             high = middle;
         }
     }
-    // The smaller y is the larger f.
+    // A smaller y is a larger f.
     b / a * (1.0 - low) / low.max(1e-300)
 }
 
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_those_of_tables() {
+    fn quantiles_equal_published_ones() {
         for (p, a, b, expected) in [
             (0.95, 3.0, 10.0, 3.708_26),
             (0.99, 3.0, 10.0, 6.552_31),

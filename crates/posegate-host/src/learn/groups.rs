@@ -1,4 +1,5 @@
-//! Factors for a new robot: what robots (or runs) that differ as a whole need, and the largest that a new one will need.
+//! Factors for a new robot: the factors that robots (or runs) with systematic differences need, and the largest that
+//! a new one will need.
 
 use super::binomial::{conformal_rank, order_statistic};
 use serde::{Deserialize, Serialize};
@@ -27,17 +28,17 @@ pub(super) fn needed(confidence: f64) -> u64 {
         .unwrap_or(fewest + 1)
 }
 
-/// Returns the factor that a group needs: the score of rank ceil((n + 1) epsilon) of its n, infinite if it has too few.
-/// The same rank is taken of every group, so the factors of groups that differ by chance alone are exchangeable.
+/// Returns the factor that a group needs: the score of rank ceil((n + 1) epsilon) of its n, infinite if it has too
+/// few scores. All groups use the same rank, so the factors of groups that differ only by chance are exchangeable.
 pub(super) fn own_factor(scores: &[f64], epsilon: f64) -> f64 {
     conformal_rank(scores.len() as u64, epsilon)
         .and_then(|rank| order_statistic(scores, rank))
         .unwrap_or(f64::INFINITY)
 }
 
-/// Returns the factor that a new group needs at most, with a confidence: the one of rank ceil((G + 1) confidence) of the
-/// factors of G groups. `None` if there are too few groups, or too many of them have too few rows.
-pub(super) fn for_a_new_one(factors: &[f64], confidence: f64) -> Option<f64> {
+/// Returns the largest factor that a new group needs, with a confidence: the one of rank ceil((G + 1) confidence) of
+/// the factors of G groups. `None` if there are too few groups, or if too many of them have too few rows.
+pub(super) fn for_a_new_group(factors: &[f64], confidence: f64) -> Option<f64> {
     let rank = conformal_rank(factors.len() as u64, confidence)?;
     order_statistic(factors, rank).filter(|factor| factor.is_finite())
 }
@@ -47,14 +48,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranks_are_those_of_exchangeable_groups() {
+    fn rank_is_that_of_exchangeable_groups() {
         for (confidence, groups) in [(0.5, 1), (0.7, 3), (0.8, 4), (0.9, 9), (0.95, 19)] {
             assert_eq!(needed(confidence), groups, "{confidence}");
         }
-        assert_eq!(for_a_new_one(&[1.0, 4.0, 2.0], 0.8), None);
-        assert_eq!(for_a_new_one(&[1.0, 4.0, 2.0, 3.0], 0.8), Some(4.0));
-        assert_eq!(for_a_new_one(&[1.0, 4.0, 2.0, 3.0], 0.6), Some(3.0));
-        assert_eq!(for_a_new_one(&[1.0, f64::INFINITY, 2.0, 3.0], 0.8), None);
+        assert_eq!(for_a_new_group(&[1.0, 4.0, 2.0], 0.8), None);
+        assert_eq!(for_a_new_group(&[1.0, 4.0, 2.0, 3.0], 0.8), Some(4.0));
+        assert_eq!(for_a_new_group(&[1.0, 4.0, 2.0, 3.0], 0.6), Some(3.0));
+        assert_eq!(for_a_new_group(&[1.0, f64::INFINITY, 2.0, 3.0], 0.8), None);
         assert_eq!(own_factor(&[3.0, 1.0, 2.0, 4.0], 0.8), 4.0);
         assert_eq!(own_factor(&[3.0, 1.0, 2.0], 0.8), f64::INFINITY);
     }

@@ -5,7 +5,7 @@ use super::binomial::{conformal_rank, order_statistic, rank};
 use super::detections::hexadecimal;
 use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
-use super::groups::{self, GroupReport, for_a_new_one, own_factor};
+use super::groups::{self, GroupReport, for_a_new_group, own_factor};
 use super::student::normal_quantile;
 use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
@@ -19,20 +19,20 @@ const ROOMY: f64 = 1.5;
 const FEWEST: f64 = 10.0;
 /// The fewest blocks of consecutive rows for estimating the dependence of rows.
 const FEWEST_BLOCKS: usize = 20;
-/// If all rows have the same condition, other values count as equal within this: as a difference of a logarithm of a
-/// determinant, as a share of any other condition.
-const ALIKE: f64 = 0.01;
+/// If all rows have the same condition, other values within this tolerance count as equal: a difference for the
+/// logarithm of a determinant, a share for any other condition.
+const EQUAL_WITHIN: f64 = 0.01;
 
 /// The settings for learning factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InflationSettings {
-    /// The share of the estimates whose set shall contain the truth, above 0 and below 1.
+    /// The share of the estimates whose set must contain the truth, above 0 and below 1.
     pub epsilon: f64,
-    /// The probability, over the random choice of data, that the set does so under a condition; above 0 and below 1. If the
-    /// estimates are of several groups (robots, runs): the probability, over the choice of groups, that it does so for a
-    /// new group.
+    /// The probability, over the random choice of data, that the set does so under a condition; above 0 and below 1.
+    /// If the estimates are of several groups (robots, runs): the probability, over the choice of groups, that it
+    /// does so for a new group.
     pub confidence: f64,
-    /// `true` if the factors shall hold for a new group, `false` if only for the groups in the data.
+    /// `true` if the factors must be valid for a new group, `false` if only for the groups in the data.
     pub new_group: bool,
 }
 
@@ -52,7 +52,7 @@ struct Document {
     confidence: f64,
     /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     condition: String,
-    /// The column of the groups for a new one of which the factors hold; `None` if only for those in the data.
+    /// The column of the groups, if the factors are valid for a new group; `None` if only for those in the data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     new: Option<String>,
     data: Data,
@@ -91,12 +91,12 @@ pub struct InflationReport {
     pub to: f64,
     /// Rows in it.
     pub rows: u64,
-    /// The number of independent rows that would tell equally well how often the truth is outside. Consecutive rows
-    /// are dependent.
+    /// The number of independent rows with the same information on the share of sets without the truth. Consecutive
+    /// rows are dependent.
     pub independent_rows: u64,
     /// The share of the sets that contained the truth without a factor.
     pub held: f64,
-    /// The factor at which the share would have been epsilon among these rows: may be below 1.
+    /// The factor at which the share would have been epsilon among these rows; may be below 1.
     pub needed: f64,
     /// A lower limit of the needed factor, with the model's confidence.
     pub low: f64,
@@ -155,7 +155,7 @@ pub fn learn_inflation(
     let overall = of(first, last);
     if grouped {
         let factors = scored.own_factors([first, last]);
-        if for_a_new_one(&factors, confidence).is_none() {
+        if for_a_new_group(&factors, confidence).is_none() {
             return Err(LearnError::TooFewGroups {
                 found: factors.iter().filter(|factor| factor.is_finite()).count() as u64,
                 of: estimates.grouped_by,
@@ -188,16 +188,16 @@ pub fn learn_inflation(
             ends.push(last);
             ends
         };
-        if last - first <= ALIKE * size {
-            ends = std::vec![first - ALIKE * size, last + ALIKE * size];
+        if last - first <= EQUAL_WITHIN * size {
+            ends = std::vec![first - EQUAL_WITHIN * size, last + EQUAL_WITHIN * size];
         }
         part = ends.windows(2).map(|pair| of(pair[0], pair[1])).collect();
         let enough = |part: &InflationReport| {
             let rows = part.independent_rows as f64 >= ROOMY * fewest;
             rows && (!grouped || part.inflation > 0.0)
         };
-        let told_apart = distinct.len() <= MOST || last - first <= ALIKE * size;
-        if told_apart || part.iter().all(enough) {
+        let are_distinct = distinct.len() <= MOST || last - first <= EQUAL_WITHIN * size;
+        if are_distinct || part.iter().all(enough) {
             break;
         }
     }
@@ -257,7 +257,7 @@ struct Scores<'a> {
     r2: f64,
     epsilon: f64,
     confidence: f64,
-    /// The number of groups if the factors hold for a new one, else 0.
+    /// The number of groups if the factors are valid for a new group, else 0.
     groups: usize,
 }
 
@@ -287,14 +287,14 @@ impl Scores<'_> {
         let upper = self.upper_rank(n, independent);
         let lower = (epsilon > margin).then(|| nth(epsilon - margin));
         let at = |k: Option<u64>| k.and_then(|k| order_statistic(&factors, k));
-        // A new group needs what groups need, and at least what the data need together.
-        let wanted = if self.groups > 0 {
-            for_a_new_one(&self.own_factors([from, to]), confidence)
+        // A new group needs the factor of the groups, and at least the factor of all data together.
+        let needed_factor = if self.groups > 0 {
+            for_a_new_group(&self.own_factors([from, to]), confidence)
                 .map(|factor| factor.max(at(upper).unwrap_or(0.0)))
         } else {
             at(upper)
         };
-        let inflation = wanted.map_or(0.0, |factor| {
+        let inflation = needed_factor.map_or(0.0, |factor| {
             let factor = (libm::ceil(factor * 1e6) / 1e6).max(1.0);
             Inflation::new(factor).map_or(0.0, |_| factor)
         });
@@ -355,7 +355,7 @@ impl Scores<'_> {
     /// Returns the coverage of each group by the model, and by the factors that the other groups need.
     fn reports(&self, model: &InflationModel, names: &[String]) -> Vec<GroupReport> {
         let parts = &model.document.part;
-        // Of each part and group: the factor of a new one among the others.
+        // For each part and group: the factor for a new group, from the others.
         let left_out: Vec<Vec<Option<f64>>> = parts
             .iter()
             .map(|part| {
@@ -364,7 +364,7 @@ impl Scores<'_> {
                     .map(|group| {
                         let mut others = factors.clone();
                         others.remove(group);
-                        for_a_new_one(&others, self.confidence).map(|factor| factor.max(1.0))
+                        for_a_new_group(&others, self.confidence).map(|factor| factor.max(1.0))
                     })
                     .collect()
             })
@@ -410,7 +410,7 @@ impl Scores<'_> {
     }
 }
 
-/// Returns the number of independent rows that would tell the share of rows beyond a factor as exactly. It is the
+/// Returns the number of independent rows with the same information on the share of rows beyond a factor. It is the
 /// number of rows divided by a variance ratio: that of sums over blocks of consecutive rows to that of independent
 /// rows, for the block length with the largest ratio.
 fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> u64 {
@@ -468,7 +468,7 @@ impl InflationModel {
             what,
         };
         if document.posegate_model != VERSION || document.kind != "inflation" {
-            return Err(wrong("it is no model of inflation of version 1".into()));
+            return Err(wrong("it is not a model of inflation of version 1".into()));
         }
         for share in [document.epsilon, document.confidence] {
             if !(share > 0.0 && share < 1.0) {
@@ -514,9 +514,9 @@ impl InflationModel {
         self.document.confidence
     }
 
-    /// Returns the factor for the covariance of an estimate under a condition: at least 1. At the end between two
-    /// conditions the larger factor, and the largest of all if the condition is unknown. `None` outside of the
-    /// conditions in the data, if there were too few rows, and for NaN.
+    /// Returns the factor, at least 1, for the covariance of an estimate under a condition. At the border of two
+    /// conditions the larger factor applies, and the largest of all if the condition is unknown. `None` outside of
+    /// the conditions in the data, if there were too few rows, and for NaN.
     #[must_use]
     pub fn inflation(&self, condition: Option<f64>) -> Option<f64> {
         let holds = |part: &&InflationReport| {
@@ -552,7 +552,7 @@ impl InflationModel {
         &self.document.group
     }
 
-    /// Returns the column of the groups if the factors hold for a new one: `robot` or `run`.
+    /// Returns the column of the groups if the factors are valid for a new group: `robot` or `run`.
     #[must_use]
     pub fn new_group(&self) -> Option<&str> {
         self.document.new.as_deref()

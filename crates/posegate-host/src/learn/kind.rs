@@ -21,7 +21,7 @@ impl Model {
     /// Reads a model from the text of its file; errors name it `file`.
     ///
     /// # Errors
-    /// The text is not a model of a kind and version that this crate knows.
+    /// The text is not a model of a kind and version that this crate supports.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
         let table: toml::Table = of(text, file)?;
         match table.get("kind").and_then(toml::Value::as_str) {
@@ -45,7 +45,7 @@ pub(super) fn of<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, Learn
             file: file.to_owned(),
             line: 1 + before.matches('\n').count() as u64,
             column: 1 + before[line_start..].chars().count(),
-            what: format!("no model: {}", fault.message()),
+            what: format!("not a model: {}", fault.message()),
         }
     })
 }

@@ -47,17 +47,16 @@ pub struct OutcomesReport {
     pub contradicted_at: Option<u64>,
 }
 
-/// The number of failure rates that are bet on, evenly spaced on a logarithmic scale between the claimed rate and 1.
+/// The number of failure rates with a bet, evenly spaced on a logarithmic scale between the claimed rate and 1.
 const BETS: u32 = 64;
 
-/// Tests the claim that a docking succeeds with probability `epsilon` or more, whatever the results of earlier
-/// dockings.
+/// Tests the claim that a docking succeeds with probability `epsilon` or more, for any results of earlier dockings.
 ///
-/// A bet starts at 1. At each docking it is multiplied by the likelihood ratio of the outcome: its probability under a
-/// higher failure rate over that under the claimed one. The e-value is the mean of the bets on many rates. If the claim
-/// is true, the e-value ever reaches `1 / alpha` with probability at most `alpha` (Ville's inequality), however often
-/// it is evaluated and whenever one stops. The e-value is the test. The limits are valid at every evaluation too, if every
-/// docking succeeds with one probability.
+/// A bet starts at 1. At each docking it is multiplied by the likelihood ratio of the outcome: its probability under
+/// a higher failure rate over that under the claimed one. The e-value is the mean of the bets on many rates. If the
+/// claim is true, the e-value ever reaches `1 / alpha` with probability at most `alpha` (Ville's inequality), for any
+/// number of evaluations and any stopping rule. The e-value is the test. The limits are also valid at every
+/// evaluation, if every docking succeeds with the same probability.
 ///
 /// # Errors
 /// [`LearnError::Share`] if epsilon or alpha is not in (0, 1).
@@ -125,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn honest_fleets_are_believed_and_others_not() {
+    fn false_claims_are_contradicted_and_true_ones_rarely() {
         let contradicted = |failures: f64| {
             (0..400)
                 .filter(|seed| {
@@ -141,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bet_is_what_it_says() {
+    fn e_value_equals_the_hand_computed_one() {
         let found = test_outcomes(&[true; 100], 0.9, 0.05).unwrap();
         assert!(found.e_value < 1.0 && found.contradicted_at.is_none());
         assert_eq!(found.successes, 100);

@@ -5,14 +5,14 @@ use super::binomial::order_statistic;
 use super::student::{normal_quantile, t_quantile};
 use std::collections::BTreeMap;
 
-/// Where the runs of a file's rows come from.
+/// The origin of the runs of a file's rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum RunSource {
     /// The rows are taken as independent of each other.
     #[default]
     Independent,
-    /// The column `run` names the run of each row.
+    /// The column `run` states the run of each row.
     Column,
     /// The rows follow each other at video rate: a new run starts after a gap in `t_s`.
     Gaps {
@@ -28,7 +28,7 @@ pub enum RunSource {
 pub struct Runs {
     /// The run of each row, from 0; empty if every row is a run of its own.
     pub of_row: Vec<u32>,
-    /// Where the runs come from.
+    /// The origin of the runs.
     pub source: RunSource,
 }
 
@@ -39,7 +39,7 @@ const GAP_S: f64 = 2.0;
 const GAP_STEPS: f64 = 10.0;
 
 impl Runs {
-    /// Returns the runs of rows with names. Rows with the same name are a run, wherever they are in the file.
+    /// Returns the runs of rows with names. Rows with the same name are a run, at any place in the file.
     #[must_use]
     pub fn of_names<'a>(names: impl Iterator<Item = &'a str>) -> Self {
         let mut known: BTreeMap<&str, u32> = BTreeMap::new();
@@ -54,9 +54,9 @@ impl Runs {
         }
     }
 
-    /// Returns the runs of rows without names, by their times (seconds). If half of the rows follow the one before
-    /// within 0.5 s, in the file's order or in the order of time, then a new run starts where time falls, or after a
-    /// step of more than 2 s and of more than 10 median steps. Otherwise the rows are independent.
+    /// Returns the runs of rows without names, by their times (seconds). If half of the rows follow the previous one
+    /// within 0.5 s, in the file's order or in the order of time, a new run starts if time falls, or after a step of
+    /// more than 2 s and of more than 10 median steps. Otherwise the rows are independent.
     #[must_use]
     pub fn of_times(times: &[f64]) -> Self {
         let as_in_file: Vec<usize> = (0..times.len()).collect();
@@ -113,8 +113,8 @@ impl Tally {
         tally
     }
 
-    /// Returns the design effect: the variance of the share of hits over that of as many independent rows, at least 1,
-    /// from the spread of the sums over runs. `None` with fewer than two runs.
+    /// Returns the design effect: the ratio of the variance of the share of hits to that of the same number of
+    /// independent rows, at least 1, from the spread of the sums over runs. `None` with fewer than two runs.
     pub(super) fn effect(&self) -> Option<f64> {
         let runs = self.runs.len() as f64;
         let total = |which: usize| self.runs.values().map(|run| run[which]).sum::<u64>() as f64;
@@ -147,8 +147,8 @@ impl Tally {
     }
 }
 
-/// Returns the design effect of scores in runs: the largest one of the share of scores beyond the median and beyond the
-/// q-quantile.
+/// Returns the design effect of scores in runs: the larger one of the shares of scores beyond the median and beyond
+/// the q-quantile.
 pub(super) fn effect(scores: &[f64], runs: &[u32], q: f64) -> f64 {
     let mut effect = 1.0f64;
     for level in [0.5, q] {
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn video_is_cut_at_gaps() {
+    fn video_is_split_into_runs_at_gaps() {
         // Three approaches of 50 frames at 10 Hz; after the second one the clock starts again.
         let mut times: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k)).collect();
         times.extend((0..50).map(|k| 30.0 + 0.1 * f64::from(k)));
@@ -189,7 +189,7 @@ mod tests {
         assert!(matches!(runs.source, RunSource::Gaps { gap_s: 2.0, .. }));
         let expected: Vec<u32> = (0..150).map(|k| k / 50).collect();
         assert_eq!(runs.of_row, expected);
-        // In any order: two approaches, whose rows alternate.
+        // In shuffled order: two approaches, whose rows alternate.
         let shuffled: Vec<f64> = (0..50).flat_map(|k| [times[k], times[50 + k]]).collect();
         let expected: Vec<u32> = (0..100).map(|k| k % 2).collect();
         assert_eq!(Runs::of_times(&shuffled).of_row, expected);
@@ -211,7 +211,7 @@ mod tests {
 
     /// Rows that repeat 20 times count once.
     #[test]
-    fn effect_is_the_length_of_constant_runs() {
+    fn effect_of_constant_runs_is_their_length() {
         let hit = |run: u32| crate::learn::split::mixed(u64::from(run)).is_multiple_of(4);
         let repeated = Tally::of((0..20_000).map(|row| (row / 20, hit(row / 20))));
         let effect = repeated.effect().unwrap();
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn few_runs_count_less() {
+    fn few_runs_reduce_the_independent_rows() {
         assert_eq!(for_few_runs(1, 0.95), 0.0);
         assert!((for_few_runs(2, 0.95) - (1.644_854f64 / 6.313_752).powi(2)).abs() < 1e-5);
         assert!(for_few_runs(1000, 0.95) > 0.995);

@@ -1,18 +1,18 @@
-//! Confidence limits of a probability that are valid however often one looks.
+//! Confidence limits of a probability that are valid at every evaluation.
 
 /// Returns limits of a probability after `successes` of `count` trials: a confidence sequence.
 ///
-/// With a probability of at least `1 - alpha`, the limits contain the true probability after *every* trial, so one may look
-/// at each and stop at any (Clopper-Pearson limits allow one look, at a number of trials that was fixed beforehand). The
-/// limits enclose the p for which the likelihood ratio
+/// With a probability of at least `1 - alpha`, the limits contain the true probability after *every* trial. So they
+/// may be evaluated after each trial, with any stopping rule. (Clopper-Pearson limits allow one evaluation, after a
+/// number of trials that was fixed beforehand.) The limits enclose the p for which the likelihood ratio
 ///
 /// ```text
 /// B(successes + 1/2, failures + 1/2) / B(1/2, 1/2) / (p^successes (1 - p)^failures)
 /// ```
 ///
-/// is below `1 / alpha`. For the true p this ratio is a martingale that starts at 1 (Ville's inequality). It assumes that
-/// each trial succeeds with probability p, whatever the results of earlier ones. `alpha` is above 0 and below 1. The limits are
-/// rounded outwards by 1e-12.
+/// is below `1 / alpha`. For the true p this ratio is a martingale that starts at 1 (Ville's inequality). It assumes
+/// that each trial succeeds with probability p, for any results of earlier trials. `alpha` is above 0 and below 1.
+/// The limits are rounded outwards by 1e-12.
 #[must_use]
 pub fn confidence_sequence(successes: u64, count: u64, alpha: f64) -> [f64; 2] {
     let (s, f) = (
@@ -21,7 +21,7 @@ pub fn confidence_sequence(successes: u64, count: u64, alpha: f64) -> [f64; 2] {
     );
     let mixture = log_beta(s + 0.5, f + 0.5) - log_beta(0.5, 0.5);
     let threshold = -libm::log(alpha);
-    // The ratio falls down to the share of successes, where it is at most 1, and rises from there.
+    // The ratio decreases up to the share of successes, where it is at most 1, and then increases.
     let is_contradicted = |p: f64| {
         let likelihood = times_log(s, libm::log(p)) + times_log(f, libm::log1p(-p));
         mixture - likelihood >= threshold
@@ -48,7 +48,7 @@ pub fn confidence_sequence(successes: u64, count: u64, alpha: f64) -> [f64; 2] {
     ]
 }
 
-/// Returns `times` the logarithm of a number; 0 for no times, also if the number is 0.
+/// Returns `times` multiplied by the logarithm of a number; 0 if `times` is 0, even if the number is 0.
 fn times_log(times: f64, log: f64) -> f64 {
     if times == 0.0 { 0.0 } else { times * log }
 }
@@ -79,9 +79,9 @@ mod tests {
         (0..fleets).filter(excludes).count() as u64
     }
 
-    /// The limits beside the test are evaluated after every docking.
+    /// The limits of the test are evaluated after every docking.
     #[test]
-    fn truth_is_inside_at_every_look_except_in_a_share_of_alpha() {
+    fn truth_is_inside_at_all_evaluations_with_probability_1_minus_alpha() {
         for truth in [0.99, 0.9, 0.5] {
             let count = excluded(400, truth, |s, n| confidence_sequence(s, n, ALPHA));
             // 5 % of 400, and three standard deviations more.
@@ -92,16 +92,17 @@ mod tests {
         }
     }
 
-    /// A rate that changes is no single probability: the limits exclude the first one, and then have no claim.
+    /// If the rate changes there is no single probability: the limits exclude the first rate, and then have no
+    /// meaning.
     #[test]
-    fn a_rate_that_changes_is_excluded() {
+    fn first_rate_is_excluded_after_a_change() {
         let successes = |count: u64| count.min(300) + count.saturating_sub(300) / 2;
         let excludes = |count: u64| confidence_sequence(successes(count), count, ALPHA)[1] < 0.99;
         assert!(!(1..=300).any(excludes) && (301..=340).any(excludes));
     }
 
     #[test]
-    fn limits_solve_their_equation_and_are_not_loose() {
+    fn limits_solve_their_equation_and_are_tight() {
         assert_eq!(confidence_sequence(0, 0, ALPHA), [0.0, 1.0]);
         for (s, n) in [
             (0, 1),
@@ -120,7 +121,7 @@ mod tests {
                 "{s} of {n}"
             );
             if n >= 100 {
-                // The price of looking at each trial grows as the root of the logarithm of their number.
+                // The price of evaluating after each trial grows as the root of the logarithm of their number.
                 assert!(high - low <= 2.6 * (once_high - once_low), "{s} of {n}");
             }
             // By hand: (2n choose n) / 4^n / p^n = 1 / alpha for n successes of n.

@@ -30,9 +30,9 @@ const STEPS: u32 = 16;
 const FOLDS: usize = 2;
 /// Bend penalties that are tried, times rows per corner.
 const BENDS: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
-/// Relative bend penalty per axis. A bend in phi costs more: phi has little effect.
-const DEARER: [f64; 3] = [1.0, 4.0, 1.0];
-/// The largest magnitude of a logit: shares are no nearer to 0 or 1.
+/// Relative bend penalty per axis. The penalty is larger for phi, which has little effect.
+const BEND_PENALTY: [f64; 3] = [1.0, 4.0, 1.0];
+/// The largest magnitude of a logit, which keeps shares away from 0 and 1.
 const FARTHEST_LOGIT: f64 = 9.0;
 
 impl Lattice {
@@ -67,20 +67,20 @@ impl Lattice {
         &self,
         spots: &[&InterpolationWeights],
         values: &[f64],
-        stiffness: SmoothnessPenalty,
+        penalty: SmoothnessPenalty,
     ) -> Vec<f64> {
         let ones = std::vec![1.0; spots.len()];
-        self.solve(spots, &ones, values, stiffness)
+        self.solve(spots, &ones, values, penalty)
     }
 
     /// Returns the fit to the q-quantile, by iterations from a first guess. Each step replaces the tilted absolute
-    /// value by a parabola that is nowhere below it (Hunter and Lange).
+    /// value by a parabola that is at least as large everywhere (Hunter and Lange).
     fn quantile(
         &self,
         spots: &[&InterpolationWeights],
         values: &[f64],
         q: f64,
-        stiffness: SmoothnessPenalty,
+        penalty: SmoothnessPenalty,
     ) -> Vec<f64> {
         let level = super::binomial::order_statistic(
             values,
@@ -95,7 +95,7 @@ impl Lattice {
                 price[index] = 0.5 / (near + off);
                 pull[index] = price[index] * values[index] + q - 0.5;
             }
-            fit = self.solve_weighted(spots, &price, &pull, stiffness);
+            fit = self.solve_weighted(spots, &price, &pull, penalty);
             near = (near * 0.75).max(0.01);
         }
         fit
@@ -106,7 +106,7 @@ impl Lattice {
         &self,
         spots: &[&InterpolationWeights],
         hits: &[f64],
-        stiffness: SmoothnessPenalty,
+        penalty: SmoothnessPenalty,
     ) -> Vec<f64> {
         let mean = (hits.iter().sum::<f64>() + 0.5) / (hits.len() as f64 + 1.0);
         let mut fit = std::vec![libm::log(mean / (1.0 - mean)); self.len()];
@@ -119,7 +119,7 @@ impl Lattice {
                 price[index] = (p * (1.0 - p)).max(0.02);
                 pull[index] = price[index] * logit + hits[index] - p;
             }
-            fit = self.solve_weighted(spots, &price, &pull, stiffness);
+            fit = self.solve_weighted(spots, &price, &pull, penalty);
             for logit in &mut fit {
                 *logit = logit.clamp(-FARTHEST_LOGIT, FARTHEST_LOGIT);
             }
@@ -132,10 +132,10 @@ impl Lattice {
         spots: &[&InterpolationWeights],
         price: &[f64],
         values: &[f64],
-        stiffness: SmoothnessPenalty,
+        penalty: SmoothnessPenalty,
     ) -> Vec<f64> {
         let pull: Vec<f64> = price.iter().zip(values).map(|(w, v)| w * v).collect();
-        self.solve_weighted(spots, price, &pull, stiffness)
+        self.solve_weighted(spots, price, &pull, penalty)
     }
 
     /// Returns the corners' values that minimise `sum price/2 value^2 - pull value` plus the bend penalty: a banded
@@ -145,7 +145,7 @@ impl Lattice {
         spots: &[&InterpolationWeights],
         price: &[f64],
         pull: &[f64],
-        stiffness: SmoothnessPenalty,
+        penalty: SmoothnessPenalty,
     ) -> Vec<f64> {
         let n = self.len();
         let mut band = BandedMatrix::new(n, 2 * self.counts[1] * self.counts[2]);
@@ -162,13 +162,13 @@ impl Lattice {
                 }
             }
         }
-        self.stiffen(&mut band, stiffness, spots.len() as f64 / n as f64);
+        self.add_bend_penalty(&mut band, penalty, spots.len() as f64 / n as f64);
         band.solve(&mut right);
         right
     }
 
-    fn stiffen(&self, band: &mut BandedMatrix, stiffness: SmoothnessPenalty, each: f64) {
-        let SmoothnessPenalty { bend, slope } = stiffness;
+    fn add_bend_penalty(&self, band: &mut BandedMatrix, penalty: SmoothnessPenalty, each: f64) {
+        let SmoothnessPenalty { bend, slope } = penalty;
         for i in 0..self.counts[0] {
             for j in 0..self.counts[1] {
                 for k in 0..self.counts[2] {
@@ -179,7 +179,7 @@ impl Lattice {
                             at[axis] += step;
                             self.corner(at)
                         };
-                        let price = each * bend * DEARER[axis];
+                        let price = each * bend * BEND_PENALTY[axis];
                         if here[axis] + 2 < self.counts[axis] {
                             band.square(&[(at(0), 1.0), (at(1), -2.0), (at(2), 1.0)], price);
                         }
@@ -213,8 +213,8 @@ impl InterpolationWeights {
     }
 }
 
-/// Returns a fit whose corners are nowhere lower than the lowest of its values at the rows around them: beyond the rows
-/// a slope is meaningless.
+/// Returns a fit whose corners are at least the lowest of its values at the rows around them: beyond the rows a slope
+/// is meaningless.
 pub(super) fn floored(fit: &[f64], spots: &[InterpolationWeights]) -> Vec<f64> {
     let mut least = std::vec![f64::INFINITY; fit.len()];
     let mut lowest = f64::INFINITY;
@@ -239,8 +239,8 @@ const FEWEST_AROUND: usize = 20;
 /// The confidence of the limit that the rows around a corner set.
 const CAP_CONFIDENCE: f64 = 0.95;
 
-/// With too few rows for such a limit, the largest value is a limit with this tail: the largest of n errors grows with the power
-/// 1/4 of n.
+/// With too few rows for such a limit, the largest value is a limit with this tail: the largest of n errors grows
+/// with the power 1/4 of n.
 const TAIL: f64 = 0.25;
 
 /// Returns the values of the rows in the cells around each corner, ascending.
@@ -261,8 +261,8 @@ pub(super) fn errors_around(
     around
 }
 
-/// Returns a fit to the `q`-quantile whose corners are nowhere higher than an upper confidence limit of that quantile of the
-/// values around them: a slope is not continued to errors that were not observed.
+/// Returns a fit to the `q`-quantile whose corners are at most an upper confidence limit of that quantile of the
+/// values around them: a slope is not extrapolated to errors that were not observed.
 pub(super) fn capped(fit: &[f64], around: &[Vec<f64>], q: f64) -> Vec<f64> {
     let needed = libm::log(1.0 - CAP_CONFIDENCE) / libm::log(q);
     let limit = |values: &Vec<f64>| {
@@ -304,12 +304,12 @@ impl Target {
         lattice: &Lattice,
         spots: &[&InterpolationWeights],
         values: &[f64],
-        stiffness: SmoothnessPenalty,
+        penalty: SmoothnessPenalty,
     ) -> Vec<f64> {
         match self {
-            Self::Mean => lattice.mean(spots, values, stiffness),
-            Self::Quantile(q) => lattice.quantile(spots, values, q, stiffness),
-            Self::Share => lattice.share(spots, values, stiffness),
+            Self::Mean => lattice.mean(spots, values, penalty),
+            Self::Quantile(q) => lattice.quantile(spots, values, q, penalty),
+            Self::Share => lattice.share(spots, values, penalty),
         }
     }
 
@@ -482,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_and_shares_are_found() {
+    fn fits_equal_known_quantiles_and_shares() {
         let axes = axes();
         let lattice = Lattice::over(&axes);
         let rows = rows(6000);

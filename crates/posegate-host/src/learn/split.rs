@@ -13,13 +13,13 @@ pub(super) struct Drawn {
     pub(super) row: Detection,
     /// `true` if the shape is fitted to it; otherwise it calibrates regions.
     pub(super) fitted: bool,
-    /// Its run; every row has its own one if rows are independent.
+    /// The row's run; every row has its own run if rows are independent.
     pub(super) run: u32,
     draw: u64,
 }
 
-/// Returns the rows in an order that depends only on the rows themselves and their runs, not on the file's order. Whole
-/// runs are fitted to, or calibrate.
+/// Returns the rows in an order that depends only on the rows and their runs, not on the file's order. Complete runs
+/// are on one side of the split.
 pub(super) fn split(detections: &Detections, seed: u64) -> Vec<Drawn> {
     let of_row = &detections.runs.of_row;
     let mut rows: Vec<Drawn> = detections
@@ -34,15 +34,15 @@ pub(super) fn split(detections: &Detections, seed: u64) -> Vec<Drawn> {
         })
         .collect();
     sort(&mut rows);
-    // Equal rows are split like others: if all were on one side, they would not be independent.
-    let mut alike = 0u64;
+    // Equal rows are also split: if all were on one side, they would not be independent.
+    let mut repeats = 0u64;
     let mut last: Option<Detection> = None;
     for drawn in &mut rows {
         let again = last.is_some_and(|last| compare(&last, &drawn.row).is_eq());
-        alike = if again { alike + 1 } else { 0 };
+        repeats = if again { repeats + 1 } else { 0 };
         last = Some(drawn.row);
         if again {
-            drawn.draw = mixed(drawn.draw ^ mixed(alike));
+            drawn.draw = mixed(drawn.draw ^ mixed(repeats));
         }
     }
     sort(&mut rows);
@@ -53,7 +53,7 @@ pub(super) fn split(detections: &Detections, seed: u64) -> Vec<Drawn> {
         }
         return rows;
     }
-    // The draw of a run is that of all of its rows.
+    // All rows of a run use the draw of the run.
     let mut draws: BTreeMap<u32, u64> = BTreeMap::new();
     for drawn in &rows {
         let draw = draws.entry(drawn.run).or_default();
@@ -135,20 +135,20 @@ mod tests {
     }
 
     #[test]
-    fn runs_are_never_divided() {
+    fn runs_are_on_one_side() {
         let of_row: Vec<u32> = (0..600).map(|k| k % 30).collect();
         let mut sides: BTreeMap<u32, Vec<bool>> = BTreeMap::new();
         for drawn in split(&detections(600, of_row), 1) {
             sides.entry(drawn.run).or_default().push(drawn.fitted);
         }
         assert_eq!(sides.len(), 30);
-        let whole = |side: &Vec<bool>| side.len() == 20 && side.iter().all(|f| *f == side[0]);
-        assert!(sides.values().all(whole));
+        let is_complete = |side: &Vec<bool>| side.len() == 20 && side.iter().all(|f| *f == side[0]);
+        assert!(sides.values().all(is_complete));
         assert_eq!(sides.values().filter(|side| side[0]).count(), 12);
     }
 
     #[test]
-    fn independent_rows_are_split_one_by_one() {
+    fn independent_rows_are_split_individually() {
         let rows = split(&detections(1000, Vec::new()), 1);
         let fitted = rows.iter().filter(|drawn| drawn.fitted).count();
         assert!((350..450).contains(&fitted), "{fitted}");

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_those_of_tables() {
+    fn quantiles_equal_published_ones() {
         for (probability, degrees, expected) in [
             (0.95, 1.0, 6.313_752),
             (0.95, 2.0, 2.919_986),

@@ -1,4 +1,4 @@
-//! Are docks and tags where the site file says? Offsets from logs of dockings.
+//! Compares the places of docks and tags in the site file with logs of dockings.
 
 use super::LearnError;
 use super::fisher::fisher_quantile;
@@ -8,14 +8,15 @@ use std::collections::BTreeMap;
 
 /// The fewest dockings from which an offset and its region follow.
 const FEWEST: usize = 5;
-/// Offsets whose deviation is less than this share of their mean and [`SMALL`] do not scatter: what is left is rounding.
+/// Offsets have no scatter if their deviation is less than this share of their mean and [`SMALL`]: the rest is
+/// rounding.
 const SCATTER: f64 = 1e-9;
 /// A length (m) and an angle (rad) that is small for any mean.
 const SMALL: f64 = 1e-3;
-/// Offsets follow from each other if what is left of a variance is less than this share of it.
+/// An offset follows from others if the rest of its variance is less than this share of it.
 const LEFT: f64 = 1e-9;
 
-/// What a site file says: the goals of its docks, by the name of the task, and the places of its tags.
+/// The goals of a site's docks, by the name of the task, and the places of its tags.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurveyedSite {
     /// x, y (m), yaw (rad), world frame.
@@ -27,7 +28,7 @@ pub struct SurveyedSite {
 /// A robot in contact with a dock, localized by one tag.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// The docking among those at its dock: rows of one docking depend on each other.
+    /// The docking, unique at its dock: rows of one docking depend on each other.
     pub run: String,
     /// The name of the dock's task.
     pub dock: String,
@@ -46,30 +47,32 @@ pub enum Surveyed {
     Tag,
 }
 
-/// The offset of a dock or a tag from where the site file says it is.
+/// The offset of a dock or a tag from its place in the site file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffsetReport {
-    /// What it is.
+    /// The kind of object.
     pub kind: Surveyed,
-    /// Its name.
+    /// The object's name.
     pub name: String,
     /// Dockings with it.
     pub dockings: u64,
     /// The true place minus that of the site file: x, y (m, world axes), yaw (rad). `None` if there are too few dockings.
     pub offset: Option<[f64; 3]>,
     /// Half the extent of the confidence region of the offset along each of x, y and yaw. `None` if there are too few dockings, or if their
-    /// offsets do not scatter in x, y and yaw, each by itself: such numbers are no measurements, and the offset is not tested.
+    /// offsets do not scatter independently in x, y and yaw: such numbers are not measurements, and the offset is not tested.
     pub region: Option<[f64; 3]>,
     /// Hotelling's statistic of the offset over the limit beyond which it is significant; above 1 if it is.
     pub significance: f64,
-    /// `true` if it is to be surveyed again: its offset is significant, and explains the looks better than any other one.
+    /// `true` if the object must be surveyed again: its offset is significant, and explains the looks better than any
+    /// other.
     pub stale: bool,
-    /// The others whose offset explains the looks as well: they were only ever seen together.
+    /// Other objects whose offset explains the looks equally well, because they were only seen together.
     pub or: Vec<(Surveyed, String)>,
 }
 
-/// Reads looks: `run` (the docking; those at another dock are others, even of the same name), `dock` (the name of its task), `tag`, and `x_m, y_m, yaw_rad`, the robot's pose at contact as it
-/// follows from a look at that tag.
+/// Reads looks. Columns: `run` (the docking; dockings at different docks are different, even with equal names),
+/// `dock` (the name of its task), `tag`, and `x_m, y_m, yaw_rad`, the robot's pose at contact that follows from a
+/// look at that tag.
 ///
 /// # Errors
 /// The first invalid field, with its line and column; a dock or a tag that the site does not have; a file without rows.
@@ -94,7 +97,7 @@ pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>,
             let has = others.join(", ");
             Err(line.wrong_at(
                 column,
-                format!("`{name}` is no {what} of the site; it has: {has}"),
+                format!("`{name}` is not a {what} of the site; it has: {has}"),
             ))
         };
         let mut numbers = [0.0; 3];
@@ -116,14 +119,15 @@ pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>,
     Ok(rows)
 }
 
-/// Returns the offsets of docks and tags, the significant ones found one after the other: each time the one that leaves least to explain is
-/// taken as off by its offset, and the others are tested again. If everything is where the site file says, anything is called stale with a
-/// probability of at most 1 - `confidence`.
+/// Returns the offsets of docks and tags. The significant ones are found one after the other: the one that leaves
+/// least to explain is removed from the looks, and the others are tested again. If all places agree with the site
+/// file, any object is stale with a probability of at most 1 - `confidence`.
 ///
-/// A dock's offset in a docking is the mean over its looks of the localized pose minus the goal. A tag's offset is the displacement of the
-/// tag, about itself, that makes up for the difference. Each is tested by Hotelling's T-squared test over dockings, with the error divided by
-/// the number of docks and tags. This assumes that dockings are independent of each other, that their errors are normal and have no
-/// mean: neither a bias of the camera, nor play on one side of the dock.
+/// A dock's offset in a docking is the mean over its looks of the localized pose minus the goal. A tag's offset is
+/// the displacement of the tag, in its own frame, that explains the difference. Each is tested by Hotelling's
+/// T-squared test over dockings, with the error divided by the number of docks and tags. This assumes independent
+/// dockings, whose errors are normal and have no mean: neither a bias of the camera, nor play on one side of the
+/// dock.
 ///
 /// # Errors
 /// [`LearnError::Share`] if the confidence is not in (0, 1).
@@ -182,8 +186,8 @@ pub fn survey(
     Ok(found.into_values().collect())
 }
 
-/// Returns the significant offset that leaves least to explain: the sum of what is significant afterwards is the least. Of equal ones (seen
-/// together only) the first: a dock before a tag.
+/// Returns the significant offset after whose removal the sum of the significant statistics is least. If several are
+/// equal (only seen together), the first: a dock before a tag.
 fn best<'a>(
     residuals: &[Residual],
     objects: &[(Surveyed, String)],
@@ -205,7 +209,7 @@ fn best<'a>(
     best.map(|(_, report)| report)
 }
 
-/// The localized pose at contact minus the goal, and what turns it into a displacement of the tag.
+/// The localized pose at contact minus the goal, and the lever that converts it into a displacement of the tag.
 #[derive(Clone)]
 struct Residual {
     run: String,
@@ -234,8 +238,8 @@ fn of(look: &Look, site: &SurveyedSite) -> Option<Residual> {
 }
 
 impl Residual {
-    /// Returns the displacement of the tag that explains the difference. A tag that is off by t and turned by a makes the localized pose off by
-    /// -t - a J lever, and -a, J being a quarter turn to the left.
+    /// Returns the displacement of the tag that explains the difference. A tag that is displaced by t and turned by a
+    /// changes the localized pose by -t - a J lever, and -a, J being a quarter turn to the left.
     fn of_tag(&self) -> Vector3<f64> {
         let turn = -self.difference.z;
         let [x, y] = self.lever;
@@ -246,7 +250,7 @@ impl Residual {
         )
     }
 
-    /// Returns what the displacement of the tag adds to the localized pose.
+    /// Returns the change of the localized pose by a displacement of the tag.
     fn by_tag(&self, tag: Vector3<f64>) -> Vector3<f64> {
         let [x, y] = self.lever;
         Vector3::new(-tag.x + tag.z * y, -tag.y - tag.z * x, -tag.z)
@@ -305,7 +309,7 @@ fn report(residuals: &[Residual], kind: Surveyed, name: &str, level: f64) -> Off
     let covariance = scatter / (n - 1.0);
     let limit = 3.0 * (n - 1.0) / (n - 3.0) * fisher_quantile(level, 3.0, n - 3.0);
     report.offset = Some([mean.x, mean.y, mean.z]);
-    // Looks without scatter are no sample; they tell nothing.
+    // Looks without scatter are not a sample and give no result.
     if let Some(factor) = scattered(mean, covariance) {
         report.region = Some([0, 1, 2].map(|k| libm::sqrt(limit * covariance[(k, k)] / n)));
         report.significance = n * mean.dot(&factor.solve(&mean)) / limit;
@@ -313,7 +317,8 @@ fn report(residuals: &[Residual], kind: Surveyed, name: &str, level: f64) -> Off
     report
 }
 
-/// Returns the factor of a covariance. `None` if a coordinate does not scatter, or follows from the ones before it.
+/// Returns the Cholesky factor of a covariance. `None` if a coordinate does not scatter, or follows from the ones
+/// before it.
 fn scattered(mean: Vector3<f64>, covariance: Matrix3<f64>) -> Option<Cholesky<f64, Const<3>>> {
     let factor = covariance.cholesky()?;
     let lower = factor.l_dirty();
@@ -325,7 +330,7 @@ fn scattered(mean: Vector3<f64>, covariance: Matrix3<f64>) -> Option<Cholesky<f6
     (0..3).all(scatters).then_some(factor)
 }
 
-/// Takes the effect of an offset off the looks.
+/// Subtracts the effect of an offset from the looks.
 fn take_off(residuals: &mut [Residual], report: &OffsetReport) {
     let Some([x, y, yaw]) = report.offset else {
         return;
@@ -346,7 +351,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_displaced_tag_is_computed_back() {
+    fn displacement_of_a_tag_is_recovered() {
         let residual = |difference| Residual {
             run: String::new(),
             dock: String::new(),
@@ -357,8 +362,8 @@ mod tests {
         let tag = Vector3::new(0.02, -0.01, 0.03);
         let effect = residual(Vector3::zeros()).by_tag(tag);
         assert!((residual(effect).of_tag() - tag).norm() < 1e-15);
-        // A tag 2 m ahead, turned by 0.01 rad to the left: the robot, which is taken to see it as it was, seems to be turned to the right about the
-        // tag: it seems 2 cm to the left.
+        // A tag 2 m ahead, turned by 0.01 rad to the left. The robot uses the unturned tag, so it seems to be turned
+        // to the right about the tag: 2 cm to the left.
         let ahead = Residual {
             lever: [-2.0, 0.0],
             ..residual(Vector3::zeros())
@@ -384,7 +389,7 @@ mod tests {
         }
     }
 
-    /// Dockings at a dock by a tag, numbered from 0, each off by what `pose` makes of three numbers around 0.
+    /// Dockings at a dock by a tag, numbered from 0, with the error that `pose` computes from three numbers around 0.
     fn dockings(
         dock: &str,
         tag: &str,
@@ -406,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_without_scatter_tell_nothing() {
+    fn looks_without_scatter_give_no_result() {
         let site = site(&["a"]);
         for count in 5..20 {
             for value in [0.0, 1e-3, 0.0123, 0.1, 0.3, -2.7, 1000.1] {
@@ -422,8 +427,8 @@ mod tests {
                     dockings("a", "a", count, following),
                 ] {
                     for report in survey(&looks, &site, 0.99).unwrap() {
-                        let told = (report.significance, report.stale, report.region);
-                        assert_eq!(told, (0.0, false, None), "{count} of {value}: {report:?}");
+                        let result = (report.significance, report.stale, report.region);
+                        assert_eq!(result, (0.0, false, None), "{count} of {value}: {report:?}");
                         assert!(report.offset.is_some());
                     }
                 }
@@ -439,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dock_and_a_tag_of_one_name_are_named_together() {
+    fn dock_and_tag_of_one_name_are_reported_together() {
         let looks = dockings("a", "a", 12, |numbers| {
             numbers.map(|number| 0.03 + 0.01 * number)
         });
@@ -451,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn dockings_numbered_anew_at_each_dock_are_told_apart() {
+    fn dockings_of_different_docks_are_distinguished_by_dock() {
         let small = |numbers: [f64; 3]| numbers.map(|number| 0.01 * number);
         let mut looks = dockings("a", "b", 6, small);
         looks.extend(dockings("b", "b", 7, small));

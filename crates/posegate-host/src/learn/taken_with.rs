@@ -1,8 +1,8 @@
-//! What detections were taken with: a bound holds for this camera and these tags only.
+//! The camera and the tags of detections: a bound is valid only for this camera and these tags.
 
 use serde::{Deserialize, Serialize};
 
-/// The camera and the tags of the detections from which bounds were learnt. What is not known is not compared.
+/// The camera and the tags of the detections from which bounds were learnt. Unknown values are not compared.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TakenWith {
@@ -30,10 +30,10 @@ pub struct TakenWith {
 }
 
 /// The share by which two calibrations of one camera, or two measurements of one tag, may differ.
-const ALIKE: f64 = 0.01;
+const EQUAL_WITHIN: f64 = 0.01;
 
 impl TakenWith {
-    /// Returns what is wrong with the description itself.
+    /// Returns the fault of the description; `None` if it is valid.
     #[must_use]
     pub fn fault(&self) -> Option<&'static str> {
         let numbers = [self.fx, self.fy, self.tag_size];
@@ -43,12 +43,13 @@ impl TakenWith {
             .then_some("focal lengths, image and tag size are numbers above 0")
     }
 
-    /// Returns in what another camera or tag differs, in words, or `None` if nothing that is known of both does.
+    /// Returns a description of the first difference from another camera or other tags; `None` if all values that
+    /// both know are equal.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<String> {
         let number = |name: &str, a: Option<f64>, b: Option<f64>, unit: &str| {
             let (a, b) = (a?, b?);
-            ((a - b).abs() > ALIKE * a.abs().max(b.abs()))
+            ((a - b).abs() > EQUAL_WITHIN * a.abs().max(b.abs()))
                 .then(|| format!("{name} {a} {unit}, not {b} {unit}"))
         };
         let text = |name: &str, a: &Option<String>, b: &Option<String>| {

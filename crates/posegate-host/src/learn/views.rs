@@ -1,4 +1,5 @@
-//! Views from which an observation is good enough: boxes of (d, phi, psi) in which both bounds are within a limit.
+//! Views from which an observation is accurate enough: boxes of (d, phi, psi) in which both bounds are within a
+//! limit.
 
 use super::error_model::ErrorModel;
 
@@ -19,7 +20,7 @@ pub struct ViewBox {
 const PARTS: [usize; 3] = [4, 2, 4];
 /// The most boxes.
 const MOST: usize = 8;
-/// A box that adds less than this share of all good parts is left out.
+/// A box that adds less than this share of all good parts is not returned.
 const WORTH: f64 = 0.005;
 /// Distance of boxes from the edges of cells: there the larger bound of two neighbours applies.
 const INSIDE: f64 = 1e-9;
@@ -28,7 +29,7 @@ const MARGIN: f64 = 1e-9;
 
 impl ErrorModel {
     /// Returns at most eight boxes, which may overlap, in each of which both bounds are at most `translation` (m) and
-    /// `yaw_deg` everywhere. Views that would need many more boxes are left out.
+    /// `yaw_deg` everywhere. Views that would need many more boxes are not covered.
     #[must_use]
     pub fn views(&self, translation: f64, yaw_deg: f64) -> Vec<ViewBox> {
         self.views_within(|_| [translation, yaw_deg])
@@ -129,7 +130,7 @@ impl ErrorModel {
         parts
     }
 
-    /// Returns where a part begins along an axis: metres, degrees.
+    /// Returns the beginning of a part along an axis: metres, degrees.
     fn end(&self, which: usize, part: usize) -> f64 {
         let axis = &self.cells().axes[which];
         let cell = (part / PARTS[which]).min(axis.cells() - 1);
@@ -216,7 +217,7 @@ mod tests {
 
     #[test]
     fn rectangles_are_the_largest() {
-        // A stair: three columns wide below, one wide above.
+        // A stair: three columns wide at the bottom, one wide at the top.
         let columns = [true, true, true, true, false, false];
         let mut all = Vec::new();
         largest(&columns, [2, 3], &mut |rectangle| all.push(rectangle));

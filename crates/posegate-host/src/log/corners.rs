@@ -11,7 +11,7 @@
 //!
 //! A tag that is small in the image fits nearly as well in its mirrored orientation (a pose flip). If the pixels do not
 //! distinguish the two poses, or fit no pose, [`locate`] returns no fix. [`locate_all`] returns both poses instead, each
-//! with its own covariance, and follows the valley of the least squares however it is curved.
+//! with its own covariance, and follows the valley of the least squares for any curvature.
 //!
 //! ```
 //! use posegate_host::log::corners::{MountedCamera, TagObservation, locate};
@@ -27,9 +27,9 @@
 //! };
 //! // The corners of a tag that is seen from 27 degrees off its normal, at 3.1 m, in pixels.
 //! let corners_px = [[284.9, 269.1], [338.1, 270.4], [338.1, 209.6], [284.9, 210.9]];
-//! let seen = TagObservation { tag: &tag.tag, tolerance: Tolerance::NONE, corners_px };
+//! let observation = TagObservation { tag: &tag.tag, tolerance: Tolerance::NONE, corners_px };
 //! // Corners are detected to 0.3 px; pose-sets have epsilon = 0.99.
-//! let fix = locate(&camera, &[seen], 0.3, 11.3449)?;
+//! let fix = locate(&camera, &[observation], 0.3, 11.3449)?;
 //! let [x, y, yaw] = fix.pose;
 //! assert!((x - 1.0).abs() < 0.01 && (y + 1.5).abs() < 0.01 && (yaw - 0.45).abs() < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -75,8 +75,8 @@ pub struct Fix {
     /// The covariance by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the
     /// wanted radius holds the true pose.
     pub covariance: [[f64; 3]; 3],
-    /// The factor between that covariance and the first-order one, before tolerances: 1 to 4 from [`locate`]; from
-    /// [`locate_all`] at least 1, in the direction in which it is largest.
+    /// The factor between that covariance and the first-order one, before tolerances. At least 1: at most 4 from
+    /// [`locate`]; from [`locate_all`] the largest of all directions.
     pub grown: f64,
     /// The root mean square of the pixel residuals.
     pub rms_px: f64,
@@ -104,7 +104,7 @@ pub enum FixError {
 }
 
 impl FixError {
-    /// Returns its name, in snake case.
+    /// Returns the reason's name in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -128,7 +128,7 @@ const CLEARER: f64 = 16.0;
 /// ellipsoid's radius.
 const RAYS: u32 = 192;
 const RAY_STEPS: u32 = 24;
-/// At these distances, in radii of the ellipsoid, no pose may fit.
+/// No pose may fit at these distances, in radii of the ellipsoid.
 const BEYOND: [f64; 5] = [2.25, 2.5, 3.0, 4.0, 6.0];
 /// Poses at least this far apart count as different, m and rad.
 const APART: f64 = 1e-3;
@@ -187,27 +187,27 @@ impl Fix {
     }
 }
 
-/// Returns by how much another pose must fit worse to be left out, as a difference of the sums of squares over sigma^2.
+/// Returns how much worse another pose must fit to be excluded, as a difference of the sums of squares over sigma^2.
 fn clearer(radius_squared: f64) -> f64 {
     CLEARER.max(1.5 * radius_squared)
 }
 
-/// Returns how far two poses are apart: metres and radians as one norm.
+/// Returns the distance of two poses: metres and radians as one norm.
 fn apart(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     let mut apart = a - b;
     apart.z = wrapped(apart.z);
     apart.norm()
 }
 
-/// Returns the value that a sum of squares over sigma^2 with this many degrees of freedom exceeds once in 30,000 times:
-/// 4 standard deviations in the approximation of Wilson and Hilferty.
+/// Returns the value that a sum of squares over sigma^2 with this many degrees of freedom exceeds with probability 1
+/// / 30,000: 4 standard deviations in the approximation of Wilson and Hilferty.
 fn misfit(freedom: usize) -> f64 {
     let n = freedom as f64;
     let part = 2.0 / (9.0 * n);
     n * libm::pow(1.0 - part + 4.0 * libm::sqrt(part), 3.0)
 }
 
-/// Returns the derivatives from the residuals one [`STEP`] ahead and behind.
+/// Returns the derivatives from the residuals one [`STEP`] ahead and one behind.
 fn slopes(ahead: &[f64], behind: &[f64]) -> Option<Vec<f64>> {
     let pairs = ahead.iter().zip(behind);
     let slopes: Vec<f64> = pairs.map(|(a, b)| (a - b) / (2.0 * STEP)).collect();
@@ -242,7 +242,7 @@ struct View<'e> {
 }
 
 impl<'e> View<'e> {
-    /// Returns the view if there is a tag, and all numbers are usable.
+    /// Returns the view if there is a tag and all numbers are finite.
     fn checked(
         eye: &'e MountedCamera,
         seen: &[TagObservation<'_>],
@@ -263,7 +263,8 @@ impl<'e> View<'e> {
         Ok(Self::of(eye, seen))
     }
 
-    /// Returns the local minima of the cost that are reached from all directions, best first. One minimum may be there several times.
+    /// Returns the local minima of the cost that are reached from all directions, best first. A minimum may occur
+    /// several times.
     fn minima(&self) -> Vec<(f64, Vector3<f64>)> {
         let mut found: Vec<(f64, Vector3<f64>)> = (0..STARTS)
             .filter_map(|k| self.descended(self.start(f64::from(k) / f64::from(STARTS))?))
@@ -287,8 +288,8 @@ impl<'e> View<'e> {
         }
     }
 
-    /// Returns a start pose: the first tag lies at the distance that its size in the image gives, at its place in the
-    /// image, in a given direction of the world (in turns).
+    /// Returns a start pose. The first tag is at its place in the image, at the distance that its size in the image
+    /// gives, in a given direction of the world (turns).
     fn start(&self, turns: f64) -> Option<Vector3<f64>> {
         let tag = self.corners.get(..4)?;
         let middle = tag
@@ -328,21 +329,21 @@ impl<'e> View<'e> {
             UnitQuaternion::from_euler_angles(0.0, 0.0, pose.z),
         );
         let to_mount = (robot * self.mount).inverse();
-        let mut left = Vec::with_capacity(2 * self.corners.len());
+        let mut residuals = Vec::with_capacity(2 * self.corners.len());
         for (corner, [u, v]) in &self.corners {
             let at = to_mount * corner;
             if !(at.x > 1e-3) {
                 return None;
             }
             let [pu, pv] = self.camera.project([-at.y / at.x, -at.z / at.x]);
-            left.extend([pu - u, pv - v]);
+            residuals.extend([pu - u, pv - v]);
         }
-        Some(left)
+        Some(residuals)
     }
 
     fn cost(&self, pose: &Vector3<f64>) -> Option<f64> {
-        let left = self.residuals(pose)?;
-        let cost: f64 = left.iter().map(|value| value * value).sum();
+        let residuals = self.residuals(pose)?;
+        let cost: f64 = residuals.iter().map(|value| value * value).sum();
         cost.is_finite().then_some(cost)
     }
 
@@ -361,15 +362,15 @@ impl<'e> View<'e> {
 
     /// Returns `J'J` and `J'e` at a pose.
     fn normal_equations(&self, pose: &Vector3<f64>) -> Option<(Matrix3<f64>, Vector3<f64>)> {
-        let left = self.residuals(pose)?;
+        let residuals = self.residuals(pose)?;
         let columns = self.jacobian(pose)?;
         let information = Matrix3::from_fn(|r, c| dot(&columns[r], &columns[c]));
-        let gradient = Vector3::from_fn(|r, _| dot(&columns[r], &left));
+        let gradient = Vector3::from_fn(|r, _| dot(&columns[r], &residuals));
         Some((information, gradient))
     }
 
-    /// Returns the factor by which the covariance must grow so that its ellipsoid, with the axes `root`, holds every
-    /// sampled pose whose cost is below a level. `None` if the factor would be above 4.
+    /// Returns the factor by which the covariance must grow so that its ellipsoid, with the axes `root`, contains
+    /// every sampled pose whose cost is below a level. `None` if the factor would be above 4.
     fn grown(&self, pose: &Vector3<f64>, root: &Matrix3<f64>, level: f64) -> Option<f64> {
         let fits = |ray: &Vector3<f64>, radii: f64| {
             self.cost(&(pose + ray * radii))

@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn three_rows_of_three() {
+    fn covariance_needs_three_rows_of_three_numbers() {
         let rows = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9e-3]];
         assert_eq!(read("1,2,3\n4,5,6\n7,8,9e-3\n"), Ok(rows));
         assert_eq!(

@@ -1,8 +1,9 @@
-//! Poses from the detections of a tag detector and the calibration that it publishes, by the tags and the camera of a site.
+//! Computes robot poses from the detections and calibration that a tag detector publishes, with the tags and the
+//! camera of a site.
 //!
-//! [`Detector::camera`] checks a calibration (ROS's CameraInfo) against the site's camera. [`Detector::look`] computes the poses that one
-//! image leaves open. Nothing here knows ROS: fields are those of `sensor_msgs/msg/CameraInfo` and
-//! `apriltag_msgs/msg/AprilTagDetection`.
+//! [`Detector::camera`] checks a calibration (ROS's CameraInfo) against the site's camera. [`Detector::look`]
+//! computes the poses that fit one image. This module does not depend on ROS: fields are those of
+//! `sensor_msgs/msg/CameraInfo` and `apriltag_msgs/msg/AprilTagDetection`.
 //!
 //! ```
 //! use posegate_host::log::detector::{CameraInfo, Detector, DetectorSettings, FoundTag};
@@ -40,17 +41,17 @@ mod tests;
 const AGREES_PX: f64 = 1.0;
 /// Points along a side of the image at which calibrations are compared.
 const GRID: u32 = 9;
-/// By how much a corner may be outside of the image: detectors fit lines beyond the last pixel.
+/// A corner may be this far outside of the image: detectors fit lines beyond the last pixel.
 const OUTSIDE_PX: f64 = 1.0;
 
-/// How detections are used.
+/// Settings of a [`Detector`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectorSettings {
     /// The standard deviation of each coordinate of a corner, pixels, above 0.
     pub corner_sigma_px: f64,
-    /// Detections with more corrected bits are not used.
+    /// Detections with more corrected bits than this are not used.
     pub max_hamming: i32,
-    /// The squared radius of the pose-sets.
+    /// The squared radius of the pose-sets: a chi-square quantile, such as 11.3449 for confidence 0.99.
     pub radius_squared: f64,
 }
 
@@ -71,9 +72,9 @@ pub struct CameraInfo {
     pub r: [f64; 9],
     /// The rectified image's projection matrix by rows; zeros if it is that of the raw image.
     pub p: [f64; 12],
-    /// Columns and rows that are combined into one; 0 for 1.
+    /// Columns and rows that are combined into one pixel; 0 means 1.
     pub binning: [u32; 2],
-    /// The part of the image that is published: first column, first row, columns, rows; zeros for all.
+    /// The published part of the image: first column, first row, columns, rows; zeros for all of it.
     pub roi: [u32; 4],
 }
 
@@ -82,52 +83,53 @@ pub struct CameraInfo {
 pub struct FoundTag {
     /// The family, with or without the prefix `tag`.
     pub family: String,
-    /// The number.
+    /// The tag's number in its family.
     pub id: i32,
-    /// Corrected bits.
+    /// The number of corrected bits.
     pub hamming: i32,
-    /// The corners in AprilTag's order (bottom left, bottom right, top right, top left as a viewer sees the upright tag), pixels.
+    /// The corners in AprilTag's order, pixels: bottom left, bottom right, top right, top left, as a viewer sees the
+    /// upright tag.
     pub corners_px: [[f64; 2]; 4],
 }
 
-/// Why a site gives no detector.
+/// The reason why a detector cannot be made for a site.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DetectorError {
     /// The site has no camera.
     #[error("the site has no camera: add [camera.NAME] to it")]
     NoCamera,
-    /// It has several.
+    /// The site has several cameras, and no name is given.
     #[error("the site has the cameras {0}: name one of them")]
     SeveralCameras(String),
-    /// It has no camera of this name.
+    /// The site has no camera of this name.
     #[error("the site has no camera `{name}`: it has {all}")]
     UnknownCamera {
-        /// The name.
+        /// The requested name.
         name: String,
-        /// The names of the site.
+        /// The names of the site's cameras.
         all: String,
     },
-    /// It has no tag.
+    /// The site has no tag.
     #[error("the site has no tag: add [tag.NAME] to it")]
     NoTag,
-    /// Two tags look the same.
+    /// Two tags have the same family and number.
     #[error(transparent)]
     Alike(#[from] AlikeTags),
-    /// The calibration has a tolerance.
+    /// The calibration of the site's camera has a tolerance.
     #[error(
         "camera `{0}` has a `tolerance` of its calibration, which poses from corners do not include: calibrate it well enough to leave the tolerance out, or use poses of a filter"
     )]
     Calibration(String),
 }
 
-/// Why a calibration is not used.
+/// The reason why a calibration is not used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraInfoError {
-    /// All numbers are 0.
+    /// The calibration is missing: the focal length is 0.
     #[error("the camera info has no calibration (fx is 0): calibrate the camera")]
     NotCalibrated,
-    /// The distortion is not one of the known models.
+    /// The distortion model or its number of coefficients is not supported.
     #[error(
         "the camera info has the distortion model `{model}` with {count} coefficients: expected plumb_bob with 5, rational_polynomial with 8, or equidistant with 4"
     )]
@@ -137,15 +139,15 @@ pub enum CameraInfoError {
         /// The number of coefficients.
         count: usize,
     },
-    /// The rectified image is turned.
+    /// The rectification rotates the image.
     #[error(
         "the camera info has a rectification matrix that turns the image, as for a stereo pair: let the detector read the raw image, and write image = \"raw\" in the site"
     )]
     Turned,
-    /// The numbers are not those of a camera.
+    /// The numbers are not a valid calibration.
     #[error("the camera info is not that of a camera: {0}")]
     Invalid(#[from] LensError),
-    /// Another size.
+    /// The image has another size than the site's camera.
     #[error(
         "the camera info is for an image of {found}, and the site's camera `{camera}` has {expected}: remap camera_info to that camera, or correct the site"
     )]
@@ -157,7 +159,7 @@ pub enum CameraInfoError {
         /// The size in the site.
         expected: String,
     },
-    /// Another calibration.
+    /// The calibration differs from the site's camera.
     #[error(
         "the camera info differs from the site's camera `{camera}` by up to {apart_px:.1} px (at most {most_px:.1}): another camera, another calibration, or another image (rect or raw); correct the site, then build its tables again"
     )]
@@ -171,7 +173,7 @@ pub enum CameraInfoError {
     },
 }
 
-/// Why an image gives no pose.
+/// The reason why an image gives no pose.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LookError {
@@ -188,7 +190,7 @@ pub enum LookError {
         /// The tags of the site.
         known: String,
     },
-    /// Too many corrected bits.
+    /// A detection has more corrected bits than are accepted.
     #[error(
         "the detection of tag {id} has {hamming} corrected bits, at most {most} are accepted (max_hamming)"
     )]
@@ -200,21 +202,21 @@ pub enum LookError {
         /// The largest accepted number.
         most: i32,
     },
-    /// A tag is there twice: one of them is not the site's.
+    /// A tag is detected twice, so one of the two is a copy or a reflection.
     #[error("tag {0} is detected twice in one image: remove the copy, or the reflection")]
     Twice(i32),
-    /// A corner is not in the image.
+    /// A corner is not finite or not in the image.
     #[error(
         "a corner of tag {0} is not in the image of the camera info: the detector reads another image"
     )]
     NotInImage(i32),
-    /// The corners give no pose.
+    /// No pose, or no single pose, fits the corners.
     #[error("the corners of the detected tags give no pose: {0}")]
     Corners(#[from] FixError),
 }
 
 impl LookError {
-    /// Returns `true` if a known tag was detected and contradicts what is known, so that an earlier pose must not be used any more.
+    /// Returns `true` if the detections contradict the site, so that an earlier pose must not be used any more.
     #[must_use]
     pub const fn is_contradiction(&self) -> bool {
         matches!(
@@ -234,7 +236,7 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// Makes a detector for a camera of a site; the name may be left out if the site has only one.
+    /// Returns a detector for a camera of a site; `None` selects the only camera.
     ///
     /// # Errors
     /// [`DetectorError`]
@@ -265,8 +267,8 @@ impl Detector {
             return Err(DetectorError::Calibration(name.clone()));
         }
         let tags = KnownTags::of(site);
-        if let Some(alike) = tags.alike() {
-            return Err(alike.clone().into());
+        if let Some(equal) = tags.alike() {
+            return Err(equal.clone().into());
         }
         Ok(Self {
             name: name.clone(),
@@ -276,23 +278,23 @@ impl Detector {
         })
     }
 
-    /// Returns the name of the camera in the site.
+    /// Returns the name of the camera in the site file.
     #[must_use]
     pub fn camera_name(&self) -> &str {
         &self.name
     }
 
-    /// Returns how detections are used.
+    /// Returns the settings.
     #[must_use]
     pub const fn settings(&self) -> DetectorSettings {
         self.settings
     }
 
-    /// Returns the camera with a published calibration, if that is the site's camera. The numbers are those of the calibration. Takes some
-    /// milliseconds for a camera with distortion.
+    /// Returns the site's camera with the numbers of a published calibration. Takes some milliseconds for a camera
+    /// with distortion.
     ///
-    /// The image is the one that the site says its detector reads. A site without distortion says that it reads a pinhole's image: then it
-    /// may be the rectified one.
+    /// The site says which image its detector reads, raw or rectified. A site without distortion stands for a pinhole
+    /// image, so its image may be the rectified one.
     ///
     /// # Errors
     /// [`CameraInfoError`]
@@ -317,7 +319,7 @@ impl Detector {
         })
     }
 
-    /// Compares a camera with the site's.
+    /// Checks that a camera agrees with the site's.
     fn agrees(&self, camera: &Camera) -> Result<(), CameraInfoError> {
         let own = &self.camera.camera;
         let size = |camera: &Camera| [camera.width_px, camera.height_px];
@@ -338,7 +340,7 @@ impl Detector {
                 (at(row, height) - own.cy) / own.fy,
             ];
             let [[u, v], [other_u, other_v]] = [own.project(ray), camera.project(ray)];
-            // Through a lens, the corners of this grid may be outside of the image.
+            // Points of this grid may be outside of the image of a lens.
             if (0.0..=width).contains(&u) && (0.0..=height).contains(&v) {
                 let apart = libm::hypot(other_u - u, other_v - v);
                 apart_px = apart_px.max(if apart.is_finite() { apart } else { 1e9 });
@@ -355,11 +357,11 @@ impl Detector {
         })
     }
 
-    /// Returns the poses of the robot that the detections of one image leave open, best first: one or two
-    /// ([`locate_all`]). Detections of other tags are ignored, as are those with too many corrected bits.
+    /// Returns the poses of the robot that fit the detections of one image, best first: one or two ([`locate_all`]).
+    /// Detections of unknown tags and detections with too many corrected bits are ignored.
     ///
     /// # Errors
-    /// [`LookError`]. If no detection can be used, the reason of the first one.
+    /// [`LookError`]. If no detection is usable, the reason of the first one.
     pub fn look(&self, camera: &MountedCamera, found: &[FoundTag]) -> Result<Vec<Fix>, LookError> {
         let mut seen = Vec::new();
         let mut ids = BTreeSet::new();
@@ -410,7 +412,7 @@ impl Detector {
         Ok(locate_all(camera, &seen, corner_sigma_px, radius_squared)?)
     }
 
-    /// Returns the first tags of the site, in words.
+    /// Returns the first tags of the site as text.
     fn known(&self) -> String {
         let mut words: Vec<String> = self
             .tags

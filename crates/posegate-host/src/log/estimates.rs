@@ -35,13 +35,13 @@ pub struct Row {
     pub truth: Option<[f64; 3]>,
     /// The number of the row within its report; `None` if there is no such column.
     pub hypothesis: Option<u64>,
-    /// The time since the last fix, seconds, if the reader was told its column and the field is not empty.
+    /// The time since the last fix, seconds; `None` if the reader has no column for it or the field is empty.
     pub since_fix_s: Option<f64>,
     /// The row's line in the file, from 1.
     pub line: u64,
 }
 
-/// The reason why a file is not a recording.
+/// The reason why a CSV file cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
@@ -67,9 +67,9 @@ pub enum LogError {
         /// The column.
         column: String,
     },
-    /// A field that is not a number.
+    /// A field is not a number.
     #[error(
-        "{file}:{line}:{column}: `{found}` in `{name}` is no number; expected a decimal number (`nan` and `inf` are numbers, and are denied)"
+        "{file}:{line}:{column}: `{found}` in `{name}` is not a number; expected a decimal number (`nan` and `inf` are numbers, and are denied)"
     )]
     NotANumber {
         /// The file.
@@ -83,7 +83,7 @@ pub enum LogError {
         /// The text of the field.
         found: String,
     },
-    /// A row whose `hypothesis` does not continue its report.
+    /// The `hypothesis` of a row does not continue its report.
     #[error("{file}:{line}: `hypothesis` is {found}; expected {expected}")]
     Hypothesis {
         /// The file.
@@ -92,10 +92,10 @@ pub enum LogError {
         line: u64,
         /// The number of the row.
         found: u64,
-        /// What it should be.
+        /// The expected number.
         expected: String,
     },
-    /// A covariance file that is not three by three.
+    /// A covariance file does not have three rows of three numbers.
     #[error(
         "{file}:{line}: {found} {what}; expected 3 (a covariance of x, y, yaw without a header)"
     )]
@@ -104,7 +104,7 @@ pub enum LogError {
         file: String,
         /// Line, from 1.
         line: u64,
-        /// What there are too few or too many of.
+        /// `rows` or `numbers in each row`.
         what: &'static str,
         /// Their number.
         found: usize,
@@ -252,14 +252,14 @@ impl<R: Read> Rows<R> {
         })
     }
 
-    /// Also reads the time since the last fix from a column, if the header has it. Returns whether it does.
+    /// Also reads the time since the last fix from a column. Returns `true` if the header has it.
     pub fn reads_since_fix(&mut self, column: &str) -> bool {
         let index = self.header.split(", ").position(|name| name == column);
         self.since_fix = index.map(|index| (index, "the time since the last fix"));
         index.is_some()
     }
 
-    /// Checks that the header has a time column.
+    /// Requires that the header has a time column.
     ///
     /// # Errors
     /// [`LogError::MissingColumn`] if it has none.
@@ -373,8 +373,8 @@ impl<R: Read> Iterator for Rows<R> {
     }
 }
 
-/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. `None`
-/// if the number is not a time; the caller treats the stamp as stale.
+/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. `None` if the number is
+/// not finite or too large; the caller treats the stamp as stale.
 #[must_use]
 pub fn clock_ms(seconds: f64) -> Option<u32> {
     let ms = libm::floor(seconds * 1000.0);
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_go_by_name() {
+    fn columns_are_found_by_name_in_any_order() {
         let rows = read(&format!(
             "{HEADER}3,1,2,11,12,13,22,23,33,x\n nan ,1,inf,1,2,3,4,5,6,\n"
         ))
@@ -421,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_files_are_named_with_their_place() {
+    fn errors_state_file_line_and_column() {
         let error = read("x_m,y_m\n1,2\n").unwrap_err();
         assert!(
             error.contains("log.csv:1:1") && error.contains("`yaw_rad`"),
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn truth_is_whole_or_not_there() {
+    fn incomplete_truth_is_an_error() {
         let header = HEADER.replace("other", "true_yaw_rad,true_x_m,true_y_m");
         let rows = read(&format!(
             "{header}3,1,2,11,12,13,22,23,33,9,7,8\n3,1,2,11,12,13,22,23,33,,,\n"
@@ -455,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_wrap() {
+    fn clock_wraps_at_2_pow_32_ms() {
         assert_eq!(clock_ms(1.2345), Some(1234));
         assert_eq!(clock_ms(4_294_967.296), Some(0));
         assert_eq!(clock_ms(-0.001), Some(u32::MAX));

@@ -1,7 +1,7 @@
 //! Reports of several hypotheses: rows of one time, numbered by a column `hypothesis`.
 //!
-//! A particle filter may have several clusters, and a tag that is seen squarely has two poses. Such a report is permitted only where
-//! the pose-set of every hypothesis is inside.
+//! A particle filter may have several clusters, and a tag that is seen head-on has two poses. Such a report is
+//! permitted only if the pose-set of every hypothesis is inside.
 
 use super::{LogError, Row};
 use std::ops::Range;
@@ -9,8 +9,8 @@ use std::ops::Range;
 /// Largest number of hypotheses of a report.
 pub const MOST_HYPOTHESES: usize = 8;
 
-/// Returns the rows of each report. Without a column `hypothesis` every row is a report of its own. With it a report begins at each 0;
-/// the next rows are its hypotheses 1, 2 and so on, and have the same times.
+/// Returns the rows of each report. Without a column `hypothesis` every row is a report of its own. With it a report
+/// begins at each 0; the next rows are its hypotheses 1, 2 and so on, and have the same time.
 ///
 /// # Errors
 /// [`LogError::Hypothesis`] for the first row whose number or time does not continue its report. `file` names the input.
@@ -64,13 +64,13 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_a_time_are_one_report() {
+    fn numbered_rows_of_one_time_are_one_report() {
         let text = "1,0,0,0,0\n1,1,0,0,1\n2,0,0,0,0\n2,0,0,0,0\n2,1,0,0,1\n2,2,0,0,2\n";
         assert_eq!(grouped(text), Ok(vec![2, 1, 3]));
     }
 
     #[test]
-    fn rows_that_do_not_continue_a_report_are_named() {
+    fn rows_that_do_not_continue_a_report_are_errors() {
         for (text, place) in [
             ("1,0,0,0,1\n", "log.csv:2"),
             ("1,0,0,0,0\n1,0,0,0,2\n", "log.csv:3"),

@@ -1,4 +1,4 @@
-//! The tags of a site as a detector names them: by family and number.
+//! The tags of a site by family and number, as a detector reports them.
 
 use crate::site::{Site, SiteTag};
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// A tag's family without the prefix `tag`, which some detectors write, and its number.
 type Key = (String, i64);
 
-/// Two tags with the same family and number: an image does not show which one is seen.
+/// Two tags with the same family and number: an image does not distinguish them.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the tags `{first}` and `{second}` have the same family and id, so an image does not show which one is seen: give one another id, or leave one out of the site"
@@ -26,7 +26,7 @@ pub struct KnownTags {
 }
 
 impl KnownTags {
-    /// Returns the tags of a site. Tags with the same family and number are left out: see [`Self::alike`].
+    /// Returns the tags of a site. Tags with the same family and number are excluded: see [`Self::alike`].
     #[must_use]
     pub fn of(site: &Site) -> Self {
         let mut named: BTreeMap<Key, Vec<(&String, &SiteTag)>> = BTreeMap::new();
@@ -52,19 +52,19 @@ impl KnownTags {
         known
     }
 
-    /// Returns the first two tags that are left out because an image does not distinguish them.
+    /// Returns the first two tags that were excluded because an image does not distinguish them.
     #[must_use]
     pub const fn alike(&self) -> Option<&AlikeTags> {
         self.alike.as_ref()
     }
 
-    /// Returns the tag of a detection; the family may lack its prefix `tag`.
+    /// Returns the tag of a detection; the prefix `tag` of the family is optional.
     #[must_use]
     pub fn get(&self, family: &str, id: i64) -> Option<&SiteTag> {
         self.tags.get(&key(family, id))
     }
 
-    /// Returns all tags that detections identify, by family and number.
+    /// Returns all tags that detections can identify, by family and number.
     pub fn all(&self) -> impl Iterator<Item = &SiteTag> {
         self.tags.values()
     }
@@ -80,7 +80,7 @@ mod tests {
     use crate::site::SAMPLE;
 
     #[test]
-    fn alike_tags_are_left_out() {
+    fn tags_with_equal_family_and_id_are_excluded() {
         let known = |more: &str| {
             let site = Site::parse(&format!("{SAMPLE}\n{more}"), "site.toml").unwrap();
             KnownTags::of(&site)
@@ -91,7 +91,7 @@ mod tests {
         let twin = "[tag.other]\nid = 7\nfamily = \"36h11\"\nsize = 0.3\npose = { x = 9.0, y = 9.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
         let both = known(twin);
         assert!(both.get("tag36h11", 7).is_none() && both.all().count() == 0);
-        let alike = both.alike().unwrap();
-        assert_eq!([&*alike.first, &*alike.second], ["other", "t7"]);
+        let equal = both.alike().unwrap();
+        assert_eq!([&*equal.first, &*equal.second], ["other", "t7"]);
     }
 }

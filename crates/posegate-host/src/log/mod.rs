@@ -8,7 +8,7 @@
 //! let rows = estimates(csv.as_bytes(), "run.csv", Columns::TimedPoses)?;
 //! assert_eq!((rows[0].t_s, rows[0].truth), (Some(0.5), Some([1.02, 0.0, 0.1])));
 //!
-//! // A fault has its file, line and column.
+//! // An error states file, line and column.
 //! let error = estimates("x_m,y_m,yaw_rad\n1,2,east\n".as_bytes(), "run.csv", Columns::Poses).unwrap_err();
 //! assert!(error.to_string().starts_with("run.csv:2:3: `east`"));
 //! # Ok::<(), posegate_host::log::LogError>(())

@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn between_poses_is_interpolated() {
+    fn pose_between_two_poses_is_interpolated() {
         let mut track = Trajectory::new(3, 1.0);
         assert_eq!(track.at(0.0), TruthLookup::NotYet);
         track.push(1.0, [0.0, 2.0, 3.1]);
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_later_pose_is_counted() {
+    fn poses_that_are_not_later_are_counted_as_left_out() {
         let mut track = Trajectory::new(2, 1.0);
         for (t_s, x) in [
             (1.0, 0.0),

@@ -187,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn comments_and_line_ends_do_not_matter() {
+    fn comments_and_line_ends_are_ignored() {
         let text = "\u{feff}# a trajectory\r\n\r\n 1.5\t1 2 3 0 0 0.7071 0.7071 # here\r\n2.5 1 2 3 0 0 0 -1.0002";
         let poses = trajectory(text, "t.txt").unwrap();
         assert_eq!(poses.len(), 2);
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_lines_are_named_with_their_place() {
+    fn errors_state_file_line_and_column() {
         let good = "1 0 0 0 0 0 0 1\n";
         for (text, start) in [
             ("", "t.txt:1:1: no pose"),

@@ -1,4 +1,4 @@
-//! Verdicts in numbers that people and scripts read: metres, radians, factors.
+//! Converts verdicts to metres, radians and factors.
 
 use posegate::contain::Margin;
 use posegate::pose::Pose;
@@ -32,14 +32,14 @@ mod tests {
     use posegate::num::BinaryAngle;
 
     #[test]
-    fn a_denial_never_reads_one() {
+    fn margin_of_a_denial_is_printed_below_one() {
         assert_eq!(factor_text(Margin::from_q16(65_535)), "0.999");
         assert_eq!(factor_text(Margin::ONE), "1.000");
         assert_eq!(factor(Margin::from_q16(1 << 17)), 2.0);
     }
 
     #[test]
-    fn poses_read_as_metres_and_radians() {
+    fn poses_are_converted_to_metres_and_radians() {
         let pose = Pose {
             x_um: -1_500_000,
             y_um: 20_000,

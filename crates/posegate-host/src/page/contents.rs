@@ -29,7 +29,7 @@ pub struct PageInput<'a> {
     pub pictures: Vec<(String, String)>,
 }
 
-/// The reason why there is no page.
+/// The reason why a page cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
@@ -39,7 +39,7 @@ pub enum PageError {
     /// A placement of a task that does not exist.
     #[error("the site has no task `{0}`")]
     NoTask(String),
-    /// A placement with none of the task's tags where it begins, and none where it ends.
+    /// A placement has none of the task's tags at its start or at its end.
     #[error(
         "none of the tags of `{0}` is where its placement begins, or at the place that it found: it belongs to another site, or to another version of this one"
     )]
@@ -57,7 +57,7 @@ pub enum PageError {
 /// The content of one task.
 #[derive(Clone, Debug)]
 pub struct Shown {
-    /// Its name.
+    /// The task's name.
     pub name: String,
     /// The table's bytes with the proof, or the reason why there is none.
     pub table: Result<(Vec<u8>, Proof), String>,
@@ -68,7 +68,7 @@ pub struct Shown {
     pub sections: Vec<(f64, Vec<Vec<[f64; 2]>>)>,
     /// The floor plan.
     pub floor: String,
-    /// The camera's image with what is seen in it, if the task has a camera.
+    /// The camera's image with the visible tags, if the task has a camera.
     pub image: Option<(String, Vec<SeenFrom>)>,
 }
 
@@ -126,7 +126,7 @@ impl Contents {
             let found = list.iter().filter_map(|shown| shown.found.as_ref().ok());
             found.map(|(report, _)| report.clone()).collect()
         };
-        // Routes that the planner found; without plans those of the chains in the site file.
+        // The routes of the plans; without plans those of the chains in the site file.
         let mut routes = found(&plans);
         if routes.is_empty() {
             routes = found(&chains);
@@ -195,8 +195,8 @@ fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), Strin
 
 /// Returns headings over a range of degrees, including the goal's if it is in the range.
 fn spread([lo, hi]: [f64; 2]) -> Vec<f64> {
-    let wanted = libm::ceil(0.5 * (hi - lo)) as usize + 1;
-    let count = wanted.clamp(HEADINGS[0], HEADINGS[1]);
+    let steps_of_2_deg = libm::ceil(0.5 * (hi - lo)) as usize + 1;
+    let count = steps_of_2_deg.clamp(HEADINGS[0], HEADINGS[1]);
     let last = (count - 1) as f64;
     // Stay within the closed set, despite the rounding of sums of angles.
     let within = 1e-9_f64.min(0.25 * (hi - lo));

@@ -1,6 +1,6 @@
 //! Figures and tables of a page.
 
-/// Escapes text for HTML. Control characters, which HTML does not have, are replaced by U+FFFD.
+/// Escapes text for HTML. Control characters, which HTML does not allow, are replaced by U+FFFD.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -132,10 +132,10 @@ mod tests {
     }
 
     #[test]
-    fn text_is_no_markup() {
-        let told = escaped("</script><a b='c' d=\"e\">&");
+    fn markup_in_text_is_escaped() {
+        let text = escaped("</script><a b='c' d=\"e\">&");
         assert_eq!(
-            told,
+            text,
             "&lt;/script&gt;&lt;a b=&#39;c&#39; d=&quot;e&quot;&gt;&amp;"
         );
         assert_eq!(escaped("a\u{1b}\u{85}\n\tb"), "a\u{fffd}\u{fffd}\n\tb");

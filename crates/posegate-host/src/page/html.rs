@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::alike::{alike, area};
 use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
+use super::equal_tasks::{area, groups_of_equal};
 use super::figures::{base64, escaped, figure, fixed, folded, numbers, table};
 use super::summary::{summary, text as margin_text, worst};
 use crate::draw::{
@@ -62,7 +62,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         .collect();
     let tasks: Vec<Value> = tasks.into_iter().map(|(_, task)| task).collect();
     let data = json!({ "core": base64(super::CORE), "epsilon": site.epsilon, "tasks": tasks });
-    // The data must not contain anything that looks like the end of the script element.
+    // The data must not contain the end of the script element.
     let data = data.to_string().replace('<', "\\u003c");
     let parts = [
         ("title", escaped(&order.title)),
@@ -191,7 +191,7 @@ fn tasks(site: &Site, contents: &Contents) -> String {
         ],
         &rows,
     );
-    for group in alike(site, &contents.tasks) {
+    for group in groups_of_equal(site, &contents.tasks) {
         let Some((first, others)) = group.split_first() else {
             continue;
         };
@@ -200,7 +200,7 @@ fn tasks(site: &Site, contents: &Contents) -> String {
     text
 }
 
-/// Returns the figures of a task. Those of tasks that are alike are folded.
+/// Returns the figures of a task. Those of equal tasks are folded.
 fn one_task(shown: &Shown, others: &[&Shown]) -> String {
     let name = escaped(&shown.name);
     let mut text = format!("<h3 id=\"task-{name}\">{name}</h3>\n");
@@ -343,7 +343,7 @@ fn chains(contents: &Contents) -> String {
                                 format!("{} at step {}", margin_text(margin), step + 1)
                             },
                         ),
-                        way(report),
+                        steps_text(report),
                     ]);
                     let inside = figure(picture, &format!("{name}, step by step: {end}"))
                         + &numbers(
@@ -364,8 +364,8 @@ fn chains(contents: &Contents) -> String {
     table(&["", "result", "worst margin", "steps"], &rows) + &more
 }
 
-/// Returns the steps of a chain in words.
-fn way(report: &ChainReport) -> String {
+/// Returns the steps of a chain as text.
+fn steps_text(report: &ChainReport) -> String {
     let steps = report.steps.iter().map(|step| {
         let task = step.task.as_deref().unwrap_or_default();
         let ends = [step.before.pose, step.after.pose];
@@ -445,27 +445,27 @@ const PLACE_HEAD: [&str; 8] = [
 
 fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
     let mut text = String::new();
-    for (task, told) in &order.placements {
+    for (task, placement) in &order.placements {
         let Some(of) = order.site.tasks.get(task) else {
             return Err(PageError::NoTask(task.clone()));
         };
-        let hangs = |pose| of.success.tags().iter().any(|tag| tag.pose == pose);
-        let is_before = pose_of(&told["before"]).is_none_or(hangs);
-        // The user has written the found place into the site file: its digest is another one.
-        let is_adopted = !is_before && is_adopted(&of.success.tags(), told);
+        let is_mounted = |pose| of.success.tags().iter().any(|tag| tag.pose == pose);
+        let is_before = pose_of(&placement["before"]).is_none_or(is_mounted);
+        // The user may have written the found place into the site file, whose digest is then another one.
+        let is_adopted = !is_before && is_adopted(&of.success.tags(), placement);
         if !is_before && !is_adopted {
             return Err(PageError::OtherTag(task.clone()));
         }
         let digest = order.site.digest_text();
-        if let Some(other) = told["site_digest"].as_str()
+        if let Some(other) = placement["site_digest"].as_str()
             && is_before
             && other != digest
         {
             return Err(PageError::OtherSite(task.clone(), other.into(), digest));
         }
         let mut rows = Vec::new();
-        let named = [("before", &told["before"]), ("best", told)];
-        let others = told["others"].as_array().into_iter().flatten();
+        let named = [("before", &placement["before"]), ("best", placement)];
+        let others = placement["others"].as_array().into_iter().flatten();
         for (name, place) in named
             .into_iter()
             .chain(others.map(|other| ("another", other)))
@@ -482,10 +482,14 @@ fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
             "<p>The site file, the plans and the mounting sheet have the tag at the place \u{201c}before\u{201d}. To hang it at the best place, write that pose into the site file.</p>\n"
         };
         text += "<div class=\"pair\">\n";
-        // Where the tag of the site file is now.
-        let now = if is_adopted { told } else { &told["before"] };
+        // The present place of the tag in the site file.
+        let now = if is_adopted {
+            placement
+        } else {
+            &placement["before"]
+        };
         for (name, what) in named {
-            if let Some(picture) = hung(order.site, task, now, what) {
+            if let Some(picture) = floor_with_tag_at(order.site, task, now, what) {
                 text += &figure(&picture, &format!("{task}, the tag {name}"));
             }
         }
@@ -507,12 +511,12 @@ fn pose_of(place: &Value) -> Option<Pose3Deg> {
     })
 }
 
-/// Returns `true` if one of the tags is at the place that was found, or within the reserve for which that place was proven.
-fn is_adopted(tags: &[Tag], told: &Value) -> bool {
-    let Some(found) = pose_of(told) else {
+/// Returns `true` if a tag is at the found place, or within the reserve for which that place was proven.
+fn is_adopted(tags: &[Tag], placement: &Value) -> bool {
+    let Some(found) = pose_of(placement) else {
         return false;
     };
-    let reserve = |key: &str| told["reserve"][key].as_f64().unwrap_or(0.0);
+    let reserve = |key: &str| placement["reserve"][key].as_f64().unwrap_or(0.0);
     // A pose is copied with four decimals.
     let (metres, degrees) = (
         reserve("translation").max(1e-4),
@@ -528,9 +532,9 @@ fn is_adopted(tags: &[Tag], told: &Value) -> bool {
     })
 }
 
-/// Draws the floor of a task with its tag at a place. If there are several tags, the moved tag is the one nearest to the pose
-/// `now`.
-fn hung(site: &Site, task: &str, now: &Value, place: &Value) -> Option<String> {
+/// Draws the floor of a task with its tag at a place. If there are several tags, the moved tag is the one nearest to
+/// the pose `now`.
+fn floor_with_tag_at(site: &Site, task: &str, now: &Value, place: &Value) -> Option<String> {
     let pose = pose_of(place)?;
     let size = place["size"].as_f64();
     let mut site = site.clone();

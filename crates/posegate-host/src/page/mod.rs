@@ -1,12 +1,12 @@
-//! A site as one page for a browser: its plan, its tasks' success sets, tables and chains, and its tags. The page also
-//! has the core itself, as WebAssembly, which decides on an estimate that the reader drags.
+//! A site as one page for a browser: its plan, its tasks' success sets, tables and chains, and its tags. The page
+//! contains the core as WebAssembly, which decides on an estimate that the reader drags.
 //!
 //! The page is one file. It fetches nothing (its own policy forbids it), and follows the reader's choice of light or
 //! dark. Without WebAssembly it reports that, and still shows its pictures and numbers.
 //!
 //! `core.wasm` is the C boundary (`posegate-c`) compiled for `wasm32-unknown-unknown`. `./ci.sh wasm_bytes` builds it
-//! again and compares the bytes. It imports nothing, which shows that no panic is reachable in it. `./ci.sh browser`
-//! lets it make the decisions of the committed vector file in a browser.
+//! again and compares the bytes. It has no imports, which shows that no panic is reachable in it. `./ci.sh browser`
+//! runs the committed vector file through it in a browser.
 //!
 //! ```
 //! use posegate_host::page::{Contents, PageInput, page};
@@ -30,8 +30,8 @@
 pub use self::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 pub use self::html::page;
 
-mod alike;
 mod contents;
+mod equal_tasks;
 mod figures;
 mod html;
 mod start;

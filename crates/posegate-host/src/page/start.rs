@@ -1,4 +1,4 @@
-//! The first standard deviations of the panel in which an estimate is dragged.
+//! The initial standard deviations of the panel in which the reader drags an estimate.
 
 use crate::log::factor;
 use crate::site::Task;
@@ -6,13 +6,14 @@ use posegate::gate::{Verdict, judge};
 use posegate::set::{Estimate, PoseSet};
 use posegate::table::Table;
 
-/// The margin of the first pose-set: well inside, and near enough to the border to see it leave when it is dragged.
+/// The margin of the first pose-set: well inside, and so near the border that it leaves the set when it is dragged.
 const MARGIN: f64 = 1.5;
-/// The first pose-set is at most this share of the drawn part, and this many degrees.
+/// The largest first pose-set: this share of the drawn part, and this many degrees.
 const LARGEST: [f64; 2] = [0.25, 10.0];
 
-/// Returns sigmas of x, y (m) and yaw (degrees): those of the expected pose-set; without one, those of a pose-set about the goal
-/// that is proven inside with a margin of about 1.5. `wide` is the smaller side of the drawn part, metres.
+/// Returns sigmas of x, y (m) and yaw (degrees): those of the expected pose-set; without one, those of a pose-set
+/// about the goal that is proven inside with a margin of about 1.5. `wide` is the smaller side of the drawn part,
+/// metres.
 pub(super) fn first_sigmas(task: &Task, wide: f64, table: Option<&Table<'_>>) -> [f64; 3] {
     let radius = table.map_or(3.0, |table| {
         libm::sqrt(f64::from(table.radius_squared().q16()) / 65_536.0)
@@ -62,7 +63,7 @@ fn rounded_down(value: f64) -> f64 {
     }
     let unit = libm::pow(10.0, libm::floor(libm::log10(value)) - 1.0);
     let digits = libm::floor(value / unit + 1e-9);
-    // A division by a power of ten has no digits beyond those.
+    // The inverse of a power of ten avoids further digits.
     let inverse = libm::round(1.0 / unit);
     if inverse >= 1.0 {
         digits / inverse
@@ -79,7 +80,7 @@ mod tests {
     use posegate::verify::build;
 
     #[test]
-    fn the_first_pose_set_is_inside_and_near_the_border() {
+    fn first_pose_set_is_inside_and_near_the_border() {
         let site = Site::parse(SAMPLE, "site.toml").unwrap();
         for (name, task) in &site.tasks {
             let order = BakeInput {
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn two_digits_are_kept() {
+    fn two_significant_digits_are_kept() {
         for (value, rounded) in [(0.012_99, 0.012), (1.29, 1.2), (0.3, 0.3), (47.9, 47.0)] {
             assert_eq!(rounded_down(value), rounded);
         }

@@ -1,4 +1,4 @@
-//! The first lines of a page: are the site's work tasks served, by how many tags, with which worst margin?
+//! The first lines of a page: the number of served work tasks, the tags that they need, and the worst margin.
 
 use super::contents::{Contents, ShownChain};
 use super::figures::escaped;
@@ -72,14 +72,14 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
             Err(why) => format!("chain {name} is not evaluated: {why}"),
         });
     }
-    // The line is red, so it says why.
+    // The line is red, so it states the reason.
     match failing {
         0 => {}
         1 => line.text += ", 1 chain FAILS",
         more => line.text += &format!(", {more} chains FAIL"),
     }
     good &= failing == 0;
-    // A proof is about the site file: what is doubtful in it stands beside the claim.
+    // A proof is about the site file, so doubts about the file follow the claim.
     let warnings = examine(site).warnings;
     let class = match (good, warnings.is_empty()) {
         (true, true) => "good",
@@ -104,7 +104,7 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
 /// Below this margin, errors that are a little larger than stated break a plan.
 const LITTLE_SLACK: f64 = 1.05;
 
-/// The first line, and whether it is good news.
+/// The first line; `true` if all tasks are served.
 struct Line {
     text: String,
     good: bool,
@@ -142,7 +142,7 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
             );
         }
     }
-    // A manager reads of docks where all of the work is docking.
+    // If all work is docking, the text says docks.
     let what = if works.iter().all(|name| name.contains("dock")) {
         "docks"
     } else {
@@ -197,7 +197,7 @@ pub(super) fn worst(report: &ChainReport) -> Option<(Margin, usize)> {
     margins.min_by_key(|(margin, _)| margin.q16())
 }
 
-/// Formats a margin with two decimals, rounded down: what is printed is proven.
+/// Formats a margin with two decimals, rounded down: the printed value is proven.
 pub(super) fn text(margin: Margin) -> String {
     format!("{:.2}", libm::floor(factor(margin) * 100.0) / 100.0)
 }

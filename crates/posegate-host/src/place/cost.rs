@@ -78,7 +78,7 @@ pub struct ExpectedCost {
     pub headings: u32,
 }
 
-/// The reason why there is no expected cost.
+/// The reason why a pose-set has no expected cost.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CostError {
@@ -100,15 +100,15 @@ pub enum CostError {
 
 /// Returns the expected cost of a pose-set about the set's goal (the paper's `x = x*`).
 ///
-/// S is the whole success set, as in [`SuccessSet::membership`]. If several tags are seen, the least of their costs
-/// counts.
+/// S is the complete success set, as in [`SuccessSet::membership`]. If several tags are seen, the least of their
+/// costs counts.
 ///
 /// The mass outside is integrated between the exact borders of S ([`expected_cost_of`]), so its relative accuracy is
-/// good even if a miss is rare. At each heading the position is known of everything that S keeps away from (obstacles,
-/// hidden places, a tag too near or seen too head-on), and of each box or region of a union. Each of these is met by a
-/// ray, or its mass is included in the reported error. (The headings at which one comes within reach are searched by
-/// distance, from 48 or more samples; that is not a proof.) A gap that only the views of a union leave between them has
-/// no such guard: a gap smaller than the distance between rays may be missed.
+/// good even if a miss is rare. At each heading, the positions of all parts that S excludes are known (obstacles,
+/// hidden places, a tag too near or seen too head-on), and those of each box or region of a union. A ray meets each
+/// of these parts, or its mass is included in the reported error. (The headings at which a part comes within reach
+/// are searched by distance, from 48 or more samples; that is not a proof.) A gap between the views of a union is not
+/// searched in this way: a gap smaller than the distance between rays may be missed.
 ///
 /// # Errors
 /// [`CostError`] if there is no expected cost.
@@ -137,7 +137,7 @@ enum CostDomain {
     Perhaps,
 }
 
-/// Like [`expected_cost`], for any cost of a view `[d, phi, psi]` (m, rad). The cost is at least 0, and infinite where
+/// Like [`expected_cost`], for any cost of a view `[d, phi, psi]` (m, rad). The cost is at least 0, and infinite if
 /// it is unknown.
 ///
 /// The mass of the unknown views is integrated separately. Along each ray their ends are searched between 21 samples of
@@ -148,9 +148,9 @@ enum CostDomain {
 /// arguments on every machine.
 ///
 /// The density is that of a standard normal u in a ball. At each heading (u1) the rest is a disc, which is swept by
-/// rays from its centre. The intervals of each ray inside the set are exact. The mass between them is closed form
-/// (`exp(-a^2/2) - exp(-b^2/2)`), the cost a Gauss-Kronrod sum. The sum over rays is Gauss-Kronrod between the angles
-/// at which the limiting constraint changes; headings are refined adaptively.
+/// rays from its centre. The intervals of each ray inside the set are exact. The mass between them has a closed form
+/// (`exp(-a^2/2) - exp(-b^2/2)`); the cost is a Gauss-Kronrod sum. The sum over rays is Gauss-Kronrod between the
+/// angles at which the limiting constraint changes; headings are refined adaptively.
 ///
 /// # Errors
 /// [`CostError`] if there is no expected cost.
@@ -214,7 +214,7 @@ fn summed(
     if known == CostDomain::Perhaps {
         let _ = rough::sums(&along, &white, &noted);
     }
-    // Integrate the unknown part first if it is met easily: its value then shows how accurate the rest must be.
+    // Integrate the unknown part first if rays meet it: its value determines the accuracy that the rest needs.
     let first = met_unknown.get().then(unknown);
     let sure = first.map_or(0.0, |(mass, _)| c_high * mass.value);
     let (sum, headings) = integrate(&noted, MissCost { c_high, sure });
@@ -274,7 +274,7 @@ impl ExpectedCost {
             Some((membership.inside, cost))
         });
         let looks: Vec<(bool, f64)> = looks.collect();
-        // In the set without a view, as in a union with a box: use the views of all tags.
+        // If the pose is in the set without a view, as in a union with a box, use the views of all tags.
         let none_sees = looks.iter().all(|(sees, _)| !sees);
         let seen = looks.iter().filter(|(sees, _)| *sees || none_sees);
         let seen = seen.map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
@@ -294,7 +294,7 @@ impl ExpectedCost {
     }
 }
 
-/// The integrand for the unknown mass, from the cost of a view: known costs give minus infinity, so a known view
+/// The integrand for the unknown mass, from the cost of a view. A known cost gives minus infinity, so a known view
 /// excludes the pose.
 pub(super) fn unknown(cost: f64) -> f64 {
     if cost.is_finite() {

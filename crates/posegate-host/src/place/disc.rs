@@ -12,7 +12,7 @@ use posegate::shape::{Headed, LineSegment};
 /// two rays.
 const BEYOND: f64 = 1.05;
 
-/// Directions tried from a tag, in addition to those in which it is seen best, if the disc's centre is outside
+/// Directions tried from a tag, in addition to those in which it is seen best. Used if the disc's centre is outside
 /// the set.
 const FAN: u32 = 32;
 
@@ -30,7 +30,7 @@ pub(super) struct Disc<'a> {
 }
 
 /// A direction that was evaluated.
-struct Looked {
+struct EvaluatedDirection {
     angle: f64,
     signature: u64,
     leaves: Option<f64>,
@@ -57,15 +57,15 @@ impl<'a> Disc<'a> {
     fn ray(&self, angle: f64) -> Ray {
         let walk = LineSegment {
             from: self.middle,
-            way: self.white.way([libm::cos(angle), libm::sin(angle)]),
+            way: self.white.to_metres([libm::cos(angle), libm::sin(angle)]),
             length: BEYOND * self.radius,
         };
         Ray::cast(self.headed, self.views, walk, self.radius)
     }
 
-    fn look(&self, angle: f64) -> Looked {
+    fn look(&self, angle: f64) -> EvaluatedDirection {
         let ray = self.ray(angle);
-        Looked {
+        EvaluatedDirection {
             angle,
             signature: ray.signature(),
             leaves: ray.leaves,
@@ -78,17 +78,17 @@ impl<'a> Disc<'a> {
         let corners = self.corners(aim);
         let scale = known.seen.value;
         let rule = Cell::new(Rule::By7);
-        // A panel's ends are positions: the index of the corner before, plus a fraction of the way to the next
+        // A panel's ends are positions: the index of the previous corner, plus a fraction of the path to the next
         // corner.
         let take = |from: f64, to: f64| {
             let corner = libm::floor(from);
             let (low, high) = (corners[corner as usize], corners[corner as usize + 1]);
-            let (width, whole) = (high - low, corners.len() == 2);
+            let (width, is_full_turn) = (high - low, corners.len() == 2);
             let mut relative = None;
             panel(from, to, Smooth::Surely, |place| {
                 let s = place - corner;
                 // The slope is zero at corners, where a ray may touch a border.
-                let (share, slope) = if whole {
+                let (share, slope) = if is_full_turn {
                     (s, 1.0)
                 } else {
                     (s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s))
@@ -156,32 +156,33 @@ impl<'a> Disc<'a> {
     /// repeated at the end.
     fn corners(&self, aim: AccuracyTarget) -> Vec<f64> {
         let count = aim.parts(24, 64);
-        // Offset from the axes, where corners often lie.
+        // Offset from the axes, because corners are often on the axes.
         let around = |k: u32| 0.05 + TAU * f64::from(k) / f64::from(count);
         let mut angles: Vec<f64> = (0..count).map(around).collect();
         let start = angles[0];
-        let mut looked: Vec<Looked> = angles.drain(..).map(|angle| self.look(angle)).collect();
-        let outside = looked.iter().all(|look| look.leaves.is_none());
+        let mut evaluated: Vec<EvaluatedDirection> =
+            angles.drain(..).map(|angle| self.look(angle)).collect();
+        let outside = evaluated.iter().all(|look| look.leaves.is_none());
         let seeds = if outside {
             self.toward_the_set()
         } else {
-            self.nearly(&looked)
+            self.nearly(&evaluated)
         };
         for seed in seeds {
             let angle = start + (seed - start).rem_euclid(TAU);
-            looked.push(self.look(angle));
+            evaluated.push(self.look(angle));
         }
-        looked.sort_by(|a, b| a.angle.total_cmp(&b.angle));
-        if let Some(first) = looked.first() {
-            let again = Looked {
+        evaluated.sort_by(|a, b| a.angle.total_cmp(&b.angle));
+        if let Some(first) = evaluated.first() {
+            let again = EvaluatedDirection {
                 angle: start + TAU,
                 ..*first
             };
-            looked.push(again);
+            evaluated.push(again);
         }
         let tight = (1e-3 * aim.accuracy).max(1e-10);
         let mut corners = Vec::new();
-        for pair in looked.windows(2) {
+        for pair in evaluated.windows(2) {
             self.part(&pair[0], &pair[1], tight, &mut corners);
         }
         let first = corners.first().copied().unwrap_or(start);
@@ -193,7 +194,13 @@ impl<'a> Disc<'a> {
     }
 
     /// Adds the angles between two directions at which the rays' limiting constraints change, in order.
-    fn part(&self, a: &Looked, b: &Looked, tight: f64, corners: &mut Vec<f64>) {
+    fn part(
+        &self,
+        a: &EvaluatedDirection,
+        b: &EvaluatedDirection,
+        tight: f64,
+        corners: &mut Vec<f64>,
+    ) {
         let mut open = std::vec![(a.angle, a.signature, b.angle, b.signature)];
         while let Some((from, left, to, right)) = open.pop() {
             if left == right {
@@ -210,13 +217,13 @@ impl<'a> Disc<'a> {
         }
     }
 
-    /// Returns directions in which a border enters the disc between two evaluated angles, although at these
-    /// angles it is just outside the disc.
-    fn nearly(&self, looked: &[Looked]) -> Vec<f64> {
+    /// Returns directions in which a border enters the disc between two evaluated angles, but is just outside the
+    /// disc at these angles.
+    fn nearly(&self, evaluated: &[EvaluatedDirection]) -> Vec<f64> {
         let mut seeds = Vec::new();
-        let count = looked.len();
-        let leaves = |k: usize| looked[k % count].leaves.unwrap_or(0.0);
-        for (k, look) in looked.iter().enumerate() {
+        let count = evaluated.len();
+        let leaves = |k: usize| evaluated[k % count].leaves.unwrap_or(0.0);
+        for (k, look) in evaluated.iter().enumerate() {
             let here = look.leaves.unwrap_or(0.0);
             let (before, after) = (leaves(k + count - 1), leaves(k + 1));
             let near = here > self.radius && here < BEYOND * self.radius;
@@ -249,8 +256,8 @@ impl<'a> Disc<'a> {
         seeds
     }
 
-    /// Returns the directions from the disc's centre to the parts of the set that lie on lines from each tag.
-    /// Seen from outside, a set may be narrow.
+    /// Returns the directions from the disc's centre to the parts of the set that are on lines from each tag. From
+    /// outside, the set may be narrow.
     fn toward_the_set(&self) -> Vec<f64> {
         let mut seeds = Vec::new();
         for view in 0..self.views {

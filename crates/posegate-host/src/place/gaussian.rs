@@ -3,8 +3,8 @@
 use posegate::confidence::{probability, radius_squared};
 use posegate::shape::PoseDeg;
 
-/// The distribution of the robot's pose when it should be at its goal: the density N(x*, P), restricted to the
-/// pose-set at confidence epsilon (Definition 1).
+/// The distribution of the robot's pose for an estimate at its goal: the density N(x*, P), restricted to the pose-set
+/// at confidence epsilon (Definition 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian {
     covariance: [[f64; 3]; 3],
@@ -12,7 +12,7 @@ pub struct Gaussian {
     r2: f64,
 }
 
-/// The reason why numbers do not define a Gaussian pose-set.
+/// The reason why numbers are not a Gaussian pose-set.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GaussianError {
@@ -153,8 +153,8 @@ impl Gaussian {
         probability(self.r2)
     }
 
-    /// Returns the density's integral over the part that a plane cuts off the pose-set. `scale` is the scale of the
-    /// pose-set that touches the plane; the result is 0 from 1 on.
+    /// Returns the density's integral over the part of the pose-set that a plane cuts off. `scale` is the scale of
+    /// the pose-set that touches the plane; the result is 0 if it is at least 1.
     #[must_use]
     pub fn cap(&self, scale: f64) -> f64 {
         let radius = libm::sqrt(self.r2);
@@ -206,8 +206,8 @@ impl Gaussian {
     }
 }
 
-/// The pose-set as the image of a ball, in the goal frame: yaw is `yaw u1`, the position
-/// `drift u1 + spread (u2, u3)`, with `|u| <= radius`; u has the standard normal density.
+/// The pose-set as the image of a ball, in the goal frame: yaw is `yaw u1`, the position `drift u1 + spread (u2,
+/// u3)`, with `|u| <= radius`; u has the standard normal density.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WhitenedPoseSet {
     pub radius: f64,
@@ -226,7 +226,7 @@ impl WhitenedPoseSet {
     }
 
     /// Maps a direction in the disc to metres.
-    pub(super) fn way(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(super) fn to_metres(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         self.spread.map(|[a, b]| a * u + b * v)
     }
 

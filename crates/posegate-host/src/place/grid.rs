@@ -12,9 +12,9 @@ const DISTANCES: [f64; 8] = [0.06, 0.1, 0.16, 0.24, 0.36, 0.52, 0.72, 0.95];
 const BEARINGS: [f64; 5] = [0.0, -0.45, 0.45, -0.9, 0.9];
 /// Angles above the optical axis, as shares of the largest one.
 const ELEVATIONS: [f64; 3] = [0.0, -0.5, 0.5];
-/// How far a tag is turned away from the camera, as shares of the largest angle.
+/// Rotations of a tag away from the camera, as shares of the largest angle.
 const TURNS: [f64; 3] = [0.0, -0.55, 0.55];
-/// Points nearer to each other than this, in the unit cube, count as one.
+/// Points closer to each other than this, in the unit cube, count as one.
 const SAME: f64 = 1e-3;
 
 /// Returns at most `most` points of the unit cube of a space: a grid over each part of the space, and places that the
@@ -37,8 +37,8 @@ pub(super) fn grid(task: &Task, space: &Space, most: usize) -> Vec<Vec<f64>> {
             kept.push(point);
         }
     }
-    let room = most.saturating_sub(points.len()).max(1);
-    let every = kept.len().div_ceil(room).max(1);
+    let rest = most.saturating_sub(points.len()).max(1);
+    let every = kept.len().div_ceil(rest).max(1);
     points.extend(kept.into_iter().step_by(every));
     points
 }

@@ -14,7 +14,7 @@ pub(super) struct AccuracyTarget<'a> {
     /// Relative error of the integral.
     pub accuracy: f64,
     miss: MissCost,
-    /// Fewest parts of a disc, if a body in it needs more than usual.
+    /// Least number of parts of a disc, if a body in it needs more than usual.
     looks: u32,
     work: &'a Work,
 }
@@ -24,7 +24,7 @@ pub(super) struct AccuracyTarget<'a> {
 pub(super) struct MissCost {
     /// Cost of one miss.
     pub c_high: f64,
-    /// Cost of the misses that are already known, in addition to the integral.
+    /// Cost of the misses that are certain, in addition to the integral.
     pub sure: f64,
 }
 
@@ -56,7 +56,7 @@ impl AccuracyTarget<'_> {
         [half.max(1e-14 * seen), own.min(shared).max(1e-15)]
     }
 
-    /// Returns `true` for a search, where the mass outside matters only as a part of the integral.
+    /// Returns `true` for a search: the mass outside matters only as a part of the integral.
     fn is_rough(&self) -> bool {
         self.accuracy > 3e-5
     }
@@ -103,7 +103,8 @@ pub(super) fn integrate(
     ends.extend(bodies.ends(white, parts.saturating_mul(6).max(48)));
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|b, a| *b - *a < 1e-12);
-    // Half of the views are for these parts, the same number for each heading. Unused views go to the next heading.
+    // Half of the views are for these parts, the same number for each heading. Unused views are available to the next
+    // heading.
     let share = quadrature.views / (30 * ends.len() as u64);
     let mut headings = 0;
     let mut known = Sum::default();
@@ -128,7 +129,7 @@ pub(super) fn integrate(
         panel
     };
     let mut panels: Vec<Panel> = Vec::new();
-    // From the middle outwards: the sum so far shows how accurate the rest must be.
+    // From the middle outwards: the sum so far determines the accuracy that the rest needs.
     let mut order: Vec<[f64; 2]> = ends.windows(2).map(|w| [w[0], w[1]]).collect();
     order.sort_by(|a, b| (a[0] + a[1]).abs().total_cmp(&(b[0] + b[1]).abs()));
     for [from, to] in order {
@@ -151,7 +152,7 @@ pub(super) fn integrate(
     (sum, headings)
 }
 
-/// Returns where the yaw arcs of boxes end, as t.
+/// Returns the ends of the yaw arcs of boxes, as t.
 fn arcs(along: &LineClipper, white: &WhitenedPoseSet) -> Vec<f64> {
     let reach = white.radius * white.yaw;
     let mut all = Vec::new();

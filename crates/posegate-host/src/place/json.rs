@@ -37,7 +37,7 @@ impl Placed {
         }
     }
 
-    /// Returns the whole installation error at which the task still succeeds: the reserve, and what is left beyond it.
+    /// Returns the total installation error at which the task still succeeds: the reserve and the additional error.
     /// Zero if not even the reserve is allowed.
     #[must_use]
     pub fn tolerance(&self) -> Tolerance {
@@ -71,15 +71,15 @@ impl Placement {
     /// Returns the best place, with `evaluations`, `others` and `restarts`.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        let mut told = self.best.to_json();
+        let mut value = self.best.to_json();
         let others: Vec<Value> = self.others.iter().map(Placed::to_json).collect();
-        told["evaluations"] = json!(self.evaluations);
-        told["others"] = json!(others);
+        value["evaluations"] = json!(self.evaluations);
+        value["others"] = json!(others);
         let restarts = self.restarts.iter();
         let restarts: Vec<Value> = restarts
             .map(|one| json!({ "mean": one.mean, "tag_pose": pose_json(&one.pose) }))
             .collect();
-        told["restarts"] = json!(restarts);
-        told
+        value["restarts"] = json!(restarts);
+        value
     }
 }

@@ -27,8 +27,8 @@ impl ViewBound<'_> {
     }
 }
 
-/// The bound on the error of an observation, plus the error due to the tolerances of tag and camera: `100 translation +
-/// yaw`, so one centimetre counts as much as one degree. A view that the model does not cover is a miss.
+/// The bound on the error of an observation, plus the error from the tolerances of tag and camera: `100 translation +
+/// yaw`, so one centimetre costs as much as one degree. A view that the model does not cover is a miss.
 #[derive(Clone, Debug)]
 pub struct LearntCost<'a> {
     /// The bounds, by d, phi and psi.
@@ -36,7 +36,7 @@ pub struct LearntCost<'a> {
     /// The cost of a miss.
     c_high: f64,
     /// The views with tolerances, with the tag at the camera's height: the lever is longest there, and a search may
-    /// move the tag to any height. Empty if nothing has a tolerance.
+    /// move the tag to any height. Empty if neither tag nor camera has a tolerance.
     views: Vec<Visibility>,
 }
 
@@ -51,11 +51,11 @@ impl<'a> LearntCost<'a> {
             }
             let mut level = *view;
             level.tag.pose.z = level.mount.z;
-            let alike = |known: &&mut Visibility| {
+            let same = |known: &&mut Visibility| {
                 known.mount == level.mount && known.mount_tolerance == level.mount_tolerance
             };
             let mut views = views.borrow_mut();
-            match views.iter_mut().find(alike) {
+            match views.iter_mut().find(same) {
                 Some(known) => known.phi_max_deg = known.phi_max_deg.max(level.phi_max_deg),
                 None => views.push(level),
             }
@@ -84,18 +84,18 @@ impl ViewCost for LearntCost<'_> {
         self.c_high
     }
 
-    /// A learnt bound has jumps and kinks at the borders of its cells. An accuracy beyond 1e-4 is not worth its time,
-    /// and the number of views has a limit.
-    fn quadrature(&self, wanted: Quadrature) -> Quadrature {
-        let views = if wanted.accuracy > 1e-4 {
+    /// A learnt bound has jumps and kinks at the borders of its cells. So the relative error is never below
+    /// 1e-4, and the number of views is limited.
+    fn quadrature(&self, requested: Quadrature) -> Quadrature {
+        let views = if requested.accuracy > 1e-4 {
             60_000
         } else {
             600_000
         };
         Quadrature {
-            accuracy: wanted.accuracy.max(1e-4),
-            headings: wanted.headings.min(900),
-            views: wanted.views.min(views),
+            accuracy: requested.accuracy.max(1e-4),
+            headings: requested.headings.min(900),
+            views: requested.views.min(views),
         }
     }
 }

@@ -14,13 +14,13 @@ use posegate::shape::{LineClipper, Pose3Deg, SuccessSet, Tag, Tolerance};
 pub enum Objective {
     /// The least expected cost (Eq. 12); a miss has a cost like any view.
     Cost,
-    /// The least expected cost of the places at which S contains the whole pose-set.
+    /// The least expected cost of the places at which S contains the complete pose-set.
     ContainedCost,
     /// The largest scale at which S contains the pose-set.
     Margin,
     /// The smallest tag with which S contains the pose-set. Needs a limit of the tag's resolution (`px_per_bit_min`).
     SmallestTag,
-    /// The largest installation error beyond the reserve at which S contains the pose-set, the same number of
+    /// The largest installation error beyond the reserve at which S contains the pose-set, in equal numbers of
     /// centimetres and degrees.
     Tolerance,
 }
@@ -48,7 +48,7 @@ impl Objective {
     }
 }
 
-/// The robot's possible poses when it looks.
+/// The robot's possible poses at the look.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PosePrior {
     /// At its goal (the paper's x = x*, known exactly).
@@ -59,8 +59,8 @@ pub enum PosePrior {
 
 /// The cost of a view, `[d, phi, psi]` in m and rad.
 pub trait ViewCost: Sync {
-    /// Returns the cost, finite and at least 0. Returns infinity if such a view has no known cost. It then counts as a
-    /// miss, in the mean and in the probability of a miss.
+    /// Returns the cost, finite and at least 0; infinity if the cost of such a view is not known. Such a view counts
+    /// as a miss, in the mean and in the probability of a miss.
     fn of_view(&self, view: [f64; 3]) -> f64;
 
     /// The cost of a pose outside S.
@@ -71,7 +71,7 @@ pub trait ViewCost: Sync {
         false
     }
 
-    /// Returns the quadrature to use if `wanted` is asked for: coarser if a cost is expensive or has kinks.
+    /// Returns the quadrature to use instead of the requested one: coarser if a cost is expensive or has kinks.
     fn quadrature(&self, wanted: Quadrature) -> Quadrature {
         wanted
     }
@@ -94,16 +94,16 @@ impl ViewCost for Cost {
     }
 }
 
-/// A tag that is to be mounted for a task.
+/// A tag to be mounted for a task.
 #[derive(Clone, Debug)]
 pub struct Task {
     /// The task's success set, with the tag at its present pose.
     pub set: SuccessSet,
     /// The tag.
     pub tag: Tag,
-    /// The wall on which the tag is to be mounted. It does not hide the tag.
+    /// The wall on which the tag is to be mounted; it does not hide this tag. `None` for no wall.
     pub wall: Option<String>,
-    /// How far off the installer may mount the tag. Containment and margins hold for every pose within it. The
+    /// The largest installation error. Containment and margins are valid for every pose of the tag within it. The
     /// expected cost is that of the planned pose.
     pub reserve: Tolerance,
 }
@@ -128,13 +128,13 @@ impl Task {
         }
     }
 
-    /// Returns the success set with the tag exactly at a pose, or within its tolerance of it, at most the reserve.
+    /// Returns the success set with the tag exactly at a pose, or within its tolerance, but at most the reserve.
     #[must_use]
     pub fn at(&self, pose: Pose3Deg) -> SuccessSet {
         self.changed(pose, self.tag.size, None)
     }
 
-    /// Returns the poses of which the task succeeds for every pose of the tag within the reserve of a pose, and `left`
+    /// Returns the poses from which the task succeeds for every pose of the tag within the reserve, and `left`
     /// centimetres and degrees beyond it.
     #[must_use]
     pub fn reserved(&self, pose: Pose3Deg, size: f64, left: f64) -> SuccessSet {
@@ -171,8 +171,8 @@ impl Task {
     }
 }
 
-/// The evaluation of a place.
-pub(super) struct Question<'a> {
+/// Evaluates places of a tag.
+pub(super) struct PlaceEvaluator<'a> {
     pub task: &'a Task,
     pub known: PosePrior,
     pub cost: &'a dyn ViewCost,
@@ -216,9 +216,9 @@ pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 /// Largest installation error beyond the reserve that is tried, centimetres and degrees.
 const MOST_LEFT: f64 = 45.0;
 
-impl Question<'_> {
-    /// Returns the value of a pose; less is better. A pose from which the goal does not see the tag, or whose set
-    /// contains less than required, is worse than every other. Its value grows with the distance from being valid.
+impl PlaceEvaluator<'_> {
+    /// Returns the value of a pose; less is better. A pose is worse than every other if the tag is not seen from the
+    /// goal, or if its set contains less than required. Its value grows with the distance from a valid pose.
     pub fn value(&self, pose: Pose3Deg) -> f64 {
         let set = self.task.at(pose);
         let reserved = match self.objective {
@@ -243,7 +243,7 @@ impl Question<'_> {
             (_, PosePrior::Exactly) => f64::INFINITY,
             (Objective::Cost, PosePrior::About(belief)) => {
                 let found = self.expected(&set, &belief);
-                // Where nothing is seen, a smaller distance from being seen is better.
+                // If nothing is seen, a smaller distance from a view is better.
                 match found {
                     Some(Expected { mean, p_miss, .. }) if p_miss < 1.0 - 1e-9 => mean,
                     _ => unseen(),
@@ -310,7 +310,8 @@ impl Question<'_> {
         membership.inside && known
     }
 
-    /// Returns the expected cost of a pose; `None` if the robot's pose is known exactly, or nothing is seen.
+    /// Returns the expected cost of a pose; `None` if the robot's pose is known exactly, or if there is no view of a
+    /// tag.
     pub fn mean(&self, pose: Pose3Deg) -> Option<f64> {
         let PosePrior::About(belief) = self.known else {
             return None;
@@ -328,11 +329,11 @@ impl Question<'_> {
             .unwrap_or_else(|| self.cost.of_miss())
     }
 
-    /// Returns the view from the goal, whether or not it is in S.
+    /// Returns the view from the goal, even if the goal is not in S.
     fn sight_from_goal(&self, set: &SuccessSet) -> Option<[f64; 3]> {
         let membership = set.membership(goal(set));
         let sight = membership.sight.or_else(|| {
-            // Of several views, use the task's own tag.
+            // If there are several views, use the task's own tag.
             let mut sights = set
                 .tags()
                 .into_iter()
@@ -402,8 +403,8 @@ impl Question<'_> {
         }
     }
 
-    /// Returns the quick estimate of the cost of a place at which the reserved set contains the pose-set. Sums that the
-    /// answer does not depend on are left out.
+    /// Returns the quick estimate of the cost of a place at which the reserved set contains the pose-set. Sums that
+    /// the result does not depend on are not computed.
     fn quick_if_contained(
         &self,
         set: &SuccessSet,
@@ -443,7 +444,7 @@ impl Question<'_> {
             scale::largest(&set, belief, self.fineness)
         };
         let own = self.task.tag.size;
-        // A larger tag has a better resolution, but leaves the image sooner: the sizes that work form an interval.
+        // A larger tag has a better resolution, but leaves the image sooner: the sizes that succeed form an interval.
         let sizes = (-12..=8).map(|k| own * libm::exp2(0.25 * f64::from(k)));
         let mut best = 0.0f64;
         let mut below = 0.0;
@@ -464,7 +465,7 @@ impl Question<'_> {
 }
 
 /// Returns an installation error beyond the reserve, in centimetres and degrees, at which S is proven to contain the
-/// pose-set. It is the largest one, or at most 2 % smaller where its proof is difficult; 0 if nothing is proven.
+/// pose-set. It is the largest one, or at most 2 % smaller if its proof is difficult; 0 if no error is proven.
 pub(super) fn installation(task: &Task, pose: Pose3Deg, belief: &Gaussian) -> f64 {
     let reserved = |left: f64| task.reserved(pose, task.tag.size, left);
     let holds = |left: f64| scale::largest(&reserved(left), belief, Fineness::CLOSE) >= CONTAINED;
@@ -483,8 +484,8 @@ pub(super) fn goal(set: &SuccessSet) -> [f64; 3] {
     [set.goal.x, set.goal.y, set.goal.yaw_deg.to_radians()]
 }
 
-/// Returns the largest number for which `holds` is true, by bisection from `holds_at`. `holds` must be true up to some
-/// number and false beyond it.
+/// Returns the largest number for which `holds` is true, by bisection from `holds_at`. `holds` must be true up to
+/// some number and false beyond it.
 fn bisected(holds_at: f64, most: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (holds_at, most);
     if holds(high) {

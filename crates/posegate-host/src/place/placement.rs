@@ -1,8 +1,8 @@
-//! The search for the place where a tag serves its task best.
+//! The search for the best place of a tag for its task.
 
 use super::gaussian::Gaussian;
 use super::grid;
-use super::objective::{self, Objective, PosePrior, Question, Task, ViewCost};
+use super::objective::{self, Objective, PlaceEvaluator, PosePrior, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
 use super::search::{Budget, Descent, Fidelity, Optimizer, Polish, Problem, Solution};
@@ -39,7 +39,7 @@ impl core::fmt::Debug for PlacementProblem<'_> {
 pub struct Placed {
     /// The tag's pose in the world.
     pub pose: Pose3Deg,
-    /// Its size, metres.
+    /// The tag's size, metres.
     pub size: f64,
     /// `E[c]` over the pose-set's mass; `None` if the pose is known exactly.
     pub mean: Option<Approximate>,
@@ -56,7 +56,7 @@ pub struct Placed {
     /// within the reserve, and no view without a known cost was met. The first part is a proof. The second covers only what the quadrature evaluated: with a
     /// learnt cost, the pose-set may still contain an unknown part smaller than the distance between rays.
     pub contained: bool,
-    /// How far off the tag may be mounted.
+    /// The installation error for which containment and margin are proven.
     pub reserve: Tolerance,
     /// Installation error beyond the reserve at which S is proven to contain the pose-set, in centimetres and degrees;
     /// 0 if the pose is known exactly.
@@ -87,22 +87,22 @@ pub struct Restart {
     pub mean: Option<f64>,
 }
 
-/// The reason why nothing could be placed.
+/// The reason why no tag was placed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaceError {
     /// The objective needs a pose-set, but the pose is known exactly.
     #[error("the objective `{0}` is about a pose-set, but the pose is known exactly")]
     Exact(&'static str),
-    /// A search for the smallest tag, but the success set has no limit that a small tag violates.
+    /// The objective is the smallest tag, but the success set has no limit that a small tag violates.
     #[error(
         "the smallest tag has no size: the task's success set has no limit of the tag's resolution (px_per_bit_min)"
     )]
     NoSmallest,
-    /// The cost of a place has no value.
+    /// The cost of a place cannot be computed.
     #[error(transparent)]
     Cost(#[from] CostError),
-    /// There is nothing to compare.
+    /// There are no places to compare.
     #[error("there are no candidates")]
     NoCandidates,
 }
@@ -114,18 +114,18 @@ const LAST: u64 = 6;
 /// The share of the budget for the grid on which the search begins, percent.
 const GRID: u64 = 16;
 
-/// Budgets below this begin with few hints instead of a grid.
+/// Smaller budgets start from a few hints instead of a grid.
 const SMALL: u64 = 1_200;
 
 /// The number of places that are polished: the best, and possible mirror images.
 const POLISHED: usize = 2;
 
-/// The number of places straight in front of the camera with which a search may begin.
+/// The number of places straight in front of the camera that a search may start from.
 const AHEAD: u32 = 8;
 
 struct Searched<'a> {
-    quick: Question<'a>,
-    fine: Question<'a>,
+    quick: PlaceEvaluator<'a>,
+    fine: PlaceEvaluator<'a>,
     space: &'a Space,
     hints: Vec<Vec<f64>>,
 }
@@ -136,7 +136,7 @@ impl Problem for Searched<'_> {
     }
 
     fn is_periodic(&self, number: usize) -> bool {
-        self.space.goes_round(number)
+        self.space.is_periodic(number)
     }
 
     fn initial_guesses(&self) -> Vec<Vec<f64>> {
@@ -144,23 +144,23 @@ impl Problem for Searched<'_> {
     }
 
     fn value(&self, point: &[f64], look: Fidelity) -> f64 {
-        let question = match look {
+        let evaluator = match look {
             Fidelity::Quick => &self.quick,
             Fidelity::Fine => &self.fine,
         };
         match self.space.pose(point) {
-            Ok(pose) => question.value(pose),
-            // Worse than any valid pose, and less bad nearer to a valid one.
+            Ok(pose) => evaluator.value(pose),
+            // Worse than any valid pose, and better the closer it is to a valid one.
             Err(depth) => 1e40 * (1.0 + depth),
         }
     }
 }
 
-/// Searches the best place in a space: an optimizer's search, a polish of its best solutions, and a final evaluation of
-/// every number at full accuracy.
+/// Searches the best place in a space: an optimizer's search, a polish of its best solutions, and an evaluation of
+/// the final place at full accuracy.
 ///
-/// The answer is the same for the same arguments at any number of threads. `tell` is called with the number of
-/// evaluations as they are made.
+/// The result is the same for the same arguments and any number of threads. `progress` is called with the number of
+/// evaluations of each batch.
 ///
 /// # Errors
 /// [`PlaceError`] if the problem is invalid or no place was found.
@@ -170,7 +170,7 @@ pub fn place(
     optimizer: &dyn Optimizer,
     evaluations: u64,
     seed: u64,
-    tell: &(dyn Fn(u64) + Sync),
+    progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Placement, PlaceError> {
     order.check()?;
     let share = |of_100: u64| evaluations * of_100 / 100;
@@ -180,8 +180,8 @@ pub fn place(
         POLISHED as u64 * share(DESCENT + LAST)
     };
     let searched = Searched {
-        quick: order.question(None, Fineness::ROUGH),
-        fine: order.question(Some(POLISH), Fineness::CLOSE),
+        quick: order.evaluator(None, Fineness::ROUGH),
+        fine: order.evaluator(Some(POLISH), Fineness::CLOSE),
         space,
         hints: if evaluations < SMALL {
             let ahead = order.task.ahead();
@@ -190,7 +190,7 @@ pub fn place(
             grid::grid(order.task, space, share(GRID) as usize)
         },
     };
-    let search = Budget::new(evaluations - polished, tell);
+    let search = Budget::new(evaluations - polished, progress);
     let mut found = optimizer.search(&searched, &search, seed);
     found.sort_by(|a, b| a.value.total_cmp(&b.value));
     let restarts: Vec<Restart> = found
@@ -207,16 +207,16 @@ pub fn place(
     if optimizer.refines_internally() {
         polished = core::mem::take(&mut found);
     }
-    // Each solution has budgets of its own, so they are polished at the same time with the same results.
+    // Each solution has its own budgets, so the solutions can be polished in parallel with the same results.
     let polish = |Solution { point, .. }: Solution| {
-        let budget = Budget::new(share(DESCENT), tell);
+        let budget = Budget::new(share(DESCENT), progress);
         let value = budget.values(&searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
         let from = Solution { point, value };
         let found = Descent { from, sigma: 0.01 }.search(&searched, &budget, seed);
         let mut spent = budget.spent();
         let mut ends = Vec::new();
         for from in found {
-            let budget = Budget::new(share(LAST), tell);
+            let budget = Budget::new(share(LAST), progress);
             let last = Polish {
                 from,
                 step: 1e-3,
@@ -243,7 +243,7 @@ pub fn place(
         .collect();
     let mut placed = placed;
     if matches!(order.objective, Objective::Cost | Objective::ContainedCost) {
-        // Full accuracy decides. What cannot be evaluated stays first, so that it is reported.
+        // Full accuracy decides. A solution that cannot be evaluated comes first, so that its error is reported.
         let contained = order.objective == Objective::ContainedCost;
         placed.sort_by(|a, b| match (a, b) {
             (Ok(a), Ok(b)) => {
@@ -272,15 +272,15 @@ pub fn place(
 pub fn compare(
     order: &PlacementProblem<'_>,
     poses: &[Pose3Deg],
-    tell: &(dyn Fn(u64) + Sync),
+    progress: &(dyn Fn(u64) + Sync),
 ) -> Result<(usize, Vec<Placed>), PlaceError> {
     order.check()?;
-    let question = order.question(Some(POLISH), Fineness::FINE);
+    let evaluator = order.evaluator(Some(POLISH), Fineness::FINE);
     let looked: Vec<(f64, Result<Placed, PlaceError>)> = poses
         .par_iter()
         .map(|pose| {
-            let both = (question.value(*pose), order.placed(*pose));
-            tell(1);
+            let both = (evaluator.value(*pose), order.placed(*pose));
+            progress(1);
             both
         })
         .collect();
@@ -299,8 +299,8 @@ const POLISH: Quadrature = Quadrature {
     ..Quadrature::ROUGH
 };
 
-/// The quadrature of an answer. Where a wall or the image's border cuts through the pose-set, the number of views keeps
-/// it to about a second; the reported error is then larger.
+/// The quadrature of a result. If a wall or the image's border cuts through the pose-set, the limit on views keeps
+/// the time to about a second; the reported error is then larger.
 const ANSWER: Quadrature = Quadrature {
     accuracy: 1e-7,
     headings: 6_000,
@@ -319,8 +319,8 @@ impl PlacementProblem<'_> {
         Ok(())
     }
 
-    fn question(&self, quadrature: Option<Quadrature>, fineness: Fineness) -> Question<'_> {
-        Question {
+    fn evaluator(&self, quadrature: Option<Quadrature>, fineness: Fineness) -> PlaceEvaluator<'_> {
+        PlaceEvaluator {
             task: self.task,
             known: self.known,
             cost: self.cost,
@@ -335,10 +335,10 @@ impl PlacementProblem<'_> {
     /// # Errors
     /// [`PlaceError::Cost`] if there is no expected cost.
     pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
-        let question = self.question(Some(ANSWER), Fineness::FINE);
+        let evaluator = self.evaluator(Some(ANSWER), Fineness::FINE);
         let size = match (self.objective, self.known) {
             (Objective::SmallestTag, PosePrior::About(_)) => {
-                let size = question.value(pose);
+                let size = evaluator.value(pose);
                 if size < 1e20 {
                     size
                 } else {
@@ -359,14 +359,14 @@ impl PlacementProblem<'_> {
             wall: self.task.wall.clone(),
             reserve: self.task.reserve,
         };
-        let question = Question {
+        let evaluator = PlaceEvaluator {
             task: &resized,
-            ..question
+            ..evaluator
         };
         let set = resized.at(pose);
         let reserved = resized.reserved(pose, size, 0.0);
         let goal = objective::goal(&set);
-        let cost_at_goal = question.at_goal(&set);
+        let cost_at_goal = evaluator.at_goal(&set);
         let distance = libm::hypot(pose.x - goal[0], pose.y - goal[1]);
         let mut placed = Placed {
             pose,
@@ -376,14 +376,14 @@ impl PlacementProblem<'_> {
             p_miss: 0.0,
             p_unknown: Approximate::default(),
             margin: None,
-            contained: question.sees_from_goal(&reserved),
+            contained: evaluator.sees_from_goal(&reserved),
             reserve: resized.reserve,
             left: 0.0,
             distance,
         };
         match self.known {
             PosePrior::Exactly => {
-                placed.p_miss = if question.sees_from_goal(&set) {
+                placed.p_miss = if evaluator.sees_from_goal(&set) {
                     0.0
                 } else {
                     1.0

@@ -8,8 +8,8 @@ pub struct Quadrature {
     /// Largest number of headings evaluated. If it is not enough, the reported error is larger than the one to
     /// reach.
     pub headings: u32,
-    /// The number of views whose cost is evaluated before no more headings or rays are added; those already
-    /// begun are finished. If it is not enough, the reported error is larger than the one to reach.
+    /// The number of evaluated views after which no more headings or rays are added; those that were started are
+    /// finished. If it is not enough, the reported error is larger than the requested one.
     pub views: u64,
 }
 
@@ -128,7 +128,7 @@ pub(super) fn line(from: f64, to: f64, value: impl Fn(f64) -> f64) -> Approximat
     }
 }
 
-/// Returns the integral by the 7 nodes alone.
+/// Returns the integral by the 7 nodes only.
 pub(super) fn line_by_7(from: f64, to: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let few = nodes().filter(|(_, _, gauss)| *gauss > 0.0);
@@ -148,10 +148,10 @@ pub(super) fn line_within(
     let mut all = Approximate::default();
     while let Some((from, to, depth)) = open.pop() {
         let part = line(from, to, value);
-        let told = told(part.value, part.error, Smooth::Surely);
-        if told <= error * libm::ldexp(1.0, -depth) || depth == 12 {
+        let error_of_part = estimated_error(part.value, part.error, Smooth::Surely);
+        if error_of_part <= error * libm::ldexp(1.0, -depth) || depth == 12 {
             all.value += part.value;
-            all.error += told;
+            all.error += error_of_part;
         } else {
             let middle = 0.5 * (from + to);
             open.extend([(middle, to, depth + 1), (from, middle, depth + 1)]);
@@ -160,22 +160,22 @@ pub(super) fn line_within(
     all
 }
 
-/// Tells if a function may have a kink within a panel.
+/// Says if a function may have a kink within a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Smooth {
-    /// It has no kink.
+    /// The function has no kink.
     Surely,
-    /// It may have a kink.
+    /// The function may have a kink.
     Perhaps,
 }
 
-/// Returns the error estimate from the difference of two rules. For a smooth function the better rule is far
-/// better (QUADPACK takes (200 share)^1.5); at a kink it may be no better.
-fn told(value: f64, difference: f64, smooth: Smooth) -> f64 {
+/// Returns the error estimate from the difference of two rules. For a smooth function the better rule is far better
+/// (QUADPACK uses (200 share)^1.5); at a kink it may not be better.
+fn estimated_error(value: f64, difference: f64, smooth: Smooth) -> f64 {
     let share = difference / value.abs().max(f64::MIN_POSITIVE);
     match smooth {
         Smooth::Surely => difference * (2828.0 * libm::sqrt(share)).min(1.0),
-        // Twice, since two rules may have similar errors at a kink.
+        // Doubled, because both rules may have similar errors at a kink.
         Smooth::Perhaps => 2.0 * difference,
     }
 }
@@ -211,7 +211,8 @@ pub(super) fn panel(
     let sum = [0, 1].map(|k| Approximate {
         value: half * both[k].value,
         error: half
-            * (both[k].error + told(both[k].value, (both[k].value - gauss[k]).abs(), smooth)),
+            * (both[k].error
+                + estimated_error(both[k].value, (both[k].value - gauss[k]).abs(), smooth)),
     });
     Panel {
         from,
@@ -271,9 +272,9 @@ pub(super) fn refine(
     sum
 }
 
-/// Corrects the error estimate near a kink, where two rules may agree by chance. The change due to halving was
-/// the error of the whole panel, of which a fifth remains at a kink. The half that seems to have the kink gets
-/// at least that error.
+/// Corrects the error estimate near a kink, at which two rules may agree by chance. The change from halving was the
+/// error of the complete panel; a fifth of it remains at a kink. The half that probably has the kink gets at least
+/// that error.
 fn doubt(whole: &Sum, left: &mut Sum, right: &mut Sum) {
     let (before, mut a, mut b) = (whole.both(), left.both(), right.both());
     for k in 0..2 {
@@ -293,7 +294,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rule_is_exact_for_polynomials() {
+    fn rule_is_exact_for_polynomials() {
         let weights = nodes().fold([0.0; 3], |[a, b, n], (_, k, g)| [a + k, b + g, n + 1.0]);
         assert!((weights[0] - 2.0).abs() < 1e-15 && (weights[1] - 2.0).abs() < 1e-15);
         assert_eq!(weights[2], 15.0);
@@ -309,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kink_is_halved_until_it_does_not_matter() {
+    fn kink_is_halved_until_its_error_is_small() {
         let value = |x: f64| {
             let value = (x - 0.3).abs();
             let exact = |value| Approximate { value, error: 0.0 };

@@ -5,7 +5,7 @@ use posegate::shape::Pose3Deg;
 /// The names of the free numbers, in the order of [`super::Space::free`].
 const NAMES: [&str; 4] = ["x", "y", "z", "yaw_deg"];
 
-/// Reads `x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360`: ranges of x, y, z (metres) and yaw (degrees), any of them, each once.
+/// Reads ranges of x, y, z (metres) and yaw (degrees), each at most once: `x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360`.
 ///
 /// # Errors
 /// A description of the error.
@@ -13,7 +13,7 @@ pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
     let mut ranges = [None; 4];
     for part in text.split(',') {
         let part = part.trim();
-        let shape = || format!("`{part}` is no range; write NAME=LOW:HIGH, like x=0.3:7");
+        let shape = || format!("`{part}` is not a range; write NAME=LOW:HIGH, like x=0.3:7");
         let (name, range) = part.split_once('=').ok_or_else(shape)?;
         let (low, high) = range.split_once(':').ok_or_else(shape)?;
         let place = NAMES.iter().position(|known| *known == name.trim());
@@ -27,7 +27,7 @@ pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
             let number: Option<f64> = text.trim().parse().ok();
             number
                 .filter(|number| number.is_finite())
-                .ok_or_else(|| format!("`{}` in `{part}` is no number", text.trim()))
+                .ok_or_else(|| format!("`{}` in `{part}` is not a number", text.trim()))
         };
         if ranges[place].is_some() {
             return Err(format!("`{}` is given twice", NAMES[place]));
@@ -40,7 +40,7 @@ pub fn ranges(text: &str) -> Result<[Option<[f64; 2]>; 4], String> {
 /// A place to compare with others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Its name in the file, or its number from 1.
+    /// The place's name in the file, or its number from 1.
     pub name: String,
     /// The tag's pose in the world.
     pub pose: Pose3Deg,
@@ -87,7 +87,7 @@ pub fn candidates(input: &[u8], file: &str) -> Result<Vec<Candidate>, String> {
             let number: Option<f64> = text.parse().ok();
             number.filter(|number| number.is_finite()).ok_or_else(|| {
                 format!(
-                    "{file}:{line}: `{text}` in column `{}` is no number",
+                    "{file}:{line}: `{text}` in column `{}` is not a number",
                     &header[column]
                 )
             })
@@ -128,7 +128,7 @@ mod tests {
             ("x=1:two", "`two`"),
             ("x=1:inf", "`inf`"),
             ("x=1:2,x=1:2", "twice"),
-            ("", "no range"),
+            ("", "not a range"),
         ] {
             assert!(ranges(text).unwrap_err().contains(what), "{text}");
         }

@@ -26,25 +26,25 @@ pub(super) struct Ray {
     /// The radius of the disc.
     pub radius: f64,
     /// The intervals inside the set, within the disc.
-    pub stretches: Vec<LineInterval>,
+    pub intervals: Vec<LineInterval>,
     /// The intervals from which each view sees its tag, with the view's number; empty with a single view.
     seen: Vec<(usize, LineInterval)>,
-    /// Where the ray leaves the set for the first time, at most the line's length; `None` if its start is outside.
+    /// The distance at which the ray first leaves the set, at most the line's length; `None` if its start is outside.
     pub leaves: Option<f64>,
 }
 
 impl Ray {
     /// Clips a line that reaches a little beyond the disc.
     pub(super) fn cast(headed: &Headed<'_>, views: usize, walk: LineSegment, radius: f64) -> Self {
-        let (mut stretches, seen) = if views > 1 {
+        let (mut intervals, seen) = if views > 1 {
             headed.stretches_and_seen(&walk)
         } else {
             (headed.stretches(&walk), Vec::new())
         };
-        let leaves = stretches.first().filter(|first| first.from <= 0.0);
+        let leaves = intervals.first().filter(|first| first.from <= 0.0);
         let leaves = leaves.map(|first| first.to);
-        stretches.retain(|stretch| stretch.from < radius);
-        if let Some(last) = stretches.last_mut()
+        intervals.retain(|interval| interval.from < radius);
+        if let Some(last) = intervals.last_mut()
             && last.to >= radius
         {
             last.to = radius;
@@ -53,25 +53,25 @@ impl Ray {
         Self {
             walk,
             radius,
-            stretches,
+            intervals,
             seen,
             leaves,
         }
     }
 
-    /// Returns a hash of the constraints that limit the intervals. Between two rays with different hashes there is a
-    /// corner of the set, or of its border with the disc.
+    /// Returns a hash of the constraints that limit the intervals. If two rays have different hashes, a corner of the
+    /// set, or of its border with the disc, is between them.
     pub(super) fn signature(&self) -> u64 {
         // FNV-1a, by words.
         let mix = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
         let mut hash = 0xcbf2_9ce4_8422_2325;
-        for stretch in &self.stretches {
-            hash = mix(mix(hash, stretch.ended_by[0]), stretch.ended_by[1]);
+        for interval in &self.intervals {
+            hash = mix(mix(hash, interval.ended_by[0]), interval.ended_by[1]);
         }
-        for (_, stretch) in &self.seen {
+        for (_, interval) in &self.seen {
             for (at, by) in [
-                (stretch.from, stretch.ended_by[0]),
-                (stretch.to, stretch.ended_by[1]),
+                (interval.from, interval.ended_by[0]),
+                (interval.to, interval.ended_by[1]),
             ] {
                 hash = mix(hash, if at < self.radius { by } else { OPEN });
             }
@@ -85,9 +85,9 @@ impl Ray {
             |a: f64, b: f64| -libm::exp(-0.5 * a * a) * libm::expm1(0.5 * (a - b) * (a + b));
         let mut from = 0.0;
         let mut mass = 0.0;
-        for stretch in &self.stretches {
-            mass += between(from, stretch.from);
-            from = stretch.to;
+        for interval in &self.intervals {
+            mass += between(from, interval.from);
+            from = interval.to;
         }
         mass + between(from, self.radius)
     }
@@ -128,13 +128,13 @@ impl Ray {
                 all.value += part.value;
                 all.error += part.error;
             };
-            let whole = by_rule(from, to);
-            if whole.value.is_finite() {
-                return add(whole);
+            let all = by_rule(from, to);
+            if all.value.is_finite() {
+                return add(all);
             }
             for [from, to] in finite(from, to, cost) {
                 let part = by_rule(from, to);
-                // A part that is infinite between two samples is left out, and added to the error.
+                // A part that is infinite between two samples is excluded from the value and added to the error.
                 add(if part.value.is_finite() {
                     part
                 } else {
@@ -146,8 +146,8 @@ impl Ray {
         };
         if views == 1 {
             let sight = headed.sight(0, &self.walk);
-            for stretch in &self.stretches {
-                add(stretch.from, stretch.to, &|t| of_view(sight.at(t)));
+            for interval in &self.intervals {
+                add(interval.from, interval.to, &|t| of_view(sight.at(t)));
             }
             return all;
         }
@@ -156,11 +156,11 @@ impl Ray {
             .collect();
         let mut ends: Vec<f64> = Vec::new();
         let mut seeing: Vec<ViewAlongLine> = Vec::with_capacity(views);
-        for stretch in &self.stretches {
+        for interval in &self.intervals {
             let changes = self.seen.iter().flat_map(|(_, s)| [s.from, s.to]);
-            let inner = changes.filter(|end| *end > stretch.from && *end < stretch.to);
+            let inner = changes.filter(|end| *end > interval.from && *end < interval.to);
             ends.clear();
-            ends.extend(inner.chain([stretch.from, stretch.to]));
+            ends.extend(inner.chain([interval.from, interval.to]));
             ends.sort_by(f64::total_cmp);
             for pair in ends.windows(2) {
                 let middle = 0.5 * (pair[0] + pair[1]);
@@ -171,7 +171,7 @@ impl Ray {
                 let of_those = sights.iter().enumerate().filter(|(view, _)| sees(*view));
                 seeing.clear();
                 seeing.extend(of_those.map(|(_, sight)| *sight));
-                // In the set without a view, as in a union with a box: use the views of all tags.
+                // If the pose is in the set without a view, as in a union with a box, use the views of all tags.
                 if seeing.is_empty() {
                     seeing.extend(&sights);
                 }
@@ -189,7 +189,8 @@ impl Ray {
 /// The number of sampling steps of an interval, to search for an infinite cost.
 const SAMPLES: u32 = 20;
 
-/// Returns the parts of an interval at whose samples a cost is finite, up to where it becomes infinite.
+/// Returns the parts of an interval at whose samples the cost is finite, up to the points at which it becomes
+/// infinite.
 fn finite(from: f64, to: f64, cost: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(SAMPLES);
     let mut parts: Vec<[f64; 2]> = Vec::new();

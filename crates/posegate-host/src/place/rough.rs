@@ -11,9 +11,9 @@ const DIRECTIONS: u32 = 24;
 
 /// Returns the integral of the cost inside, and the mass outside.
 ///
-/// Uses 15 headings (Kronrod's nodes) with 24 rays each. At every second heading the rays are turned by half a step. If
-/// S contains the pose-set, the result is accurate to 1e-3 or better, else to some percent. The mass outside is exact
-/// along each ray.
+/// Uses 15 headings (Kronrod's nodes) with 24 rays each. At every second heading the rays are turned by half a step.
+/// If S contains the pose-set, the result is accurate to 1e-3 or better, else to a few percent. The mass outside is
+/// exact along each ray.
 pub(super) fn sums(
     along: &LineClipper,
     white: &WhitenedPoseSet,
@@ -32,7 +32,7 @@ pub(super) fn sums(
             let angle = (f64::from(k) + turned) * TAU / f64::from(DIRECTIONS);
             let walk = LineSegment {
                 from: white.middle(u1),
-                way: white.way([libm::cos(angle), libm::sin(angle)]),
+                way: white.to_metres([libm::cos(angle), libm::sin(angle)]),
                 length: radius,
             };
             let ray = Ray::cast(&headed, views, walk, radius);

@@ -1,5 +1,5 @@
-//! The largest scale s* at which a success set contains a Gaussian pose-set: its radius times s*. It is 0 if the estimate
-//! is outside, and infinite if the set never leaves.
+//! The largest scale s* at which a success set contains a Gaussian pose-set, that is, its radius times s*. It is 0 if
+//! the estimate is outside, and infinite if the scaled set never leaves the success set.
 
 use super::gaussian::{Gaussian, WhitenedPoseSet};
 use core::f64::consts::TAU;
@@ -46,11 +46,11 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
     let white = belief.at(set.goal);
     let reach = |u1: f64, within: f64| {
         let headed = along.at(white.yaw * u1);
-        let room = room(&headed, &white, u1, within, fineness);
-        libm::sqrt(u1 * u1 + room * room)
+        let radius = border_distance(&headed, &white, u1, within, fineness);
+        libm::sqrt(u1 * u1 + radius * radius)
     };
-    // At a heading u1 every scale is at least |u1|, so headings beyond the best scale do not count. A scaled yaw extent
-    // is capped at pi.
+    // At heading u1 every scale is at least |u1|, so headings beyond the best scale are skipped. A scaled yaw extent
+    // is limited to pi.
     let most = core::f64::consts::PI / white.yaw;
     let mut best = reach(0.0, f64::INFINITY);
     if best == 0.0 {
@@ -70,12 +70,12 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
             }
         }
     }
-    // At the end of a yaw arc the set ends abruptly.
+    // The set ends abruptly at the end of a yaw arc.
     for end in along.ends_of_arcs() {
         for turn in [-1.0, 0.0, 1.0] {
             let u1 = (end + TAU * turn) / white.yaw;
-            for beside in [-1e-9, 1e-9] {
-                let u1 = u1 + beside / white.yaw;
+            for offset in [-1e-9, 1e-9] {
+                let u1 = u1 + offset / white.yaw;
                 if u1.abs() < best.min(most) {
                     best = best.min(reach(u1, best));
                 }
@@ -94,7 +94,7 @@ pub(super) fn largest(set: &SuccessSet, belief: &Gaussian, fineness: Fineness) -
 }
 
 /// Returns the distance of the centre of a heading's disc from the border, in standard deviations; 0 if it is outside.
-fn room(
+fn border_distance(
     headed: &Headed<'_>,
     white: &WhitenedPoseSet,
     u1: f64,
@@ -104,7 +104,7 @@ fn room(
     // No useful pose-set is larger than this.
     let length = 1e4
         / white
-            .way([1.0, 1.0])
+            .to_metres([1.0, 1.0])
             .map(f64::abs)
             .iter()
             .fold(1e-12, |a, b| f64::max(a, *b));
@@ -112,7 +112,7 @@ fn room(
     let mut leaves = |angle: f64| {
         let walk = LineSegment {
             from: white.middle(u1),
-            way: white.way([libm::cos(angle), libm::sin(angle)]),
+            way: white.to_metres([libm::cos(angle), libm::sin(angle)]),
             length,
         };
         headed.stretches_into(&walk, &mut stretches);
@@ -126,34 +126,34 @@ fn room(
     let mut least = [(f64::INFINITY, 0.0); 2];
     for k in 0..fineness.directions {
         let angle = f64::from(k) * step;
-        let room = leaves(angle);
-        if room < least[0].0 {
+        let border = leaves(angle);
+        if border < least[0].0 {
             least[1] = least[0];
-            least[0] = (room, angle);
-        } else if room < least[1].0 {
-            least[1] = (room, angle);
+            least[0] = (border, angle);
+        } else if border < least[1].0 {
+            least[1] = (border, angle);
         }
-        if room == 0.0 {
+        if border == 0.0 {
             return 0.0;
         }
     }
-    let mut room = least[0].0;
-    // If this heading is still far from being the nearest, no refinement is needed.
-    if libm::sqrt(u1 * u1 + 0.8 * room * room) > within {
-        return room;
+    let mut distance = least[0].0;
+    // No refinement is needed if this heading is still far from being the nearest.
+    if libm::sqrt(u1 * u1 + 0.8 * distance * distance) > within {
+        return distance;
     }
     for (_, angle) in least {
-        room = room.min(golden(
+        distance = distance.min(golden(
             angle - step,
             angle + step,
             fineness.steps,
             &mut leaves,
         ));
     }
-    room
+    distance
 }
 
-/// Returns the least value that a golden-section search meets.
+/// Returns the least value that a golden-section search finds.
 fn golden(from: f64, to: f64, steps: u32, mut value: impl FnMut(f64) -> f64) -> f64 {
     const SHARE: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (from, to);
@@ -175,23 +175,24 @@ fn golden(from: f64, to: f64, steps: u32, mut value: impl FnMut(f64) -> f64) -> 
     least
 }
 
-/// The budget of a proof of one scale. Where many fail, an answer still takes seconds only.
-const PATIENCE: ProofBudget = ProofBudget {
+/// The budget of a proof of one scale. If many proofs fail, an answer still takes only seconds.
+const BUDGET: ProofBudget = ProofBudget {
     blocks: 150_000,
     smallest: 1e-6,
 };
 
-/// From this share of the largest size on, a proof gains less than 1 % and takes ten times as many blocks for a tenth of the rest.
+/// From this share of the largest size on, a proof gains less than 1 %. It takes ten times as many blocks for a tenth
+/// of the rest.
 const CLOSE: f64 = 0.995;
 
 /// The budget of a proof for the last percent.
-const CLOSE_PATIENCE: ProofBudget = ProofBudget {
+const CLOSE_BUDGET: ProofBudget = ProofBudget {
     blocks: 20_000,
     smallest: 1e-6,
 };
 
 /// The budget of the proof that decides whether a place is contained.
-const OWN_PATIENCE: ProofBudget = ProofBudget {
+const OWN_BUDGET: ProofBudget = ProofBudget {
     blocks: 400_000,
     smallest: 1e-6,
 };
@@ -216,38 +217,39 @@ pub(super) fn proven(set: &SuccessSet, belief: &Gaussian) -> Option<f64> {
         return Some(0.0);
     }
     let prover = Prover::new(set);
-    let holds = |scale: f64, patience: ProofBudget| {
-        body(set, belief, scale).is_some_and(|body| body.is_within(&prover, patience))
+    let holds = |scale: f64, budget: ProofBudget| {
+        body(set, belief, scale).is_some_and(|body| body.is_within(&prover, budget))
     };
     if largest == f64::INFINITY {
-        // No direction tried leaves the set. Small gaps may lie between them.
-        let margin = LARGE.into_iter().find(|scale| holds(*scale, PATIENCE));
+        // No direction that was tried leaves the set. Small gaps may be between them.
+        let margin = LARGE.into_iter().find(|scale| holds(*scale, BUDGET));
         return match margin {
             Some(scale) if scale == LARGE[0] => None,
             found => Some(found.unwrap_or(0.0)),
         };
     }
     let margin = last_proven(SHARES, |share| {
-        let patience = patience(&prover, share, PATIENCE);
-        holds(share * largest, patience)
+        let budget = budget(&prover, share, BUDGET);
+        holds(share * largest, budget)
     });
     let margin = margin.map_or(0.0, |share| share * largest);
-    // Containment at scale 1 is worth a proof of its own.
-    let is_own = margin < 1.0 && largest > 1.0 && holds(1.0, OWN_PATIENCE);
+    // Containment at scale 1 justifies a separate proof.
+    let is_own = margin < 1.0 && largest > 1.0 && holds(1.0, OWN_BUDGET);
     Some(if is_own { 1.0 } else { margin })
 }
 
 /// Returns the budget of a proof of a share of the largest size: blocks take longer than the slices of a convex set.
-fn patience(prover: &Prover, share: f64, usual: ProofBudget) -> ProofBudget {
+fn budget(prover: &Prover, share: f64, usual: ProofBudget) -> ProofBudget {
     if share < CLOSE || prover.is_convex() {
         usual
     } else {
-        CLOSE_PATIENCE
+        CLOSE_BUDGET
     }
 }
 
-/// Returns the last of some shares that is proven; each is that of a larger set than the one before. A failed proof takes all of its
-/// budget, and the proof of a smaller set is shorter: the search begins with the smallest one and ends with the first that fails.
+/// Returns the last of some shares that is proven; each share is of a larger set than the one before. A failed proof
+/// takes all of its budget, and the proof of a smaller set is shorter. So the search starts with the smallest share
+/// and ends with the first failure.
 pub(super) fn last_proven(
     shares: impl IntoIterator<Item = f64>,
     mut holds: impl FnMut(f64) -> bool,
@@ -258,14 +260,14 @@ pub(super) fn last_proven(
 /// Returns `true` if the set is proven to contain the pose-set, with the budget for a share of the largest tolerance.
 pub(super) fn is_contained(set: &SuccessSet, belief: &Gaussian, share: f64) -> bool {
     let prover = Prover::new(set);
-    let patience = patience(&prover, share, OWN_PATIENCE);
-    body(set, belief, 1.0).is_some_and(|body| body.is_within(&prover, patience))
+    let budget = budget(&prover, share, OWN_BUDGET);
+    body(set, belief, 1.0).is_some_and(|body| body.is_within(&prover, budget))
 }
 
 /// By how much the pose-set is enlarged for the proof, metres and radians. This is more than the rounding of a box's
 /// limits in a proof at positions (1e-11 m), and more than rounding takes from a nearly singular covariance.
 const WIDER: f64 = 3e-11;
-/// The relative growth of its square for that, 1 / k: `E(P) + E(W)` lies within `E((1 + 1 / k) P + (1 + k) W)`.
+/// The relative growth of its square for this, 1 / k: `E(P) + E(W)` lies within `E((1 + 1 / k) P + (1 + k) W)`.
 const SHARE: f64 = 2e-9;
 
 /// Returns the pose-set in the goal frame, enlarged by [`WIDER`] in every direction.
@@ -311,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn scales_are_those_of_the_support() {
+    fn scale_equals_that_of_the_support_function() {
         // An ellipsoid reaches r sqrt(P_kk) along each axis; the goal is turned by a right angle.
         let (s, rho) = ([0.1, 0.2, 0.05], [0.3, -0.2, 0.4]);
         let p = [
@@ -347,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_goal_that_is_outside_has_none() {
+    fn scale_is_zero_for_a_goal_outside() {
         let mut set = boxed(0.5, 0.5, 10.0);
         let belief = Gaussian::of_sigmas([0.1, 0.1, 0.1], 0.99).unwrap();
         set.shape = Shape::Box(BoxSet {

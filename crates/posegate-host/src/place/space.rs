@@ -2,12 +2,12 @@
 
 use posegate::shape::{Pose3Deg, Wall};
 
-/// The poses where a tag may be mounted, as the unit cube that a search explores.
+/// The poses at which a tag may be mounted, as the unit cube that a search explores.
 #[derive(Clone, Debug)]
 pub enum Space {
     /// Anywhere in a box.
     Free {
-        /// The tag's present pose: coordinates without a range stay there, and roll and pitch always.
+        /// The tag's present pose: coordinates without a range keep its values, and roll and pitch always do.
         pose: Pose3Deg,
         /// Ranges of x, y, z (metres) and yaw (degrees, an arc).
         ranges: [Option<[f64; 2]>; 4],
@@ -21,7 +21,7 @@ pub enum Space {
 pub struct Faces {
     name: String,
     faces: Vec<Face>,
-    /// Heights of the tag's middle, metres.
+    /// Heights of the tag's centre, metres.
     z: [f64; 2],
     /// Keep-outs, widened by half of the tag's width.
     keep_outs: Vec<[[f64; 2]; 2]>,
@@ -33,11 +33,11 @@ pub struct Faces {
 struct Face {
     along: [f64; 2],
     from: [f64; 2],
-    way: [f64; 2],
+    direction: [f64; 2],
     yaw_deg: f64,
 }
 
-/// The reason why a tag cannot be mounted anywhere.
+/// The reason why there is no place for a tag.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpaceError {
@@ -51,16 +51,16 @@ pub enum SpaceError {
         /// Upper end.
         hi: f64,
     },
-    /// Nothing is free.
+    /// No coordinate is free.
     #[error(
         "nothing is free: a search needs at least one of x, y, z, yaw_deg with a range of some length"
     )]
     NothingFree,
     /// A wall without space for the tag.
     #[error(
-        "wall `{wall}` has no room for a tag of {size} m (with its white border {whole} m): {why}"
+        "wall `{wall}` has no space for a tag of {size} m (with its white border {whole} m): {why}"
     )]
-    NoRoom {
+    NoSpace {
         /// The wall's name.
         wall: String,
         /// The black border's edge, metres.
@@ -93,20 +93,20 @@ impl Space {
     }
 
     /// Creates the space of a wall, for a tag that is `whole` wide with its white border
-    /// ([`Family`](posegate::shape::Family)). A wall of two corners is used on the side of the point `beside`, a block
-    /// on every face. The whole tag lies on one face, and on no keep-out. `heights` limits the heights of the tag's
-    /// middle.
+    /// ([`Family`](posegate::shape::Family)). A wall of two corners is used on the side of the point `front`, a block
+    /// on every face. The complete tag is on one face, and on no keep-out. `heights` limits the heights of the tag's
+    /// centre.
     ///
     /// # Errors
-    /// [`SpaceError::NoRoom`] if the tag fits nowhere.
+    /// [`SpaceError::NoSpace`] if the tag fits nowhere.
     pub fn wall(
         wall: &Wall,
         [size, whole]: [f64; 2],
-        beside: [f64; 2],
+        front: [f64; 2],
         heights: Option<[f64; 2]>,
     ) -> Result<Self, SpaceError> {
         let half = 0.5 * whole;
-        let no_room = |why: String| SpaceError::NoRoom {
+        let no_space = |why: String| SpaceError::NoSpace {
             wall: wall.name.clone(),
             size,
             whole,
@@ -117,7 +117,7 @@ impl Space {
             (low, high) = (low.max(lo), high.min(hi));
         }
         if !(low <= high) {
-            return Err(no_room(format!("it is {} m high", wall.z[1] - wall.z[0])));
+            return Err(no_space(format!("it is {} m high", wall.z[1] - wall.z[0])));
         }
         let count = wall.corners.len();
         let sides = if count == 2 { 1 } else { count };
@@ -125,29 +125,29 @@ impl Space {
         let mut begin = 0.0;
         for i in 0..sides {
             let (a, b) = (wall.corners[i], wall.corners[(i + 1) % count]);
-            let way = [b[0] - a[0], b[1] - a[1]];
-            let length = libm::hypot(way[0], way[1]);
+            let direction = [b[0] - a[0], b[1] - a[1]];
+            let length = libm::hypot(direction[0], direction[1]);
             let along = [begin + half, begin + length - half];
             begin += length;
             if !(along[0] <= along[1]) {
                 continue;
             }
-            let way = way.map(|v| v / length);
-            // The outside of an outline that is walked counter-clockwise is to the right.
-            let mut normal = [way[1], -way[0]];
-            let to = [beside[0] - a[0], beside[1] - a[1]];
+            let direction = direction.map(|v| v / length);
+            // The outside of an outline with counter-clockwise corners is to the right.
+            let mut normal = [direction[1], -direction[0]];
+            let to = [front[0] - a[0], front[1] - a[1]];
             if count == 2 && normal[0] * to[0] + normal[1] * to[1] < 0.0 {
                 normal = normal.map(|v| -v);
             }
             faces.push(Face {
                 along,
-                from: [a[0] + half * way[0], a[1] + half * way[1]],
-                way,
+                from: [a[0] + half * direction[0], a[1] + half * direction[1]],
+                direction,
                 yaw_deg: libm::atan2(normal[1], normal[0]).to_degrees(),
             });
         }
         if faces.is_empty() {
-            return Err(no_room(format!("it is {begin} m long")));
+            return Err(no_space(format!("it is {begin} m long")));
         }
         let widened =
             |[along, z]: &[[f64; 2]; 2]| [*along, *z].map(|[lo, hi]| [lo - half, hi + half]);
@@ -157,8 +157,8 @@ impl Space {
             z: [low, high],
             keep_outs: wall.keep_outs.iter().map(widened).collect(),
         };
-        if !faces.has_room() {
-            return Err(no_room("its keep-outs leave none".into()));
+        if !faces.has_place() {
+            return Err(no_space("its keep-outs leave none".into()));
         }
         Ok(Self::Wall(faces))
     }
@@ -174,7 +174,7 @@ impl Space {
 
     /// Returns `true` if a coordinate is periodic: its 0 and its 1 are the same place.
     #[must_use]
-    pub fn goes_round(&self, number: usize) -> bool {
+    pub fn is_periodic(&self, number: usize) -> bool {
         match self {
             Self::Free { ranges, .. } => {
                 let mut free = ranges
@@ -247,8 +247,12 @@ impl Space {
                 for face in &faces.faces {
                     let length = face.along[1] - face.along[0];
                     let to = [pose.x - face.from[0], pose.y - face.from[1]];
-                    let along = (to[0] * face.way[0] + to[1] * face.way[1]).clamp(0.0, length);
-                    let off = libm::hypot(to[0] - along * face.way[0], to[1] - along * face.way[1]);
+                    let along =
+                        (to[0] * face.direction[0] + to[1] * face.direction[1]).clamp(0.0, length);
+                    let off = libm::hypot(
+                        to[0] - along * face.direction[0],
+                        to[1] - along * face.direction[1],
+                    );
                     if off < best.0 {
                         best = (off, before + along);
                     }
@@ -263,8 +267,8 @@ impl Space {
         }
     }
 
-    /// Returns about `count` points of the unit cube in rows and columns: over each part of a wall that no keep-out
-    /// covers, up to its borders, or over each free coordinate.
+    /// Returns about `count` points of the unit cube in rows and columns: over each part of a wall without a
+    /// keep-out, up to its borders, or over each free coordinate.
     #[must_use]
     pub fn grid(&self, count: usize) -> Vec<Vec<f64>> {
         let spread = |number: usize, [lo, hi]: [f64; 2]| -> Vec<f64> {
@@ -295,7 +299,7 @@ impl Space {
             })
     }
 
-    /// Describes the space in words.
+    /// Returns a description of the space.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
@@ -315,7 +319,7 @@ impl Space {
 impl Faces {
     /// Returns the rows and columns of a grid: evenly spread, and at the borders of keep-outs.
     fn grid(&self, count: usize) -> Vec<Vec<f64>> {
-        /// One of this number of points of a grid on a wall is a height.
+        /// One in this number of points of a grid on a wall is a height.
         const HEIGHTS: usize = 9;
         let whole = self.length().max(f64::MIN_POSITIVE);
         let is_flat = self.z[1] <= self.z[0];
@@ -372,8 +376,8 @@ impl Faces {
                 return Err(deepest);
             }
             return Ok(Pose3Deg {
-                x: face.from[0] + left * face.way[0],
-                y: face.from[1] + left * face.way[1],
+                x: face.from[0] + left * face.direction[0],
+                y: face.from[1] + left * face.direction[1],
                 z,
                 roll_deg: 0.0,
                 pitch_deg: 0.0,
@@ -384,7 +388,7 @@ impl Faces {
     }
 
     /// Returns `true` if some place is outside of every keep-out. If there is any, there is one at their borders.
-    fn has_room(&self) -> bool {
+    fn has_place(&self) -> bool {
         let ends = |axis: usize, own: [f64; 2]| {
             let borders = self.keep_outs.iter().flat_map(move |out| out[axis]);
             let inner = borders.filter(move |v| *v >= own[0] && *v <= own[1]);
@@ -416,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tag_hangs_flat_on_the_wall() {
+    fn tag_is_flat_on_the_wall() {
         let space = Space::wall(&wall(&[]), [0.4, 1.25 * 0.4], [1.0, 0.0], None).unwrap();
         let first = space.pose(&[0.0, 0.0]).unwrap();
         assert_eq!(
@@ -432,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn keep_outs_are_kept() {
+    fn keep_outs_have_no_places() {
         let space = Space::wall(
             &wall(&[[[1.0, 2.0], [0.0, 2.0]]]),
             [0.4, 1.25 * 0.4],
@@ -457,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_have_faces_that_look_outwards() {
+    fn faces_of_blocks_point_outwards() {
         let block = Wall {
             corners: std::vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]],
             ..wall(&[])
@@ -495,7 +499,7 @@ mod tests {
         )
         .unwrap();
         assert_eq!(space.dimensions(), 2);
-        assert!(!space.goes_round(0) && space.goes_round(1));
+        assert!(!space.is_periodic(0) && space.is_periodic(1));
         let at = space.pose(&[0.25, 0.5]).unwrap();
         assert_eq!(
             (at.x, at.y, at.z, at.yaw_deg, at.pitch_deg),

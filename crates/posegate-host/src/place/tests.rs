@@ -60,10 +60,9 @@ fn sets() -> [(&'static str, SuccessSet); 5] {
     ]
 }
 
-/// If everything is seen, nothing is outside, and the integral equals that of an independent
-/// reference.
+/// If everything is seen, no mass is outside, and the integral equals that of an independent reference.
 #[test]
-fn where_all_is_seen_nothing_is_outside() {
+fn no_mass_is_outside_if_all_poses_see_the_tag() {
     let found = cost(&set(&[]), &sigmas([0.3, 0.3, 1.0]), 1e-7);
     assert_eq!(found.outside_mass, Approximate::default());
     assert_eq!(found.p_miss, Approximate::default());
@@ -187,7 +186,7 @@ fn by_lattice(set: &SuccessSet, covariance: [[f64; 3]; 3], epsilon: f64, count: 
 
 /// A lattice of poses gives the same result, within its resolution.
 #[test]
-fn a_lattice_of_poses_agrees() {
+fn sums_agree_with_a_lattice_of_poses() {
     let covariance = [[0.36, 0.06, 0.01], [0.06, 0.25, 0.02], [0.01, 0.02, 0.03]];
     let belief = Gaussian::new(covariance, 0.95).unwrap();
     for (name, set) in sets() {
@@ -210,9 +209,9 @@ fn a_lattice_of_poses_agrees() {
     }
 }
 
-/// A robot behind the tag: from there the set is a strip a few degrees wide, seen from its end.
+/// A robot behind the tag: from there the set is a strip, a few degrees wide, seen from its end.
 #[test]
-fn a_narrow_set_is_found_from_outside() {
+fn narrow_set_is_found_from_outside() {
     let set = set(&[
         (
             "pose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }",
@@ -248,9 +247,9 @@ fn a_narrow_set_is_found_from_outside() {
     assert!((inside / sum - 1.0).abs() < 0.1, "{inside:e} {sum:e}");
 }
 
-/// The reported errors hold in a comparison with a finer quadrature.
+/// The reported errors are confirmed by a finer quadrature.
 #[test]
-fn errors_are_no_larger_than_told() {
+fn errors_are_at_most_the_reported_ones() {
     for (name, set) in sets() {
         for sigmas in [
             [0.1, 0.1, 1.0],
@@ -267,10 +266,10 @@ fn errors_are_no_larger_than_told() {
                     off(found.integral, exact.integral),
                     off(found.outside_mass, exact.outside_mass),
                 );
-                let told = |a: Approximate, b: Approximate| a.error + b.error + 1e-12 * b.value;
+                let allowed = |a: Approximate, b: Approximate| a.error + b.error + 1e-12 * b.value;
                 assert!(
-                    integral <= told(found.integral, exact.integral)
-                        && outside <= told(found.outside_mass, exact.outside_mass)
+                    integral <= allowed(found.integral, exact.integral)
+                        && outside <= allowed(found.outside_mass, exact.outside_mass)
                         && found.integral.error <= accuracy * found.integral.value,
                     "{name} {sigmas:?} {accuracy}: {found:?} {exact:?}"
                 );
@@ -280,7 +279,7 @@ fn errors_are_no_larger_than_told() {
 }
 
 #[test]
-fn the_same_for_the_same() {
+fn equal_arguments_give_equal_results() {
     let (_, set) = sets().into_iter().nth(3).unwrap();
     let belief = sigmas([0.3, 0.2, 4.0]);
     let run = || expected_cost(&set, &belief, &Cost::default(), &Quadrature::ROUGH).unwrap();
@@ -288,7 +287,7 @@ fn the_same_for_the_same() {
 }
 
 #[test]
-fn what_is_no_belief_is_named() {
+fn invalid_pose_sets_are_errors() {
     let good = [[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 0.1]];
     let changed = |row: usize, column: usize, value: f64| {
         let mut covariance = good;
@@ -317,7 +316,7 @@ fn what_is_no_belief_is_named() {
 }
 
 #[test]
-fn what_has_no_cost_is_named() {
+fn sets_and_costs_without_a_value_are_errors() {
     let belief = sigmas([0.1, 0.1, 1.0]);
     let site = Site::parse(SAMPLE, "site.toml").unwrap();
     let dock = &site.tasks["dock"].success;
@@ -362,7 +361,7 @@ fn what_has_no_cost_is_named() {
 }
 
 #[test]
-fn a_quick_look_is_near_the_truth() {
+fn quick_estimate_is_near_the_accurate_one() {
     let set = &set(&[]);
     let cost = Cost::default();
     for (sigmas, near) in [
@@ -386,7 +385,7 @@ fn a_quick_look_is_near_the_truth() {
 }
 
 #[test]
-fn what_no_direction_meets_is_not_proven() {
+fn post_that_no_ray_meets_prevents_a_proof() {
     // A post of one millimetre within the pose-set, which every tried ray misses.
     let site = format!(
         "{}\n[task.post]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\

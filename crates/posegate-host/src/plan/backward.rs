@@ -1,10 +1,10 @@
-//! Backward pass from the work task: the places that can lead to it, and a lower bound of the cost from each.
+//! Backward pass from the work task: the places from which it is reachable, and a lower bound of the cost from each.
 
 use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::{Arc, Mutex};
 
 use super::BeliefStateF64;
-use super::costs::way;
+use super::costs::distance;
 use super::library::needed;
 use super::search::{Queued, SearchProblem};
 use posegate::contain::{Decision, decide};
@@ -13,14 +13,14 @@ use posegate::table::Table;
 /// Scale factors for a belief's set. A larger set is tried if the set itself does not fit.
 const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
 
-/// The costs to go of one problem, by the look that is not allowed: many searches ask for the same.
+/// The costs to go of one problem, by the look that is not allowed: many searches need the same ones.
 #[derive(Debug, Default)]
 pub(super) struct Horizons {
     known: Mutex<BTreeMap<Option<usize>, Arc<Vec<f64>>>>,
 }
 
 impl Horizons {
-    /// Returns the known costs to go without a look, or makes them.
+    /// Returns the costs to go without a look; computes them at most once.
     pub fn of(&self, banned: Option<usize>, make: impl FnOnce() -> Vec<f64>) -> Arc<Vec<f64>> {
         let Ok(mut known) = self.known.lock() else {
             return Arc::new(make());
@@ -33,7 +33,7 @@ impl Horizons {
 }
 
 impl SearchProblem<'_> {
-    /// Returns a belief that is exact at a place, after a look. No belief there is better.
+    /// Returns the belief after a look, exact at a place: no belief at that place is better.
     fn at_best(&self, place: usize, look: usize) -> BeliefStateF64 {
         let bound = self.library.looks[look].bound.metres_radians();
         BeliefStateF64 {
@@ -45,7 +45,7 @@ impl SearchProblem<'_> {
         }
     }
 
-    /// Yields the first of all looks with the same error: their best results are equal.
+    /// Yields the first of all looks with the same error, because their best results are equal.
     fn distinct<'s>(&'s self, looks: &'s [usize]) -> impl Iterator<Item = usize> + 's {
         let bound = |look: usize| self.library.looks[look].bound;
         looks.iter().enumerate().filter_map(move |(at, look)| {
@@ -56,9 +56,9 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// Returns `true` if a task may begin with a belief, or with a larger one. The facet test uses several levers:
-    /// a smaller set may fail it although a larger set passes. This bound must not exclude what the search could still
-    /// use.
+    /// Returns `true` if a task may begin with a belief, or with a larger one. The facet test uses several levers: a
+    /// smaller set may fail it although a larger set passes. This bound must not exclude a belief that the search can
+    /// still use.
     fn may_fit(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
         LARGER.into_iter().any(|larger| {
             let set = needed(belief, self.wider * larger);
@@ -68,7 +68,7 @@ impl SearchProblem<'_> {
 
     /// Returns `true` if, at best, some look at one place can be followed by a look at another place.
     pub fn arrives(&self, from: usize, to: usize) -> bool {
-        if way(self.places[from], self.places[to]) > self.range {
+        if distance(self.places[from], self.places[to]) > self.range {
             return false;
         }
         self.distinct(&self.seen[from]).any(|look| {
@@ -96,11 +96,11 @@ impl SearchProblem<'_> {
                     });
                 }
             };
-        // Places where the work can begin on arrival.
+        // Places from which the work can begin on arrival.
         for place in self.ends {
             push(&mut queue, &mut cost, *place, 0.0);
         }
-        // The last look, and the drive to the goal (or none).
+        // The last look, and the drive to the goal (or no drive).
         for place in 0..self.places.len() {
             let looks: Vec<usize> = self.seen[place].iter().copied().filter(allowed).collect();
             for look in self.distinct(&looks) {
@@ -110,7 +110,7 @@ impl SearchProblem<'_> {
                     push(&mut queue, &mut cost, place, self.costs.look);
                 }
                 for end in self.ends.iter().copied() {
-                    let near = way(self.places[place], self.places[end]) <= self.range;
+                    let near = distance(self.places[place], self.places[end]) <= self.range;
                     let there = near.then(|| self.drive(&best, end)).flatten();
                     if there.is_some_and(|there| self.may_fit(self.work, &there)) {
                         let value = self.costs.look + self.costs.drive(place, end, self.places);

@@ -17,7 +17,7 @@ pub struct BeliefStateF64 {
     pub spread: [f64; 2],
     /// Bound of the error about the estimate: translation, yaw.
     pub certain: [f64; 2],
-    /// The probability that `certain` does not hold.
+    /// The probability that the error exceeds `certain`.
     pub doubt: f64,
     /// The normally distributed part of the error.
     pub random: Option<Random>,
@@ -60,7 +60,7 @@ impl BeliefStateF64 {
         }
     }
 
-    /// Returns the cylinder that encloses the whole error: translation, yaw.
+    /// Returns the cylinder that encloses the complete error: translation, yaw.
     #[must_use]
     pub fn enclosing(&self) -> [f64; 2] {
         let [rho, alpha] = self.certain;
@@ -115,8 +115,8 @@ impl BeliefStateF64 {
             start: off,
             end: left,
         };
-        let way = travel(from, legs, &ends);
-        let to = [way.to.x_m, way.to.y_m, way.to.yaw_rad];
+        let path = travel(from, legs, &ends);
+        let to = [path.to.x_m, path.to.y_m, path.to.yaw_rad];
         let after = |certain, doubt, random| Self {
             pose: to,
             spread: left,
@@ -126,7 +126,7 @@ impl BeliefStateF64 {
         };
         match model {
             DriveModel::Bounded(drift) => after(
-                drift.grow(way.length_m, way.turning_rad, self.enclosing()),
+                drift.grow(path.length_m, path.turning_rad, self.enclosing()),
                 self.risk(),
                 None,
             ),
@@ -158,8 +158,8 @@ impl Random {
     }
 }
 
-/// Returns a covariance after a path that begins near its nominal start. It dominates the covariance of every
-/// such path.
+/// Returns a covariance after a path that begins near its nominal start. It dominates the covariance of every such
+/// path.
 fn grown(
     odometry: &Odometry,
     covariance: &Matrix3<f64>,
@@ -182,8 +182,8 @@ fn grown(
     let swung = away * away * covariance[(2, 2)];
     let across = carried[(0, 0)] + carried[(1, 1)];
     let p = libm::sqrt(swung / across.max(f64::MIN_POSITIVE)).clamp(1e-6, 1e6);
-    let beside = swung * (1.0 + 1.0 / p);
+    let across = swung * (1.0 + 1.0 / p);
     carried * (1.0 + p)
         + noise
-        + Matrix3::from_diagonal(&nalgebra::Vector3::new(beside, beside, 0.0))
+        + Matrix3::from_diagonal(&nalgebra::Vector3::new(across, across, 0.0))
 }

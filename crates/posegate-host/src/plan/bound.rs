@@ -1,10 +1,10 @@
-//! A lower bound of the cost of every chain, whatever places it looks from: the straight way, and the least number of
+//! A lower bound of the cost of every chain, with looks from any places: the straight path, and the least number of
 //! looks that any chain needs.
 //!
-//! A chain ends with its pose-set inside the work's success set, so the set is no wider than that. Without a look the set
-//! is at least as wide as at the start: drives only add to it. With one look it has at least that look's error, grown by
-//! the way from where its tag can be seen. If both are too wide, every chain needs two looks. Whatever is neglected here
-//! (turns, angles of view, walls) only makes chains more expensive.
+//! A chain ends with its pose-set inside the work's success set, so the set is no wider than that. Without a look the
+//! set is at least as wide as at the start: drives only add to it. With one look it has at least that look's error,
+//! grown by the path from the places where its tag is visible. If both are too wide, every chain needs two looks.
+//! Effects that are neglected here (turns, angles of view, walls) only make chains more expensive.
 
 use core::f64::consts::PI;
 
@@ -55,17 +55,17 @@ impl Hull {
     /// Returns `true` if a set with these half widths may fit: along x and y, and in heading.
     fn admits(&self, [x, y, yaw]: [f64; 3]) -> bool {
         // The core rounds outwards; nothing is excluded for a rounding.
-        const SPARE: f64 = 1e-6;
-        2.0 * x <= self.x[1] - self.x[0] + SPARE
-            && 2.0 * y <= self.y[1] - self.y[0] + SPARE
-            && self.yaw.is_none_or(|wide| 2.0 * yaw <= wide + SPARE)
+        const SLACK: f64 = 1e-6;
+        2.0 * x <= self.x[1] - self.x[0] + SLACK
+            && 2.0 * y <= self.y[1] - self.y[0] + SLACK
+            && self.yaw.is_none_or(|wide| 2.0 * yaw <= wide + SLACK)
     }
 }
 
-/// Errors that no drive makes smaller: translation and heading of a cylinder, metres and radians.
+/// Errors that drives cannot reduce: translation and heading of a cylinder, metres and radians.
 type Errors = [f64; 2];
 
-/// Returns errors after drives of at least a length: what every path of that length adds.
+/// Returns errors after drives of at least a length: the errors that every path of that length adds.
 fn driven([rho, alpha]: Errors, metres: f64, model: Option<&DriveModel>) -> Errors {
     let swung = 2.0 * metres * libm::sin(alpha.min(PI) / 2.0);
     match model {
@@ -77,7 +77,7 @@ fn driven([rho, alpha]: Errors, metres: f64, model: Option<&DriveModel>) -> Erro
     }
 }
 
-/// A work task, its start, and what every chain of a site between them has to do.
+/// A work task, its start, and the requirements of every chain of a site between them.
 pub(super) struct EveryChain<'a> {
     site: &'a Site,
     start: &'a ChainStart,
@@ -105,17 +105,17 @@ impl<'a> EveryChain<'a> {
         }
     }
 
-    /// Returns a cost that no chain is below.
+    /// Returns a lower bound of the cost of every chain.
     pub fn bound(&self) -> f64 {
         let Some(hull) = &self.hull else {
             return 0.0;
         };
-        let way = self.metre * hull.distance(self.begin());
-        if self.may_do_without(hull) {
-            return way;
+        let drive_cost = self.metre * hull.distance(self.begin());
+        if self.is_possible_without_look(hull) {
+            return drive_cost;
         }
         let look = self.site.planner.look_cost;
-        let two = 2.0 * look + way;
+        let two = 2.0 * look + drive_cost;
         self.looks()
             .filter_map(|(success, bound)| self.one_look(hull, success, bound, two))
             .fold(two, f64::min)
@@ -133,7 +133,7 @@ impl<'a> EveryChain<'a> {
         own.chain(made.map(|made| (&made.success, made.bound)))
     }
 
-    /// Errors at the start as a cylinder; 0 for what drives can make smaller.
+    /// Errors at the start as a cylinder; 0 for errors that drives can reduce.
     fn known(&self) -> Errors {
         match &self.start.known {
             StartUncertainty::Bounded {
@@ -144,7 +144,8 @@ impl<'a> EveryChain<'a> {
         }
     }
 
-    /// Returns the least distance of the estimate from its place: where a drive ends, or `still` without a drive.
+    /// Returns the least distance of the estimate from its place: that at the end of a drive, or `still` without a
+    /// drive.
     fn spread(&self, metres: f64, still: Errors) -> Errors {
         let controller = self.site.navigation.controller;
         let left = [controller.translation, controller.turn_deg.to_radians()];
@@ -156,7 +157,7 @@ impl<'a> EveryChain<'a> {
     }
 
     /// Returns `true` unless every chain needs a look.
-    fn may_do_without(&self, hull: &Hull) -> bool {
+    fn is_possible_without_look(&self, hull: &Hull) -> bool {
         let metres = hull.distance(self.begin());
         let spread = &self.start.spread;
         let spread = self.spread(metres, [spread.translation, spread.turn_deg.to_radians()]);
@@ -165,9 +166,9 @@ impl<'a> EveryChain<'a> {
         hull.admits(cylinder) && self.random(hull).is_none_or(|half| hull.admits(half))
     }
 
-    /// Returns half widths, in the goal frame, that a Gaussian start's set has after every drive. Drives shear the
-    /// covariance along the heading's error and add to it, so neither the heading's variance nor the covariance of the
-    /// position at a known heading becomes smaller.
+    /// Returns half widths, in the goal frame, that the set of a Gaussian start has after every drive. Drives shear
+    /// the covariance along the heading's error and add to it. So neither the heading's variance nor the covariance
+    /// of the position at a known heading becomes smaller.
     fn random(&self, hull: &Hull) -> Option<[f64; 3]> {
         let StartUncertainty::Gaussian {
             covariance,
@@ -199,7 +200,8 @@ impl<'a> EveryChain<'a> {
         ])
     }
 
-    /// Returns a cost that no chain with only this look is below; `None` if there is no such chain below `most`.
+    /// Returns a lower bound of the cost of every chain with only this look; `None` if there is no such chain below
+    /// `most`.
     fn one_look(
         &self,
         hull: &Hull,
@@ -207,7 +209,7 @@ impl<'a> EveryChain<'a> {
         bound: ErrorBound,
         most: f64,
     ) -> Option<f64> {
-        /// Squares along each side of the region from where the look may succeed.
+        /// Squares along each side of the region from which the look may succeed.
         const SIDE: u32 = 24;
         let (centre, radius) = region(success);
         let look = self.site.planner.look_cost;
@@ -238,8 +240,9 @@ impl<'a> EveryChain<'a> {
             let still = [before + error[0], turned + error[1]];
             let spread = self.spread(on, still);
             let half_widths = [rho + spread[0], rho + spread[0], alpha + spread[1]];
-            let way = (to + on).max(straight);
-            hull.admits(half_widths).then_some(look + self.metre * way)
+            let drive_cost = (to + on).max(straight);
+            hull.admits(half_widths)
+                .then_some(look + self.metre * drive_cost)
         });
         costs.fold(None, |least: Option<f64>, cost| {
             Some(least.map_or(cost, |least| least.min(cost)))

@@ -1,7 +1,7 @@
 //! A proof that one pose-set lies in a success set, without a table.
 //!
 //! The set is the belief's set in the goal frame. Its lengths are 6 um and its angles 2^-22 turn wider than the
-//! floats, whose error is 1e-9 of that.
+//! floats. The error of the floats is 1e-9 of these margins.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,7 +9,7 @@ use super::BeliefStateF64;
 use posegate::certify::{Body, ProofBudget, Prover};
 use posegate::shape::SuccessSet;
 
-const PATIENCE: ProofBudget = ProofBudget {
+const BUDGET: ProofBudget = ProofBudget {
     blocks: 6_000,
     smallest: 0.004,
 };
@@ -27,7 +27,7 @@ pub(super) fn is_certain(
     belief: &BeliefStateF64,
     scale: f64,
 ) -> bool {
-    body(success, belief, scale).is_some_and(|body| body.is_within(prover, PATIENCE))
+    body(success, belief, scale).is_some_and(|body| body.is_within(prover, BUDGET))
 }
 
 fn body(success: &SuccessSet, belief: &BeliefStateF64, scale: f64) -> Option<Body> {
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn cylinders_fit_to_the_border() {
+    fn cylinder_that_touches_the_border_is_proven() {
         let (set, prover) = (dock(), Prover::new(&dock()));
         let known = StartUncertainty::Bounded {
             translation: 0.05,
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn ellipsoids_fit_to_the_border() {
+    fn ellipsoid_that_touches_the_border_is_proven() {
         let (set, prover) = (dock(), Prover::new(&dock()));
         let r = libm::sqrt(posegate::confidence::radius_squared(0.99).unwrap());
         // Long across the goal's x axis, turned with it.

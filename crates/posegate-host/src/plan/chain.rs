@@ -60,14 +60,14 @@ impl ChainReport {
         self.first_failure().is_none()
     }
 
-    /// Returns the first step that fails, and why.
+    /// Returns the number of the first step that fails, from 0, and its failure.
     #[must_use]
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
         let mut steps = self.steps.iter().enumerate();
         steps.find_map(|(index, step)| Some((index, step.failure?)))
     }
 
-    /// Returns the risk with six decimals, rounded up: a risk above 0 never reads 0.
+    /// Returns the risk with six decimals, rounded up: a risk above 0 is never printed as 0.
     #[must_use]
     pub fn risk_text(&self) -> String {
         format!("{:.6}", libm::ceil(self.risk * 1e6) * 1e-6)
@@ -76,7 +76,7 @@ impl ChainReport {
 
 /// Evaluates a chain of a site file. Builds and proves the tables that it needs.
 ///
-/// Decisions are those of [`posegate::chain`], with the sharp margins of [`posegate::contain::examine`].
+/// Decisions are those of [`posegate::chain`], with the margins of [`posegate::contain::examine`].
 ///
 /// # Errors
 /// [`PlanError`].

@@ -11,7 +11,7 @@ pub(super) struct Costs {
     pub metre: f64,
     /// Cost of one look.
     pub look: f64,
-    /// Drives between places with a cost of their own, by the places' numbers.
+    /// Drives between places with costs that the user gave, by the places' numbers.
     pub drives: BTreeMap<(usize, usize), f64>,
 }
 
@@ -20,12 +20,12 @@ impl Costs {
     pub fn drive(&self, from: usize, to: usize, places: &[[f64; 3]]) -> f64 {
         match self.drives.get(&(from, to)) {
             Some(cost) => *cost,
-            None => self.metre * way(places[from], places[to]),
+            None => self.metre * distance(places[from], places[to]),
         }
     }
 }
 
-/// Reads lines of `from,to,cost` with names of places. A look's name stands for all of its places.
+/// Reads lines of `from,to,cost` with names of places. A look's name means all of its places.
 ///
 /// # Errors
 /// [`PlanError::Costs`] with file and line if the header or a cost is wrong.
@@ -63,6 +63,6 @@ pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>,
 }
 
 /// Returns the straight distance between two places, in metres.
-pub(super) fn way(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     libm::hypot(a[0] - b[0], a[1] - b[1])
 }

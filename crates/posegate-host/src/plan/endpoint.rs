@@ -10,15 +10,15 @@ use super::walk::world;
 use super::{Library, Options, PlanError, PlanResult, TaskTable};
 use crate::site::{ChainStart, Site, TaskKind};
 
-/// One work task and its start, with the part of a library that can be of use for them.
+/// One work task and its start, with the part of a library that is useful for them.
 ///
-/// The looks possible at each place and the links between places are computed once. A plan with some of the tags then
-/// costs only its own search and proofs. The result does not depend on earlier plans.
+/// The looks possible at each place and the links between places are computed once. A plan with a subset of the tags
+/// then costs only its own search and proofs. The result does not depend on earlier plans.
 #[derive(Debug)]
 pub struct TaskPlanner<'a> {
     site: &'a Site,
     library: Library,
-    laid: RouteGraph,
+    graph: RouteGraph,
     proofs: Arc<Proofs>,
     start: ChainStart,
     work: TaskTable,
@@ -27,9 +27,9 @@ pub struct TaskPlanner<'a> {
 }
 
 impl<'a> TaskPlanner<'a> {
-    /// Prepares a work task from a start. Keeps the looks that are possible at the start, at the goal, or whose
-    /// viewpoints lie at most `beside` metres from the straight line between the two. `chain` names the chain whose
-    /// drive model is used if the site has none.
+    /// Prepares a work task from a start. Keeps a look if it is possible at the start or at the goal, or if one of
+    /// its viewpoints is at most `beside` metres from the straight line between the two. `chain` names the chain
+    /// whose drive model is used if the site has none.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -52,34 +52,34 @@ impl<'a> TaskPlanner<'a> {
         prepared.connect()?;
         let work = TaskTable::baked(site, work, &task.success, task.wish)?;
 
-        let laid = prepared.laid(&start, &work, WIDER[0])?;
+        let graph = prepared.route_graph(&start, &work, WIDER[0])?;
         let tags = library.looks.iter().flat_map(|look| &look.tags);
         Ok(Self {
             site,
             tags: tags.cloned().collect(),
             proofs: Arc::default(),
             library,
-            laid,
+            graph,
             start,
             work,
             chain: chain.map(ToOwned::to_owned),
         })
     }
 
-    /// The names of the tags that can be of use for the task.
+    /// Returns the names of the tags that are useful for the task.
     #[must_use]
     pub const fn tags(&self) -> &BTreeSet<String> {
         &self.tags
     }
 
-    /// The start, in the world.
+    /// Returns the start, in the world.
     #[must_use]
     pub const fn start(&self) -> &ChainStart {
         &self.start
     }
 
     /// Returns the tags of the look for which a plan's place ([`PlanStep::place`](super::PlanStep::place)) was made.
-    /// Without these tags the place is not part of the planning. Returns an empty slice for the start and the goal.
+    /// The place exists in the planning only with these tags. Returns an empty slice for the start and the goal.
     #[must_use]
     pub fn tags_of_place(&self, place: &str) -> &[String] {
         let look = place.rsplit_once('#').map(|(look, _)| look);
@@ -88,8 +88,8 @@ impl<'a> TaskPlanner<'a> {
         look.map_or(&[], |look| &look.tags)
     }
 
-    /// Plans only with looks for which `has` returns `true` for every tag. Minimizes the number of looks, which answers
-    /// soonest whether a plan exists. Finds contingencies only if the options require them.
+    /// Plans only with looks for which `has` returns `true` for every tag. Minimizes the number of looks, because
+    /// that answers soonest if a plan exists. Finds contingencies only if the options require them.
     ///
     /// # Errors
     /// [`PlanError`].
@@ -112,15 +112,15 @@ impl<'a> TaskPlanner<'a> {
         let part = self
             .library
             .only(|look| look.tags.iter().all(|tag| has(tag)));
-        let laid = self.laid.only(&self.library, &number);
+        let graph = self.graph.only(&self.library, &number);
         let mut prepared = Prepared::unconnected(self.site, self.chain.as_deref(), part)
             .with_fewest_looks()
             .with_proofs(self.proofs.clone());
-        prepared.plan_laid(&self.start, &mut self.work.clone(), options, Some(laid))
+        prepared.plan_on_graph(&self.start, &mut self.work.clone(), options, Some(graph))
     }
 }
 
-/// Returns the names of the looks that can be of use near the line from start to goal.
+/// Returns the names of the looks that are useful near the line from start to goal.
 fn in_reach(
     library: &Library,
     [start, goal]: [[f64; 3]; 2],

@@ -51,7 +51,7 @@ pub enum PlanError {
     /// A chain without steps.
     #[error("chain `{0}` has no steps; write `steps = [{{ task = NAME }}, ...]`")]
     NoSteps(String),
-    /// A confidence without a radius in the core.
+    /// A confidence for which the core has no radius.
     #[error("epsilon = {0} has no radius that the gate takes (0.2 and above, below 1)")]
     Epsilon(f64),
     /// The chain does not exist.
@@ -77,7 +77,7 @@ pub enum PlanError {
 
 impl PlanError {
     /// Returns `true` if the error means that a look succeeds from no pose.
-    pub(super) const fn is_nowhere(&self) -> bool {
+    pub(super) const fn is_empty_look(&self) -> bool {
         matches!(
             self,
             Self::BoundTooLarge { .. }

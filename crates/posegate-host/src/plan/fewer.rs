@@ -1,11 +1,11 @@
-//! Chains with fewer looks than the plan that a search found: their places are not those of the library.
+//! Chains with fewer looks than the plan that a search found, from places outside of the library.
 //!
-//! The library has a few places of each look, where the look has the most slack. A chain with fewer looks may need other
-//! places, for example where two bounds are just kept. For the plan's looks without one of them, and for single looks near
-//! the way, a pattern search looks for such places. It only proposes: the places are added to the library, and the plan
-//! is made again, with its proofs.
+//! The library has a few places of each look: those where the look has the most slack. A chain with fewer looks may
+//! need other places, for example at the limits of two bounds. A pattern search looks for such places. It tries the
+//! plan's looks without one of them, and single looks near the path. It only proposes: the places are added to the
+//! library, and planning runs again, with its proofs.
 
-use super::costs::way;
+use super::costs::distance;
 use super::library::{facing, needed};
 use super::search::drive_to;
 use super::{BeliefStateF64, Library, Options, Plan, StepKind};
@@ -13,10 +13,10 @@ use crate::site::{ChainStart, DriveModel, Site};
 use posegate::contain::{Decision, decide, examine};
 use posegate::table::Table;
 
-/// A look, by number, and the place from which it is taken.
+/// A look, by number, and the place from which it is made.
 type PlacedLook = (usize, [f64; 3]);
 
-/// The problem of which a plan is known.
+/// The problem whose plan is known.
 pub(super) struct FewerLooks<'a> {
     pub site: &'a Site,
     pub library: &'a Library,
@@ -35,13 +35,13 @@ const SCALE: f64 = 1.02;
 /// A value above all costs, for each set that does not fit.
 const MISFIT: f64 = 1e6;
 
-/// Places at which a pattern search begins.
+/// Places from which a pattern search begins.
 const BEGINNINGS: usize = 3;
 
 /// Single looks that are tried.
 const SINGLES: usize = 6;
 
-/// First steps of a pattern search, metres and radians, and how often they are halved.
+/// First steps of a pattern search, metres and radians, and the number of times that they are halved.
 const STEPS: [f64; 2] = [0.4, 0.2];
 const HALVINGS: u32 = 7;
 
@@ -90,15 +90,19 @@ impl FewerLooks<'_> {
         looks.collect()
     }
 
-    /// The looks of which one alone may be cheaper than a cost, those nearest to the way first.
+    /// The looks that may be cheaper alone than a cost, those nearest to the path first.
     fn singles(&self, cost: f64) -> Vec<usize> {
         let [begin, goal] = [self.begin, self.goal];
         let looks = self.library.looks.iter().enumerate();
         let mut near: Vec<(f64, usize)> = looks
             .map(|(number, look)| {
                 let centre = [look.centre[0], look.centre[1], 0.0];
-                let by = way(begin, centre) + way(centre, goal);
-                ((by - 2.0 * look.radius).max(way(begin, goal)), by, number)
+                let by = distance(begin, centre) + distance(centre, goal);
+                (
+                    (by - 2.0 * look.radius).max(distance(begin, goal)),
+                    by,
+                    number,
+                )
             })
             .filter(|(least, ..)| self.price(*least, 1) < cost)
             .map(|(_, by, number)| (by, number))
@@ -129,8 +133,8 @@ impl FewerLooks<'_> {
         best.unwrap_or((f64::INFINITY, vec![]))
     }
 
-    /// Returns places to begin with: those of the plan, and for a single look also those of the library and some on the
-    /// straight way.
+    /// Returns places to begin with: those of the plan, and for a single look also those of the library and some on
+    /// the straight path.
     fn beginnings(&self, chain: &[usize], known: &[PlacedLook]) -> Vec<Vec<[f64; 3]>> {
         let place = |look: &usize| {
             let own = known.iter().find(|(own, _)| own == look);
@@ -156,7 +160,7 @@ impl FewerLooks<'_> {
         beginnings
     }
 
-    /// Moves the places, one axis at a time, while the value becomes less.
+    /// Moves the places, one axis at a time, while the value decreases.
     fn descend(&self, chain: &[usize], places: &mut [[f64; 3]], mut best: f64) -> f64 {
         let mut scale = 1.0;
         for _ in 0..HALVINGS {
@@ -182,7 +186,8 @@ impl FewerLooks<'_> {
         best
     }
 
-    /// Returns poses near a pose: moved with its heading, moved so that the tag stays where it is in the image, turned.
+    /// Returns poses near a pose: moved in its own axes, moved so that the tag keeps its place in the image, or
+    /// turned.
     fn moves(&self, look: usize, pose: [f64; 3], scale: f64) -> Vec<[f64; 3]> {
         let success = &self.library.looks[look].table.success;
         let faced = |at: [f64; 3]| facing(success, [at[0], at[1]]);
@@ -202,8 +207,8 @@ impl FewerLooks<'_> {
         moves
     }
 
-    /// Returns the cost of a chain. If sets do not fit or the risk is too high: more than any cost, and less the nearer
-    /// the sets are to fitting.
+    /// Returns the cost of a chain. If sets do not fit or the risk is too high, the value is above all costs, and
+    /// smaller the nearer the sets are to fitting.
     fn value(&self, chain: &[usize], places: &[[f64; 3]]) -> f64 {
         let mut belief = BeliefStateF64::at_start(self.begin, self.start.spread, &self.start.known);
         let (mut metres, mut risk, mut misfit) = (0.0, 0.0, 0.0);
@@ -212,7 +217,7 @@ impl FewerLooks<'_> {
             .zip(places)
             .map(|(look, place)| (Some(*look), *place));
         for (look, place) in targets.chain([(None, self.goal)]) {
-            let length = way(belief.pose, place);
+            let length = distance(belief.pose, place);
             if belief.pose != place {
                 if length > self.site.planner.range {
                     return f64::INFINITY;
@@ -228,7 +233,7 @@ impl FewerLooks<'_> {
             }
             metres += length;
             let table = look.map_or(self.work, |look| &self.tables[look]);
-            misfit += lacking(table, &belief);
+            misfit += missing_scale(table, &belief);
             risk += belief.risk();
             if let Some(look) = look {
                 let bound = self.library.looks[look].bound;
@@ -247,8 +252,8 @@ impl FewerLooks<'_> {
     }
 }
 
-/// Returns how much of the wanted scale a belief's set lacks to fit; 0 if it fits.
-fn lacking(table: &Table<'_>, belief: &BeliefStateF64) -> f64 {
+/// Returns the difference of the required scale and that of a belief's set; 0 if the set fits.
+fn missing_scale(table: &Table<'_>, belief: &BeliefStateF64) -> f64 {
     let Some(set) = needed(belief, SCALE) else {
         return 2.0;
     };

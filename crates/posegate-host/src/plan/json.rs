@@ -27,9 +27,8 @@ impl ChainReport {
 }
 
 impl StepReport {
-    /// A step. Tasks have `contained` and `margin`; a drive with the odometry model has a `covariance`.
-    /// `translation` and `yaw_rad` enclose the error after the step; `spread` bounds where the estimate may be
-    /// then.
+    /// A step. Tasks have `contained` and `margin`; a drive with the odometry model has a `covariance`. `translation`
+    /// and `yaw_rad` enclose the error after the step; `spread` bounds the estimate's distance from its place.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let [translation, yaw] = self.after.enclosing();
@@ -76,59 +75,59 @@ impl Plan {
     }
 
     fn to_json(&self) -> Value {
-        let mut whole = self.report().to_json();
+        let mut value_of_plan = self.report().to_json();
         let steps: Vec<Value> = self
             .steps
             .iter()
             .map(|step| {
-                let mut told = step.report.to_json();
-                told["place"] = json!(step.place);
+                let mut value = step.report.to_json();
+                value["place"] = json!(step.place);
                 if let Some(tag) = step.tags.first() {
-                    told["tag"] = json!(tag);
-                    told["tags"] = json!(step.tags);
+                    value["tag"] = json!(tag);
+                    value["tags"] = json!(step.tags);
                 }
-                told
+                value
             })
             .collect();
-        whole["steps"] = json!(steps);
-        whole["cost"] = json!(self.cost);
-        whole
+        value_of_plan["steps"] = json!(steps);
+        value_of_plan["cost"] = json!(self.cost);
+        value_of_plan
     }
 }
 
 impl PlanResult {
     /// `{"status", "success", "cost", "cost_bound", "library_bound", "gap", "risk", "steps", "contingencies",
-    /// "nearest_miss"}`. `cost_bound` holds for every chain, `library_bound` for the chains of the library; `gap` is the
-    /// part of the cost above `cost_bound`.
+    /// "nearest_miss"}`. `cost_bound` is a bound for every chain, `library_bound` for the chains of the library;
+    /// `gap` is the part of the cost above `cost_bound`.
     #[must_use]
     pub fn to_json(&self) -> Value {
-        let mut whole = match &self.plan {
+        let mut value_of_plan = match &self.plan {
             Some(plan) => plan.to_json(),
             None => json!({ "success": false, "steps": [], "cost": null, "risk": null }),
         };
-        whole["status"] = json!(match self.status {
+        value_of_plan["status"] = json!(match self.status {
             Status::Optimal => "optimal",
             Status::Feasible => "feasible",
             Status::Infeasible => "infeasible",
             Status::Limit => "limit",
         });
-        whole["cost_bound"] = json!(self.bound_of_all);
-        whole["library_bound"] = json!(self.bound);
-        whole["gap"] = json!(self.gap());
-        whole["model_from"] = json!(self.model_from);
+        value_of_plan["cost_bound"] = json!(self.bound_of_all);
+        value_of_plan["library_bound"] = json!(self.bound);
+        value_of_plan["gap"] = json!(self.gap());
+        value_of_plan["model_from"] = json!(self.model_from);
         let others: Vec<Value> = self
             .contingencies
             .iter()
             .map(|other| {
-                let mut told = other.plan.to_json();
-                told["after_step"] = json!(other.step);
-                told["lost_tag"] = json!(other.tags.join(", "));
-                told["risk_before"] = json!(other.risk_before);
-                told
+                let mut value = other.plan.to_json();
+                value["after_step"] = json!(other.step);
+                value["lost_tag"] = json!(other.tags.join(", "));
+                value["risk_before"] = json!(other.risk_before);
+                value
             })
             .collect();
-        whole["contingencies"] = json!(others);
-        whole["nearest_miss"] = match &self.nearest {
+        value_of_plan["contingencies"] = json!(others);
+        value_of_plan["nearest_miss"] = match &self.nearest {
             None => Value::Null,
             Some(miss) => json!({
                 "margin": miss.scale,
@@ -138,12 +137,12 @@ impl PlanResult {
             }),
         };
         if self.plan.is_none() {
-            whole["reason"] = json!(self.why_not());
+            value_of_plan["reason"] = json!(self.why_not());
         }
-        whole
+        value_of_plan
     }
 
-    /// Returns why there is no plan, with the nearest miss.
+    /// Returns the reason why there is no plan, with the nearest miss.
     #[must_use]
     pub fn why_not(&self) -> String {
         let mut text: String = match self.status {

@@ -1,4 +1,4 @@
-//! The planner's library: looks at tags, and places to look from.
+//! The planner's library: looks at tags, and the viewpoints of the looks.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use posegate::shape::{Shape, SuccessSet, Visibility};
 use posegate::table::Table;
 use posegate::task::wrapped;
 
-/// A look with its viewpoints, or the reason why there is none.
+/// A look with its viewpoints, or the reason why it has none.
 type MadeLook = Result<(Look, Vec<Viewpoint>), PlanError>;
 
 /// A localization task that the planner can choose.
@@ -21,28 +21,28 @@ pub struct Look {
     /// The table of the poses from where the look succeeds. Its name is the task's, or that of the tag for which the
     /// look was made.
     pub table: TaskTable,
-    /// The names of the tags that it needs, or may need; `id N` if the site has no such tag.
+    /// The names of the tags that the look needs or may need; `id N` if the site has no such tag.
     pub tags: Vec<String>,
-    /// r_l, and the share of observations within it.
+    /// The largest error r_l, and the share of observations within it.
     pub bound: ErrorBound,
-    /// Position of its tag (or its goal), metres.
+    /// Position of the look's tag (or its goal), metres.
     pub centre: [f64; 2],
-    /// Largest distance from the centre at which the look may be of use, metres.
+    /// Largest distance from the centre at which the look may be useful, metres.
     pub radius: f64,
 }
 
-/// A place to look from.
+/// A place from which a look is made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Viewpoint {
     /// Pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// Its name: the look's name and a number.
+    /// The viewpoint's name: the look's name and a number.
     pub name: String,
     /// The look's number in the library.
     pub look: usize,
 }
 
-/// Looks and the places to look from.
+/// Looks and their viewpoints.
 #[derive(Clone, Debug)]
 pub struct Library {
     /// The looks, in the order of their names.
@@ -61,7 +61,7 @@ impl Library {
         Self::with(site, false, &|_| true)
     }
 
-    /// Like [`Library::of`], with only those looks of whose success sets `keeps` returns `true`.
+    /// Like [`Library::of`], with only the looks for whose success set `keeps` returns `true`.
     ///
     /// # Errors
     /// Those of [`Library::of`].
@@ -128,7 +128,7 @@ impl Library {
             .filter(|(_, found)| found.is_ok())
             .filter_map(|(of, _)| *of)
             .collect();
-        let is_spare = |tag: &String| !site.tags.contains_key(tag) || seen.contains(tag);
+        let is_optional = |tag: &String| !site.tags.contains_key(tag) || seen.contains(tag);
         let mut library = Self {
             looks: vec![],
             views: vec![],
@@ -136,7 +136,7 @@ impl Library {
         for (of, found) in made {
             let (look, views) = match found {
                 Ok(found) => found,
-                Err(error) if of.is_some_and(is_spare) && error.is_nowhere() => continue,
+                Err(error) if of.is_some_and(is_optional) && error.is_empty_look() => continue,
                 Err(error) => return Err(error),
             };
             let own = library.looks.len();
@@ -210,7 +210,7 @@ fn look(
         bound.metres_radians(),
         most,
     );
-    if places.iter().all(|(_, room)| *room < 1.0) {
+    if places.iter().all(|(_, slack)| *slack < 1.0) {
         return Err(PlanError::BoundTooLarge {
             task: table.name,
             translation: bound.translation,
@@ -236,8 +236,8 @@ fn look(
     Ok((look, views))
 }
 
-/// Returns the position of a look's tag (or its goal), and the largest distance from it at which the look may be of use,
-/// metres.
+/// Returns the position of a look's tag (or its goal), and the largest distance from it at which the look may be
+/// useful, metres.
 pub(super) fn region(success: &SuccessSet) -> ([f64; 2], f64) {
     match farthest_view(&success.shape) {
         Some(view) => {
@@ -248,7 +248,8 @@ pub(super) fn region(success: &SuccessSet) -> ([f64; 2], f64) {
     }
 }
 
-/// Returns the pose of a robot at a position whose camera faces a look's tag. `None` if the look is not at one tag.
+/// Returns the pose of a robot at a position whose camera faces a look's tag. `None` if the look is not at exactly
+/// one tag.
 pub(super) fn facing(success: &SuccessSet, [x, y]: [f64; 2]) -> Option<[f64; 3]> {
     let view = farthest_view(&success.shape)?;
     let bearing = libm::atan2(view.tag.pose.y - y, view.tag.pose.x - x);
@@ -276,9 +277,9 @@ fn farthest_view(shape: &Shape) -> Option<&Visibility> {
         })?
 }
 
-/// Returns the largest scale of `bound` whose set about a pose fits, at most 64. Returns 0 if the pose itself is
-/// outside.
-pub(super) fn room(table: &Table<'_>, pose: [f64; 3], bound: [f64; 2]) -> f64 {
+/// Returns the largest scale, at most 64, at which the set with `bound` about a pose fits. Returns 0 if the pose
+/// itself is outside.
+pub(super) fn slack(table: &Table<'_>, pose: [f64; 3], bound: [f64; 2]) -> f64 {
     let holds = |scale: f64| {
         bounded(pose, bound.map(|v| v * scale))
             .is_some_and(|set| decide(table, &set) == Decision::Inside)
@@ -302,8 +303,8 @@ pub(super) fn bounded([x_m, y_m, yaw_rad]: [f64; 3], [m, rad]: [f64; 2]) -> Opti
     PoseSet::bounded(Estimate { x_m, y_m, yaw_rad }, m, rad).ok()
 }
 
-/// Returns the set that must fit for a belief, its lengths scaled by `wider` and a little more to cover the core's
-/// roundings.
+/// Returns the set that must fit for a belief. Its lengths are scaled by `wider` and by a small factor that covers
+/// the core's roundings.
 pub(super) fn needed(belief: &BeliefStateF64, wider: f64) -> Option<PoseSet> {
     let [x_m, y_m, yaw_rad] = belief.pose;
     let estimate = Estimate { x_m, y_m, yaw_rad };
@@ -339,16 +340,16 @@ fn places(
     let probe = [bound[0].max(0.05), bound[1].max(0.02)];
     let mut found: Vec<([f64; 3], f64)> = candidates(success)
         .into_iter()
-        .map(|pose| (pose, room(table, pose, probe)))
-        .filter(|(_, room)| *room > 0.0)
+        .map(|pose| (pose, slack(table, pose, probe)))
+        .filter(|(_, slack)| *slack > 0.0)
         .collect();
     let best_first = |found: &mut Vec<([f64; 3], f64)>| {
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
     };
     best_first(&mut found);
     found.truncate(4 * most);
-    for (pose, room_there) in &mut found {
-        climb(table, probe, pose, room_there);
+    for (pose, slack_there) in &mut found {
+        climb(table, probe, pose, slack_there);
     }
     best_first(&mut found);
     let mut kept: Vec<([f64; 3], f64)> = vec![];
@@ -358,7 +359,7 @@ fn places(
                 && (other.0[2] - pose[2]).abs() < 0.35
         };
         if kept.len() < most && !kept.iter().any(near) {
-            kept.push((pose, room(table, pose, bound)));
+            kept.push((pose, slack(table, pose, bound)));
         }
     }
     kept
@@ -372,7 +373,7 @@ fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64
             for sign in [-1.0, 1.0] {
                 let mut tried = *pose;
                 tried[axis] += sign * step[axis];
-                let there = room(table, tried, probe);
+                let there = slack(table, tried, probe);
                 if there > *best * 1.001 {
                     (*pose, *best) = (tried, there);
                 }
@@ -382,8 +383,7 @@ fn climb(table: &Table<'_>, probe: [f64; 2], pose: &mut [f64; 3], best: &mut f64
     }
 }
 
-/// Returns poses that may see well: the goal and, for a tag, a fan of distances and bearings with the camera facing the
-/// tag.
+/// Returns candidate poses: the goal and, for a tag, a fan of distances and bearings with the camera facing the tag.
 fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
     let goal = success.goal;
     let mut poses = vec![[goal.x, goal.y, goal.yaw_deg.to_radians()]];
@@ -419,8 +419,8 @@ fn candidates(success: &SuccessSet) -> Vec<[f64; 3]> {
     poses
 }
 
-/// Returns a place to look from that is as near to `goal` as possible, with slack for four times the look's own error.
-/// `None` if `from` has no such slack or nothing is gained.
+/// Returns a viewpoint that is as near to `goal` as possible, with slack for four times the look's own error. `None`
+/// if `from` has no such slack or the place is not nearer.
 pub(super) fn towards(
     look: &Look,
     table: &Table<'_>,
@@ -437,7 +437,7 @@ pub(super) fn towards(
         let yaw = wrapped(bearing - view.mount.yaw_deg.to_radians());
         [place[0], place[1], yaw]
     };
-    let fits = |share: f64| room(table, at(share), look.bound.metres_radians()) >= 4.0;
+    let fits = |share: f64| slack(table, at(share), look.bound.metres_radians()) >= 4.0;
     if !fits(0.0) {
         return None;
     }

@@ -19,27 +19,27 @@ pub(super) fn seen(library: &Library, tables: &[Table<'_>], pose: [f64; 3]) -> V
     (0..tables.len()).filter(near).filter(holds).collect()
 }
 
-/// The places of one planning problem: the library's, the start, those on the way, and the goal.
+/// The places of one planning problem: those of the library, the start, those on the path, and the goal.
 #[derive(Clone, Debug)]
 pub(super) struct Roadmap {
     pub places: Vec<[f64; 3]>,
     /// The looks whose tables contain each place's pose.
     pub seen: Vec<Vec<usize>>,
-    /// The places that can follow each place of the library.
+    /// The successors of each place of the library.
     successors: Vec<Vec<usize>>,
     /// The number of places that belong to the library.
     fixed: usize,
     pub start: usize,
     /// The looks of the places between start and goal.
     nearer: Vec<usize>,
-    /// Places from which the work may be done.
+    /// Places from which the work may begin.
     pub ends: Vec<usize>,
 }
 
 impl Roadmap {
     /// Builds the roadmap for drives up to a range, from a start to the goal of a work task. Adds to the library's
-    /// places with their looks and links. Every look within range of the goal gets a place nearer to it, no matter how
-    /// many others there are. So more tags never remove a plan.
+    /// places with their looks and links. Every look within range of the goal gets a place nearer to it, for any
+    /// number of other places. So more tags never remove a plan.
     pub fn of(
         library: &Library,
         tables: &[Table<'_>],
@@ -97,23 +97,23 @@ impl Roadmap {
     /// Returns the successors and the predecessors of each place, including the places of this problem.
     pub fn with_dynamic(&self, question: &SearchProblem<'_>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
         let count = self.places.len();
-        let mut leads = self.successors.clone();
-        leads.resize(count, vec![]);
+        let mut successors = self.successors.clone();
+        successors.resize(count, vec![]);
         for own in self.fixed..count {
-            for (from, led) in leads.iter_mut().enumerate().take(self.fixed) {
+            for (from, predecessors) in successors.iter_mut().enumerate().take(self.fixed) {
                 if question.arrives(from, own) {
-                    led.push(own);
+                    predecessors.push(own);
                 }
             }
-            leads[own] = (0..count).filter(|to| question.arrives(own, *to)).collect();
+            successors[own] = (0..count).filter(|to| question.arrives(own, *to)).collect();
         }
-        let mut led = vec![vec![]; count];
-        for (from, to) in leads.iter().enumerate() {
+        let mut predecessors = vec![vec![]; count];
+        for (from, to) in successors.iter().enumerate() {
             for to in to {
-                led[*to].push(from);
+                predecessors[*to].push(from);
             }
         }
-        (leads, led)
+        (successors, predecessors)
     }
 
     /// Keeps the looks that have a new number in `number`. Returns their part of the roadmap, and the places' new

@@ -1,4 +1,4 @@
-//! One plan on a large site: only the looks near the way are prepared, as far as they can matter.
+//! One plan on a large site: prepares only the looks near the path that can matter.
 
 use super::library::region;
 use super::{Library, Options, PlanError, PlanResult, Prepared, Status};
@@ -6,18 +6,19 @@ use crate::site::{ChainStart, Site};
 use posegate::bake::wide_extent;
 use posegate::shape::SuccessSet;
 
-/// Sites with at most this many looks are prepared as a whole.
+/// Sites with at most this many looks are prepared completely.
 const FEW: usize = 64;
 
-/// First allowed length of a way beyond the straight one, metres.
+/// First allowed length of a path beyond the straight one, metres.
 const DETOUR: f64 = 4.0;
 
-/// Plans one task of a site, as [`Prepared::plan`] does: a plan costs as much as on the whole library. `chain` names the
-/// chain whose drive model is used if the site has none.
+/// Plans one task of a site. The plan costs as much as that of [`Prepared::plan`] with the complete library. `chain`
+/// names the chain whose drive model is used if the site has none.
 ///
-/// Only looks near the way are prepared at first. If a cheaper chain could have a longer way, the looks within that
-/// way's length are added; if there is no plan, those of ways twice as long, until all looks are in use. Contingencies
-/// that no option requires are searched for with the same looks, so a contingency far from the way may be omitted.
+/// Only looks near the path are prepared at first. If a cheaper chain could have a longer path, the looks within that
+/// path's length are added. If there is no plan, those of paths twice as long are added, until all looks are in use.
+/// Contingencies that no option requires are searched for with the same looks, so a contingency far from the path may
+/// be omitted.
 ///
 /// # Errors
 /// [`PlanError`].
@@ -32,22 +33,22 @@ pub fn plan_near(
     let tasks = site.tasks.values();
     let own = tasks.filter(|task| task.error_bound.is_some()).count();
     let metre = site.planner.metre;
-    let is_whole = own + site.planner.looks.len() <= FEW
+    let is_complete = own + site.planner.looks.len() <= FEW
         || options.survive_a_lost_tag
         || !options.costs.is_empty()
         || !(metre > 0.0);
     let task = site.tasks.get(work);
     let reach = task.and_then(|task| Some((&task.success, reach(&task.success)?)));
     let (success, reach) = match reach {
-        Some(known) if !is_whole => known,
+        Some(known) if !is_complete => known,
         _ => return all(),
     };
     let goal = [success.goal.x, success.goal.y];
     let from = start.toward(success.goal).pose;
     let from = [from.x, from.y];
     let apart = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]);
-    // The length of a way from the start to a place from where the work may be done, by a place where a look may be of
-    // use, is at least this.
+    // A lower bound of the length of a path from the start to a place from which the work may begin, by a place where
+    // a look may be useful.
     let least = |success: &SuccessSet| {
         let (centre, radius) = region(success);
         apart(from, centre) + apart(centre, goal) - 2.0 * radius - reach
@@ -79,7 +80,7 @@ pub fn plan_near(
         let planned = prepared.plan(start, work, options)?;
         let cost = planned.plan.as_ref().map(|plan| plan.cost);
         match (cost, planned.status) {
-            // No cheaper chain drives farther than the length that its whole cost would pay for.
+            // No cheaper chain drives farther than the length whose cost equals its complete cost.
             (Some(cost), Status::Optimal) if cost / metre <= length => return Ok(planned),
             (Some(cost), Status::Optimal) => length = cost / metre,
             _ => length *= 2.0,

@@ -31,13 +31,13 @@ impl Default for Options {
     }
 }
 
-/// How a search for a plan ended.
+/// The end of a search for a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// No chain of the library is cheaper.
     Optimal,
-    /// There is a plan, but a cheaper plan is possible. Either a limit was reached, or the core accepted the plan
-    /// only with wider sets than those of the cheapest plan's search.
+    /// There is a plan, but a cheaper plan is possible: a limit was reached, or the core accepted the plan only with
+    /// wider sets than those of the cheapest plan's search.
     Feasible,
     /// No chain of the library is certain to succeed.
     Infeasible,
@@ -48,7 +48,7 @@ pub enum Status {
 /// A step of a plan.
 #[derive(Clone, Debug)]
 pub struct PlanStep {
-    /// Name of the place where the robot is meant to be after the step.
+    /// Name of the intended place of the robot after the step.
     pub place: String,
     /// The tags that the step looks at.
     pub tags: Vec<String>,
@@ -94,13 +94,13 @@ pub struct Nearest {
 /// The result of planning.
 #[derive(Clone, Debug)]
 pub struct PlanResult {
-    /// How the search ended.
+    /// The end of the search.
     pub status: Status,
     /// The plan.
     pub plan: Option<Plan>,
     /// A lower bound of the cost of every chain of the library.
     pub bound: Option<f64>,
-    /// A lower bound of the cost of every chain, whatever places it looks from: the straight way, and the least number
+    /// A lower bound of the cost of every chain, with looks from any places: the straight path, and the least number
     /// of looks that any chain needs.
     pub bound_of_all: f64,
     /// Plans for failed looks; with [`Options::survive_a_lost_tag`] for every look at a tag.
@@ -118,7 +118,8 @@ impl PlanResult {
         own.chain(others.flat_map(|other| other.plan.steps.iter_mut()))
     }
 
-    /// Returns the part of the plan's cost that lies above [`Self::bound_of_all`], 0 to 1; `None` without a plan.
+    /// Returns the part of the plan's cost above [`Self::bound_of_all`], as a share from 0 to 1; `None` without a
+    /// plan.
     #[must_use]
     pub fn gap(&self) -> Option<f64> {
         let cost = self.plan.as_ref()?.cost;
@@ -131,7 +132,7 @@ impl PlanResult {
     }
 
     /// Returns `true` if the core's evaluation satisfies the options.
-    pub(super) fn keeps(&self, options: &Options) -> bool {
+    pub(super) fn satisfies(&self, options: &Options) -> bool {
         let Some(plan) = &self.plan else {
             return false;
         };

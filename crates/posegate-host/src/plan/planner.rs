@@ -13,7 +13,7 @@ use super::library::Library;
 use super::map::{self, Roadmap};
 use super::proofs::{Proofs, Sharpness};
 use super::rescue::Rescues;
-use super::search::{Action, Answer, SearchOutcome, SearchProblem, Wanted};
+use super::search::{Action, Answer, SearchGoal, SearchOutcome, SearchProblem};
 use super::walk::{Walk, world};
 use super::{
     BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
@@ -30,17 +30,17 @@ use posegate::task::Leg;
 pub struct Prepared<'a> {
     site: &'a Site,
     library: Library,
-    /// The looks that each place's pose is in. `leads`: the places that can follow each place.
+    /// The looks whose success set contains each place's pose.
     seen: Vec<Vec<usize>>,
-    leads: Vec<Vec<usize>>,
-    /// `seen` and `leads` of the tables as baked, while a stricter table is in use.
+    successors: Vec<Vec<usize>>,
+    /// `seen` and `successors` of the tables as baked, while a stricter table is in use.
     wider: Option<[Vec<Vec<usize>>; 2]>,
     model: Option<DriveModel>,
     model_from: String,
     /// Costs of a metre and of a look.
     prices: [f64; 2],
     /// `true` if contingencies are searched for even if no option requires them.
-    tells_other_ways: bool,
+    finds_contingencies: bool,
     proofs: Arc<Proofs>,
 }
 
@@ -48,8 +48,8 @@ pub struct Prepared<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct RouteGraph {
     pub map: Roadmap,
-    pub leads: Vec<Vec<usize>>,
-    pub led: Vec<Vec<usize>>,
+    pub successors: Vec<Vec<usize>>,
+    pub predecessors: Vec<Vec<usize>>,
 }
 
 impl RouteGraph {
@@ -62,12 +62,12 @@ impl RouteGraph {
                 .zip(&renumbered)
                 .filter(|(_, new)| new.is_some());
             let to = |to: &usize| renumbered[*to];
-            kept.map(|(way, _)| way.iter().filter_map(to).collect())
+            kept.map(|(list, _)| list.iter().filter_map(to).collect())
                 .collect()
         };
         Self {
-            leads: part(&self.leads),
-            led: part(&self.led),
+            successors: part(&self.successors),
+            predecessors: part(&self.predecessors),
             map,
         }
     }
@@ -76,7 +76,7 @@ impl RouteGraph {
 /// The fallback if a single set cannot be proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProofFallback {
-    /// Prove and use the task's whole table.
+    /// Prove the task's complete table, and use it.
     Table,
     /// Search with wider sets.
     Wider,
@@ -128,21 +128,21 @@ impl<'a> Prepared<'a> {
             site,
             library,
             seen: vec![],
-            leads: vec![],
+            successors: vec![],
             wider: None,
             model,
             model_from: model_from.unwrap_or_default(),
             prices: [site.planner.metre, site.planner.look_cost],
-            tells_other_ways: true,
+            finds_contingencies: true,
             proofs: Arc::default(),
         }
     }
 
-    /// Plans with the fewest looks, no matter how far the robot drives, and without optional contingencies. This
-    /// answers soonest whether a plan exists.
+    /// Plans with the fewest looks, for any length of drives, and without optional contingencies. This answers
+    /// soonest if a plan exists.
     pub(super) fn with_fewest_looks(mut self) -> Self {
         self.prices = [0.0, 1.0];
-        self.tells_other_ways = false;
+        self.finds_contingencies = false;
         self
     }
 
@@ -151,7 +151,7 @@ impl<'a> Prepared<'a> {
         Self { proofs, ..self }
     }
 
-    /// The library.
+    /// Returns the library.
     #[must_use]
     pub const fn library(&self) -> &Library {
         &self.library
@@ -163,7 +163,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Computes the looks and the successors of the places from a number on, and adds them to the successors of the
-    /// others.
+    /// other places.
     fn link(&mut self, first: usize) -> Result<(), PlanError> {
         let tables = parsed(&self.library)?;
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
@@ -191,17 +191,17 @@ impl<'a> Prepared<'a> {
             wider: WIDER[0],
             ends: &[],
             seen: &seen,
-            leads: &[],
+            successors: &[],
             predecessors: &[],
             limit: 0,
             stop: &StopSignal::default(),
             prunes_dominated: true,
             horizons: &Horizons::default(),
         };
-        let leads = (0..places.len())
+        let successors = (0..places.len())
             .into_par_iter()
             .map(|from| {
-                let (mut known, new) = match self.leads.get(from) {
+                let (mut known, new) = match self.successors.get(from) {
                     Some(known) => (known.clone(), first),
                     None => (vec![], 0),
                 };
@@ -211,11 +211,11 @@ impl<'a> Prepared<'a> {
             .collect();
         drop(tables);
         self.seen = seen;
-        self.leads = leads;
+        self.successors = successors;
         Ok(())
     }
 
-    /// Returns the least confidence that a problem of this site can have: with it, drives add the least uncertainty.
+    /// Returns the least confidence of all problems of this site: with it, drives add the least uncertainty.
     fn least_epsilon(&self) -> f64 {
         let starts = self.site.chains.values();
         let of_starts = starts.map(|chain| chain.start.epsilon(self.site));
@@ -242,7 +242,7 @@ impl<'a> Prepared<'a> {
         let task = task.ok_or_else(|| PlanError::NoWork(work.to_owned()))?;
         let table = TaskTable::baked(self.site, work, &task.success, task.wish)?;
         let start = start.toward(task.success.goal);
-        let planned = self.plan_laid(&start, &mut table.clone(), options, None);
+        let planned = self.plan_on_graph(&start, &mut table.clone(), options, None);
         self.relax();
         let mut planned = planned?;
         let priced = !options.costs.is_empty();
@@ -262,7 +262,8 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Plans again with places for chains with fewer looks than a plan's. Returns a plan that costs less, if there is one.
+    /// Plans with additional places for chains with fewer looks than a plan's. Returns a cheaper plan, if there is
+    /// one.
     fn with_fewer_looks(
         &self,
         start: &ChainStart,
@@ -297,18 +298,18 @@ impl<'a> Prepared<'a> {
             more.library.views.push(Viewpoint { pose, name, look });
         }
         more.link(known)?;
-        let again = more.plan_laid(start, &mut work.clone(), options, None)?;
+        let again = more.plan_on_graph(start, &mut work.clone(), options, None)?;
         let costs_less = |other: &Plan| other.cost < plan.cost * (1.0 - 1e-9);
         Ok(again.plan.as_ref().is_some_and(costs_less).then_some(again))
     }
 
-    /// Goes back to the tables as baked, so that an answer does not depend on earlier problems.
+    /// Restores the tables as baked, so that an answer does not depend on earlier problems.
     fn relax(&mut self) {
         for look in &mut self.library.looks {
             look.table.relax();
         }
-        if let Some([seen, leads]) = self.wider.take() {
-            (self.seen, self.leads) = (seen, leads);
+        if let Some([seen, successors]) = self.wider.take() {
+            (self.seen, self.successors) = (seen, successors);
         }
     }
 
@@ -316,18 +317,18 @@ impl<'a> Prepared<'a> {
     ///
     /// If a set cannot be proven by itself and its task's proven table allows no plan, another plan may have provable
     /// sets. The second search for such a plan uses wider sets, on the tables as baked.
-    pub(super) fn plan_laid(
+    pub(super) fn plan_on_graph(
         &mut self,
         start: &ChainStart,
         work_table: &mut TaskTable,
         options: &Options,
-        laid: Option<RouteGraph>,
+        graph: Option<RouteGraph>,
     ) -> Result<PlanResult, PlanError> {
         let planned = self.plan_widening(
             start,
             work_table,
             options,
-            laid.clone(),
+            graph.clone(),
             ProofFallback::Table,
         )?;
         if planned.plan.is_some() || (self.wider.is_none() && !work_table.is_stricter()) {
@@ -335,7 +336,7 @@ impl<'a> Prepared<'a> {
         }
         self.relax();
         work_table.relax();
-        let again = self.plan_widening(start, work_table, options, laid, ProofFallback::Wider)?;
+        let again = self.plan_widening(start, work_table, options, graph, ProofFallback::Wider)?;
         Ok(match (again.plan.is_some(), again.status) {
             (true, Status::Optimal) => PlanResult {
                 status: Status::Feasible,
@@ -351,14 +352,14 @@ impl<'a> Prepared<'a> {
         start: &ChainStart,
         work_table: &mut TaskTable,
         options: &Options,
-        mut laid: Option<RouteGraph>,
-        lacking: ProofFallback,
+        mut graph: Option<RouteGraph>,
+        fallback: ProofFallback,
     ) -> Result<PlanResult, PlanError> {
         let mut bound = None;
         for wider in WIDER {
-            let (planned, keeps) =
-                self.plan_proven(start, work_table, options, wider, &mut laid, lacking)?;
-            if planned.plan.is_none() && bound.is_none() || keeps {
+            let (planned, satisfies) =
+                self.plan_proven(start, work_table, options, wider, &mut graph, fallback)?;
+            if planned.plan.is_none() && bound.is_none() || satisfies {
                 let relaxed = bound.is_some() && planned.status == Status::Optimal;
                 return Ok(PlanResult {
                     status: if relaxed {
@@ -370,7 +371,7 @@ impl<'a> Prepared<'a> {
                     ..planned
                 });
             }
-            // The search allowed for less rounding than the core, so no plan is cheaper than the one that it found.
+            // The search allowed for less rounding than the core, so no plan is cheaper than the plan that it found.
             bound = bound.or(planned.bound);
         }
         Ok(PlanResult {
@@ -384,28 +385,28 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Plans with sets widened by a factor, and proves what the plan relies on. Also returns `true` if the core's own
-    /// evaluation accepts the plan, including its risk and contingencies.
+    /// Plans with sets widened by a factor, and proves the sets that the plan relies on. Also returns `true` if the
+    /// core's own evaluation accepts the plan, including its risk and contingencies.
     fn plan_proven(
         &mut self,
         start: &ChainStart,
         work: &mut TaskTable,
         options: &Options,
         wider: f64,
-        laid: &mut Option<RouteGraph>,
-        lacking: ProofFallback,
+        graph: &mut Option<RouteGraph>,
+        fallback: ProofFallback,
     ) -> Result<(PlanResult, bool), PlanError> {
         loop {
-            let mut planned = match laid {
-                Some(laid) => self.plan_once(start, work, options, wider, laid)?,
+            let mut planned = match graph {
+                Some(graph) => self.plan_once(start, work, options, wider, graph)?,
                 None => {
-                    let laid = self.laid(start, work, wider)?;
-                    self.plan_once(start, work, options, wider, &laid)?
+                    let graph = self.route_graph(start, work, wider)?;
+                    self.plan_once(start, work, options, wider, &graph)?
                 }
             };
             let (mut changed, mut lacks) = (false, false);
             let proofs = self.proofs.clone();
-            let sharpness = if self.tells_other_ways {
+            let sharpness = if self.finds_contingencies {
                 Sharpness::Margin
             } else {
                 Sharpness::Holds
@@ -430,7 +431,7 @@ impl<'a> Prepared<'a> {
                 {
                     continue;
                 }
-                match lacking {
+                match fallback {
                     ProofFallback::Table => changed |= table.prove(self.site)?,
                     ProofFallback::Wider => {
                         lacks = true;
@@ -442,14 +443,14 @@ impl<'a> Prepared<'a> {
                 return Ok((planned, false));
             }
             if !changed {
-                let keeps = planned.keeps(options);
-                return Ok((planned, keeps));
+                let satisfies = planned.satisfies(options);
+                return Ok((planned, satisfies));
             }
-            *laid = None;
+            *graph = None;
             if self.wider.is_none() {
                 let own = [
                     core::mem::take(&mut self.seen),
-                    core::mem::take(&mut self.leads),
+                    core::mem::take(&mut self.successors),
                 ];
                 self.wider = Some(own);
             }
@@ -458,7 +459,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Builds the route graph of a problem, with sets widened by a factor.
-    pub(super) fn laid(
+    pub(super) fn route_graph(
         &self,
         start: &ChainStart,
         work: &TaskTable,
@@ -469,7 +470,7 @@ impl<'a> Prepared<'a> {
         let map = Roadmap::of(
             &self.library,
             &tables,
-            (&self.seen, &self.leads),
+            (&self.seen, &self.successors),
             self.site.planner.range,
             &work_table,
             [world(start.pose), world(work.success.goal)],
@@ -488,15 +489,19 @@ impl<'a> Prepared<'a> {
             wider,
             ends: &map.ends,
             seen: &map.seen,
-            leads: &[],
+            successors: &[],
             predecessors: &[],
             limit: 0,
             stop: &StopSignal::default(),
             prunes_dominated: true,
             horizons: &Horizons::default(),
         };
-        let (leads, led) = map.with_dynamic(&question);
-        Ok(RouteGraph { map, leads, led })
+        let (successors, predecessors) = map.with_dynamic(&question);
+        Ok(RouteGraph {
+            map,
+            successors,
+            predecessors,
+        })
     }
 
     fn plan_once(
@@ -505,7 +510,11 @@ impl<'a> Prepared<'a> {
         work: &TaskTable,
         options: &Options,
         wider: f64,
-        RouteGraph { map, leads, led }: &RouteGraph,
+        RouteGraph {
+            map,
+            successors,
+            predecessors,
+        }: &RouteGraph,
     ) -> Result<PlanResult, PlanError> {
         let tables = parsed(&self.library)?;
         let work_table = work.table()?;
@@ -525,8 +534,8 @@ impl<'a> Prepared<'a> {
             wider,
             ends: &map.ends,
             seen: &map.seen,
-            leads,
-            predecessors: led,
+            successors,
+            predecessors: predecessors,
             limit: options.limit,
             stop: &options.stop,
             prunes_dominated: true,
@@ -543,19 +552,19 @@ impl<'a> Prepared<'a> {
         let end = question.search(
             (&belief, map.start, 0.0),
             None,
-            Wanted::Cheapest,
+            SearchGoal::Cheapest,
             &mut rescue,
         );
         // A smaller set may fail a facet's lever although a larger set passes, so dominance pruning may lose a plan.
         let end = match end {
-            SearchOutcome::Infeasible(miss) if self.tells_other_ways => {
+            SearchOutcome::Infeasible(miss) if self.finds_contingencies => {
                 let thorough = SearchProblem {
                     prunes_dominated: false,
                     limit: (options.limit / FALLBACK_DIVISOR).min(FALLBACK_LIMIT),
                     ..question
                 };
                 let begin = (&belief, map.start, 0.0);
-                match thorough.search(begin, None, Wanted::Cheapest, &mut rescue) {
+                match thorough.search(begin, None, SearchGoal::Cheapest, &mut rescue) {
                     SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
                         SearchOutcome::Feasible(answer, 0.0)
                     }
@@ -577,7 +586,7 @@ impl<'a> Prepared<'a> {
             SearchOutcome::Infeasible(miss) => (Status::Infeasible, None, None, miss),
             SearchOutcome::Open(miss) => (Status::Limit, None, None, miss),
         };
-        // A plan that was excluded for lack of a contingency may have one.
+        // A plan that was excluded because a contingency is missing may have one.
         let (status, bound) = match (status, rescues.is_unsure()) {
             (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
             (Status::Infeasible, true) => (Status::Limit, None),
@@ -588,8 +597,8 @@ impl<'a> Prepared<'a> {
             None => None,
             Some(answer) => {
                 let walk = Walk::start(self.site, start, StartAssumption::General)?;
-                let plan = self.told(walk, answer, map, work)?;
-                let others = options.survive_a_lost_tag || self.tells_other_ways;
+                let plan = self.evaluated(walk, answer, map, work)?;
+                let others = options.survive_a_lost_tag || self.finds_contingencies;
                 let actions = answer.actions.iter().enumerate();
                 for (step, action) in actions.filter(|_| others) {
                     let Action::Look(look) = action else {
@@ -614,7 +623,7 @@ impl<'a> Prepared<'a> {
                     if let Some(other) = rescues.cheapest(&question, begin, *look) {
                         let mut walk = Walk::start(self.site, start, StartAssumption::General)?;
                         self.replay(&mut walk, &answer.actions[..step], map)?;
-                        let plan = self.told(walk, &other, map, work)?;
+                        let plan = self.evaluated(walk, &other, map, work)?;
                         if options.survive_a_lost_tag || plan.report().succeeds() {
                             contingencies.push(Contingency {
                                 step,
@@ -682,8 +691,8 @@ impl<'a> Prepared<'a> {
         Ok(())
     }
 
-    /// Evaluates an answer of the search as a plan, by the core, on the tables in use.
-    fn told(
+    /// Evaluates an answer of the search as a plan with the core, on the tables in use.
+    fn evaluated(
         &self,
         mut walk: Walk,
         answer: &Answer,

@@ -1,4 +1,4 @@
-//! Plans on one site; its libraries are prepared only once.
+//! Plans on one site, whose libraries are prepared only once.
 
 use std::collections::BTreeMap;
 

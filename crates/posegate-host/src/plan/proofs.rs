@@ -9,12 +9,12 @@ use posegate::certify::Prover;
 use posegate::contain::Margin;
 use posegate::shape::SuccessSet;
 
-/// What a proof must show.
+/// The statement to prove.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sharpness {
     /// The set lies in the success set.
     Holds,
-    /// So does a set that is larger by as much of the table's margin as can be proven.
+    /// The same for a set that is enlarged by as much of the table's margin as can be proven.
     Margin,
 }
 
@@ -24,7 +24,7 @@ const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
 /// A task and the numbers of a set, bit by bit.
 type Key = (String, Vec<u64>);
 
-/// The proven margins of sets. Tasks are known by name, so all plans that share them have the same tasks.
+/// The proven margins of sets. The key is a task's name, so all plans that share the proofs must have the same tasks.
 #[derive(Debug, Default)]
 pub(super) struct Proofs {
     /// The proven margin in units of 2^-16; `None` if the set could not be proven to fit.

@@ -1,15 +1,17 @@
-//! Plans without a lost tag: does one exist from a place and a belief, and which is the cheapest?
+//! Plans without a lost tag: whether one exists from a place and a belief, and the cheapest one.
 //!
-//! A search for a plan that survives a lost tag asks this before every look that it tries. Most answers follow from
-//! earlier ones: an earlier plan is taken again step by step, and what is impossible with less uncertainty is impossible
-//! with more.
+//! A search for a plan that survives a lost tag asks for an answer before every look that it tries. Most answers
+//! follow from earlier ones: the steps of an earlier plan are tried again, and a plan that is impossible with less
+//! uncertainty is impossible with more.
 
 use core::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use super::BeliefStateF64;
-use super::search::{Action, Answer, DeadEnds, SearchOutcome, SearchProblem, Wanted, is_within};
+use super::search::{
+    Action, Answer, DeadEnds, SearchGoal, SearchOutcome, SearchProblem, is_within,
+};
 
 /// A belief at a place, and the risk so far.
 type Begin<'b> = (&'b BeliefStateF64, usize, f64);
@@ -24,7 +26,7 @@ pub(super) struct Rescues {
     plans: RefCell<BTreeMap<usize, Vec<Vec<Action>>>>,
     /// The beliefs and risks from which there is no plan without a look.
     none: RefCell<BTreeMap<(usize, usize), Vec<KnownStart>>>,
-    /// What led nowhere without a look.
+    /// Dead ends without a look.
     dead: RefCell<BTreeMap<usize, Rc<RefCell<DeadEnds>>>>,
     unsure: Cell<bool>,
 }
@@ -59,7 +61,7 @@ impl Rescues {
             return false;
         }
         let dead = self.dead.borrow_mut().entry(look).or_default().clone();
-        if let Some(answer) = self.search(problem, begin, look, Wanted::Any(&dead)) {
+        if let Some(answer) = self.search(problem, begin, look, SearchGoal::Any(&dead)) {
             let mut plans = self.plans.borrow_mut();
             plans.entry(place).or_default().push(answer.actions);
             return true;
@@ -77,7 +79,7 @@ impl Rescues {
         begin: Begin<'_>,
         look: usize,
     ) -> Option<Answer> {
-        self.search(problem, begin, look, Wanted::Cheapest)
+        self.search(problem, begin, look, SearchGoal::Cheapest)
     }
 
     fn search(
@@ -85,7 +87,7 @@ impl Rescues {
         problem: &SearchProblem<'_>,
         begin: Begin<'_>,
         look: usize,
-        wanted: Wanted<'_>,
+        wanted: SearchGoal<'_>,
     ) -> Option<Answer> {
         match problem.search(begin, Some(look), wanted, &mut |_, _, _, _| true) {
             SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => Some(answer),
@@ -98,10 +100,10 @@ impl Rescues {
     }
 }
 
-/// Returns `true` if there is no plan from a belief and a risk, because there is none from another belief and risk at
-/// the same place: the one that failed is at least as good in every respect. A failure says nothing about beliefs with
-/// less uncertainty. Without pruning of dominated labels only an equal belief fails too, because only the search
-/// that prunes may assume that less uncertainty is never worse.
+/// Returns `true` if an earlier failure at the same place implies that there is no plan from a belief and a risk: the
+/// failed belief and risk are at least as good in every respect. A failure implies nothing for beliefs with less
+/// uncertainty. Without pruning of dominated labels, a failure implies only that of an equal belief: only the pruning
+/// search may assume that less uncertainty is never worse.
 fn failure_follows(
     (failed, at_risk): &KnownStart,
     (belief, risk): (&BeliefStateF64, f64),
@@ -115,7 +117,7 @@ fn failure_follows(
 }
 
 impl SearchProblem<'_> {
-    /// Returns `true` if the actions of a plan lead to the work from another beginning, without the banned look.
+    /// Returns `true` if the actions of a plan lead to the work from another start, without the banned look.
     fn succeeds(
         &self,
         (belief, place, risk): Begin<'_>,
@@ -164,7 +166,7 @@ mod tests {
         static COMPARED: Cell<[usize; 2]> = const { Cell::new([0, 0]) };
     }
 
-    /// Compares an answer with a search that knows of no earlier one.
+    /// Compares an answer with that of a search without earlier answers.
     pub(super) fn compare(
         problem: &SearchProblem<'_>,
         begin: Begin<'_>,
@@ -189,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn failure_of_a_belief_follows_only_for_beliefs_that_contain_it() {
+    fn failure_is_implied_only_for_beliefs_that_contain_the_failed_one() {
         let bounded = BeliefStateF64 {
             pose: [1.0, 2.0, 0.5],
             spread: [0.1, 0.02],
@@ -240,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_equal_those_of_searches_on_their_own() {
+    fn answers_equal_those_of_independent_searches() {
         let options = Options {
             survive_a_lost_tag: true,
             ..Options::default()
@@ -249,7 +251,7 @@ mod tests {
         let sites = if counts::is_deep() { 6 } else { 3 };
         for seed in 0..sites {
             let drive = [Drive::Bounded, Drive::Gaussian][usize::from(seed % 3 == 2)];
-            // Tags near each other, so that there are other ways.
+            // Tags near each other, so that there are alternatives.
             let text = hall(&mut Random(seed), 3 + (seed % 4) as usize, 2, drive);
             let text = text.replace("d_max = 5.5", "d_max = 9.0");
             let text = text.replace("psi_max_deg = 50.0", "psi_max_deg = 75.0");

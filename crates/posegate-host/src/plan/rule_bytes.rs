@@ -14,8 +14,8 @@ pub struct RuleOrder {
     pub rule: Rule,
 }
 
-/// Returns the bytes of a plan's rules. `None` if there are too many rules or none, or if a name is
-/// too long or empty.
+/// Returns the bytes of a plan's rules. `None` if there are too many rules or no rule, or if a name is too long or
+/// empty.
 #[must_use]
 pub fn write_rules(orders: &[RuleOrder], site_digest: [u8; 32]) -> Option<Vec<u8>> {
     let mut names: Vec<&str> = Vec::new();

@@ -1,4 +1,4 @@
-//! Turns a plan into rules that a controller executes.
+//! Converts a plan to rules that a controller executes.
 
 use super::{Plan, PlanResult, PlanStep, StepKind};
 use super::{RuleOrder, write_rules};
@@ -13,9 +13,9 @@ use posegate::task::Cylinder;
 const ATTEMPTS: u8 = 2;
 
 impl PlanResult {
-    /// Returns the rules of a plan and of its contingencies, for [`posegate::sequencer`]. Returns `None` if there is no
-    /// plan, or if a number is out of range. Also returns `None` if a task begins with an ellipsoid: rules describe a
-    /// set by its enclosing cylinder, and that was not proven. Write the start as `bounded` then.
+    /// Returns the rules of a plan and of its contingencies, for [`posegate::sequencer`]. Returns `None` if there is
+    /// no plan, or if a number is out of range. Also returns `None` if a task begins with an ellipsoid. A rule
+    /// describes a set by its enclosing cylinder, which was not proven: write the start as `bounded`.
     #[must_use]
     pub fn rules(&self, site: &Site) -> Option<Vec<u8>> {
         let plan = self.plan.as_ref()?;
@@ -57,8 +57,8 @@ fn append(
 
 fn order(step: &PlanStep, site: &Site, then: u16, otherwise: Option<u16>) -> Option<RuleOrder> {
     let standing = &step.report.standing;
-    // A rule holds for every set in a cylinder. An ellipsoid that was proven, or carried along a drive, holds only for
-    // itself.
+    // A rule is valid for every set in a cylinder. An ellipsoid that was proven, or carried along a drive, is valid
+    // only for itself.
     let alone = standing.spread == Cylinder::POINT || step.report.kind == StepKind::Navigation;
     if standing.knowledge.is_ellipsoid() && alone || step.report.failure.is_some() {
         return None;
@@ -90,15 +90,15 @@ fn order(step: &PlanStep, site: &Site, then: u16, otherwise: Option<u16>) -> Opt
             then,
             otherwise,
             place,
-            spread: nothing_less(standing.spread)?,
+            spread: at_least_rounding(standing.spread)?,
             set: standing.knowledge.enclosing()?,
             to,
         },
     })
 }
 
-/// Widens a spread by the rounding of an estimate (1 um and 2^-32 turn): a place that is reached exactly may differ by
-/// that.
-fn nothing_less(spread: Cylinder) -> Option<Cylinder> {
+/// Widens a spread by the rounding of an estimate (1 um and 2^-32 turn): a place that is reached exactly may differ
+/// by that.
+fn at_least_rounding(spread: Cylinder) -> Option<Cylinder> {
     spread.plus(Cylinder::from_um_q24(2, 1)?)
 }

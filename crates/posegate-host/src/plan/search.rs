@@ -1,17 +1,17 @@
 //! Label-setting search: labels of (cost, set, risk) at places, the cheapest first.
 //!
-//! A label says that the robot can be at a place with a belief. Each look whose success set contains the belief's set
-//! gives a new belief; from there the robot can drive to every place within range. A label is dropped if another label
-//! of the same place is at least as good in cost, set and risk. A dropped label cannot be part of a cheaper plan: a
-//! smaller set stays smaller after each step, and fits wherever a larger set does.
+//! A label means that the robot can be at a place with a belief. Each look whose success set contains the belief's
+//! set gives a new belief; from there the robot can drive to every place within range. A label is dropped if another
+//! label of the same place is at least as good in cost, set and risk. A dropped label cannot be part of a cheaper
+//! plan: a smaller set stays smaller after each step, and fits wherever a larger set does.
 //!
-//! (The facet test uses several levers: a smaller set may fail it although a larger set passes. If nothing is found, a
-//! shorter search drops only labels that are equal.)
+//! (The facet test uses several levers: a smaller set may fail it although a larger set passes. If no plan is found,
+//! a shorter search drops only equal labels.)
 //!
 //! A backward pass from the work task drops places from which even a robot with an exactly known pose before the look
 //! could not arrive well enough. The other places get a lower bound of the cost to go, which makes the search
-//! best-first. The first plan taken from the queue is the cheapest of the library. If the queue becomes empty, there is
-//! no plan.
+//! best-first. The first plan taken from the queue is the cheapest of the library. If the queue becomes empty, there
+//! is no plan.
 
 use core::cell::RefCell;
 use std::cmp;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use super::BeliefStateF64;
 use super::StopSignal;
 use super::backward::Horizons;
-use super::costs::{Costs, way};
+use super::costs::{Costs, distance};
 use super::library::{Library, needed};
 use crate::site::{DriveModel, ErrorBound, Navigation};
 use posegate::contain::{Decision, Examination, decide, examine};
@@ -44,12 +44,12 @@ pub(super) struct SearchProblem<'a> {
     pub most_risk: f64,
     /// The factor by which the sets of beliefs are widened.
     pub wider: f64,
-    /// The places where a robot with a known pose may begin the work. The goal is one of them.
+    /// The places at which a robot with a known pose may begin the work. The goal is one of them.
     pub ends: &'a [usize],
-    /// The looks that each place's pose is in.
+    /// The looks whose success set contains each place's pose.
     pub seen: &'a [Vec<usize>],
-    /// The successors of each place: where, at best, a robot arrives well enough to look there.
-    pub leads: &'a [Vec<usize>],
+    /// The successors of each place: those at which, at best, a robot arrives well enough to look.
+    pub successors: &'a [Vec<usize>],
     /// The predecessors of each place.
     pub predecessors: &'a [Vec<usize>],
     /// The number of labels that may be taken from the queue.
@@ -58,17 +58,17 @@ pub(super) struct SearchProblem<'a> {
     pub stop: &'a StopSignal,
     /// `true` if dominated labels are dropped; else only equal labels are dropped.
     pub prunes_dominated: bool,
-    /// The costs to go that are known already.
+    /// The costs to go that were already computed.
     pub horizons: &'a Horizons,
 }
 
-/// What a search is for.
+/// The goal of a search.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Wanted<'d> {
+pub(super) enum SearchGoal<'d> {
     /// The cheapest plan.
     Cheapest,
-    /// Any plan, no matter its cost: the search ends with the first one. It adds no label that an earlier search with
-    /// the same banned look showed to lead nowhere.
+    /// Any plan, at any cost: the search ends with the first one. It adds no label that an earlier search with the
+    /// same banned look showed to be a dead end.
     Any(&'d RefCell<DeadEnds>),
 }
 
@@ -79,7 +79,7 @@ pub(super) struct DeadEnds {
 }
 
 impl DeadEnds {
-    /// Returns `true` if a label with less uncertainty and less risk leads nowhere.
+    /// Returns `true` if a label with less uncertainty and less risk is a dead end.
     fn imply(&self, label: &Label) -> bool {
         self.places.get(&label.place).is_some_and(|known| {
             let mut known = known.iter();
@@ -116,7 +116,7 @@ pub(super) struct Answer {
     pub cost: f64,
 }
 
-/// How a search ended.
+/// The end of a search.
 #[derive(Clone, Debug)]
 pub(super) enum SearchOutcome {
     /// The cheapest plan.
@@ -145,10 +145,10 @@ struct Label {
     cost: f64,
     risk: f64,
     parent: Option<usize>,
-    /// The actions that lead here from the parent.
+    /// The actions from the parent to this label.
     actions: Vec<Action>,
     /// `true` if a later label of the same place dominates this one.
-    beaten: bool,
+    is_dominated: bool,
 }
 
 /// A queue entry, ordered by the smallest bound first.
@@ -202,16 +202,16 @@ impl SearchProblem<'_> {
         })
     }
 
-    /// Searches from a belief at a place. A look counts only if `rescue` returns `true`: a plan without its tags exists
-    /// from there.
+    /// Searches from a belief at a place. A look counts only if `rescue` returns `true`, that is, if a plan without
+    /// its tags exists from there.
     pub fn search(
         &self,
         (start, place, risk): (&BeliefStateF64, usize, f64),
         banned: Option<usize>,
-        wanted: Wanted<'_>,
+        goal: SearchGoal<'_>,
         rescue: &mut Rescue<'_>,
     ) -> SearchOutcome {
-        let mut search = Search::new(self, banned, wanted);
+        let mut search = Search::new(self, banned, goal);
         search.add(
             Label {
                 place,
@@ -220,7 +220,7 @@ impl SearchProblem<'_> {
                 risk,
                 parent: None,
                 actions: vec![],
-                beaten: false,
+                is_dominated: false,
             },
             false,
         );
@@ -229,23 +229,23 @@ impl SearchProblem<'_> {
 
     /// Returns `true` if a place is within the range of a drive.
     fn is_near(&self, place: usize, to: usize) -> bool {
-        way(self.places[place], self.places[to]) <= self.range
+        distance(self.places[place], self.places[to]) <= self.range
     }
 }
 
-/// Returns `true` if a plan exists without the tags of a look: the belief and the place before the look, the risk so far,
-/// the look's number.
+/// Returns `true` if a plan exists without the tags of a look. Arguments: the belief and the place before the look,
+/// the risk so far, the look's number.
 pub(super) type Rescue<'r> = dyn FnMut(&BeliefStateF64, usize, f64, usize) -> bool + 'r;
 
-/// The number of labels between two looks at the clock.
+/// The number of labels between two checks of the stop signal.
 const STOP_EVERY: usize = 16;
 
 /// A running search: all labels, and the queue of those that may be extended.
 struct Search<'s, 'p, 'd> {
     problem: &'s SearchProblem<'p>,
-    /// The look that must not be used, nor another look at its tags.
+    /// The look that is not allowed, nor any other look at its tags.
     banned: Option<usize>,
-    wanted: Wanted<'d>,
+    goal: SearchGoal<'d>,
     /// A lower bound of the cost from each place to the work.
     to_go: Arc<Vec<f64>>,
     labels: Vec<Label>,
@@ -258,11 +258,11 @@ struct Search<'s, 'p, 'd> {
 }
 
 impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
-    fn new(problem: &'s SearchProblem<'p>, banned: Option<usize>, wanted: Wanted<'d>) -> Self {
+    fn new(problem: &'s SearchProblem<'p>, banned: Option<usize>, goal: SearchGoal<'d>) -> Self {
         Self {
             problem,
             banned,
-            wanted,
+            goal,
             to_go: problem.horizons.of(banned, || problem.to_go(banned)),
             labels: vec![],
             queue: BinaryHeap::new(),
@@ -279,7 +279,7 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
             if done {
                 return SearchOutcome::Optimal(answer(&self.labels, label));
             }
-            if self.labels[label].beaten {
+            if self.labels[label].is_dominated {
                 continue;
             }
             taken += 1;
@@ -291,13 +291,13 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
                 };
             }
             self.extend(label, rescue);
-            if let (Wanted::Any(_), Some((_, last))) = (self.wanted, self.best) {
+            if let (SearchGoal::Any(_), Some((_, last))) = (self.goal, self.best) {
                 return SearchOutcome::Feasible(answer(&self.labels, last), bound);
             }
         }
-        if let (Wanted::Any(dead), true) = (self.wanted, self.problem.prunes_dominated) {
+        if let (SearchGoal::Any(dead), true) = (self.goal, self.problem.prunes_dominated) {
             let mut dead = dead.borrow_mut();
-            // From the first label the robot may also drive without a look, so it is worth more than others there.
+            // From the first label the robot may also drive without a look, so it is better than others there.
             let others = self.at_place.iter().flatten().filter(|number| **number > 0);
             others.for_each(|number| dead.add(&self.labels[*number]));
         }
@@ -335,12 +335,12 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
         }
     }
 
-    /// Adds the looks from a label, each alone and with a drive to every place that it leads to.
+    /// Adds the looks from a label, each alone and with a drive to every successor.
     fn look(&mut self, from: &Label, rescue: &mut Rescue<'_>) {
         let problem = self.problem;
         let mut looked: Vec<ErrorBound> = vec![];
         for look in problem.seen[from.place].iter().copied() {
-            // Another look with the same error leads to the same labels.
+            // Another look with the same error successors to the same labels.
             let bound = problem.library.looks[look].bound;
             if looked.contains(&bound)
                 || !problem.allowed(look, self.banned)
@@ -358,7 +358,7 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
                 ..from.clone()
             };
             self.work(&after);
-            let others = problem.leads[from.place].iter().copied();
+            let others = problem.successors[from.place].iter().copied();
             let others = others.filter(|to| !problem.ends.contains(to));
             let ends = problem.ends.iter().copied();
             let ends = ends.filter(|to| problem.is_near(from.place, *to));
@@ -407,8 +407,8 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
         fits
     }
 
-    /// Adds the end of the plan if the work fits a label. Notes a near miss if it does not at the goal. `after` is the
-    /// look before.
+    /// Adds the end of the plan if the work fits a label. If it does not fit at the goal, records a near miss.
+    /// `after` is the look before.
     fn arrive(&mut self, label: &Label, after: Option<usize>) {
         let goal = self.problem.places.len() - 1;
         if !self.work(label) && label.place == goal {
@@ -416,7 +416,7 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
         }
     }
 
-    /// Keeps the arrival that comes nearest to fitting the work.
+    /// Keeps the arrival that is nearest to fitting the work.
     fn note(&mut self, belief: &BeliefStateF64, after: Option<usize>) {
         let scale = scale(self.problem.work, belief, self.problem.wider);
         if self.miss.as_ref().is_none_or(|known| scale > known.scale) {
@@ -428,8 +428,8 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
         }
     }
 
-    /// Adds a label, unless its risk is too high, it leads nowhere, or another label of its place is at least as good.
-    /// `done` labels are finished plans.
+    /// Adds a label, unless its risk is too high, it is a dead end, or another label of its place is at least as
+    /// good. `done` labels are finished plans.
     fn add(&mut self, label: Label, done: bool) {
         if label.risk > self.problem.most_risk {
             return;
@@ -445,16 +445,18 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
                 self.best = Some((label.cost, number));
             }
         } else {
-            let is_dead = match self.wanted {
-                Wanted::Any(dead) if self.problem.prunes_dominated && label.parent.is_some() => {
+            let is_dead = match self.goal {
+                SearchGoal::Any(dead)
+                    if self.problem.prunes_dominated && label.parent.is_some() =>
+                {
                     dead.borrow().imply(&label)
                 }
                 _ => false,
             };
-            if is_dead || self.is_beaten(&label) {
+            if is_dead || self.is_dominated_by_another(&label) {
                 return;
             }
-            self.beat(&label);
+            self.drop_dominated(&label);
             self.at_place[label.place].push(number);
         }
         self.queue.push(Queued {
@@ -465,32 +467,32 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
         self.labels.push(label);
     }
 
-    /// Returns `true` if a label of the same place makes this one useless.
-    fn is_beaten(&self, label: &Label) -> bool {
+    /// Returns `true` if a label of the same place dominates this one.
+    fn is_dominated_by_another(&self, label: &Label) -> bool {
         let mut here = self.at_place[label.place].iter();
-        here.any(|other| self.beats(&self.labels[*other], label))
+        here.any(|other| self.dominates(&self.labels[*other], label))
     }
 
-    /// Drops the labels of its place that a label makes useless.
-    fn beat(&mut self, label: &Label) {
+    /// Drops the labels of its place that a label dominates.
+    fn drop_dominated(&mut self, label: &Label) {
         let here = core::mem::take(&mut self.at_place[label.place]);
-        let (beaten, stays) = here
+        let (is_dominated, stays) = here
             .into_iter()
-            .partition(|other| self.beats(label, &self.labels[*other]));
+            .partition(|other| self.dominates(label, &self.labels[*other]));
         self.at_place[label.place] = stays;
-        let beaten: Vec<usize> = beaten;
-        for other in beaten {
-            self.labels[other].beaten = true;
+        let is_dominated: Vec<usize> = is_dominated;
+        for other in is_dominated {
+            self.labels[other].is_dominated = true;
         }
     }
 
-    /// Returns `true` if a label makes another label of its place useless.
-    fn beats(&self, a: &Label, b: &Label) -> bool {
-        let is_no_dearer = match self.wanted {
-            Wanted::Cheapest => a.cost <= b.cost,
-            Wanted::Any(_) => true,
+    /// Returns `true` if a label dominates another label of its place.
+    fn dominates(&self, a: &Label, b: &Label) -> bool {
+        let costs_no_more = match self.goal {
+            SearchGoal::Cheapest => a.cost <= b.cost,
+            SearchGoal::Any(_) => true,
         };
-        is_no_dearer
+        costs_no_more
             && a.risk <= b.risk
             && if self.problem.prunes_dominated {
                 is_within(&a.belief, &b.belief)
@@ -519,7 +521,7 @@ pub(super) fn drive_to(
     ))
 }
 
-/// Returns `true` if a belief is at least as good as another one at the same place in every respect.
+/// Returns `true` if a belief is at least as good as another belief at the same place in every respect.
 pub(super) fn is_within(a: &BeliefStateF64, b: &BeliefStateF64) -> bool {
     let within = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1];
     within(a.certain, b.certain)

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Ends searches when a flag is set, or at a time. A search that it ends reports that it reached its limit. By default
-/// it never ends one.
+/// Ends searches if a flag is set, or at a time. A search that it ends reports that its limit was reached. The
+/// default signal never ends a search.
 #[derive(Clone, Debug, Default)]
 pub struct StopSignal {
     flag: Option<Arc<AtomicBool>>,
@@ -13,7 +13,7 @@ pub struct StopSignal {
 }
 
 impl StopSignal {
-    /// Creates a signal that is set when the flag is, or from a time on.
+    /// Creates a signal that is set if the flag is set, or from a time on.
     #[must_use]
     pub const fn new(flag: Arc<AtomicBool>, until: Option<Instant>) -> Self {
         Self {

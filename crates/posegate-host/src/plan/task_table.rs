@@ -1,4 +1,4 @@
-//! A task's table for plans and chains: baked at once, proven if something relies on it.
+//! A task's table for plans and chains: baked first, proven only if a plan relies on it.
 
 use super::PlanError;
 use crate::site::{Site, TableOverrides};
@@ -12,7 +12,7 @@ use posegate::verify::{BuildError, build};
 pub struct TaskTable {
     /// The task's name.
     pub name: String,
-    /// Its success set.
+    /// The task's success set.
     pub success: SuccessSet,
     wish: TableOverrides,
     bytes: Vec<u8>,
@@ -24,8 +24,8 @@ pub struct TaskTable {
 }
 
 impl TaskTable {
-    /// Bakes the facets of the whole set without a proof. If the set has no facets, builds and proves the table that
-    /// the site file asks for.
+    /// Bakes the facets of the complete set without a proof. If the set has no facets, builds and proves the table
+    /// that the site file specifies.
     ///
     /// # Errors
     /// [`PlanError::Table`], [`PlanError::Unbounded`], [`PlanError::Epsilon`].
@@ -53,8 +53,8 @@ impl TaskTable {
         Ok(table)
     }
 
-    /// Like [`TaskTable::baked`], then proves the table: as facets of the whole set if possible, else as the site file
-    /// asks.
+    /// Like [`TaskTable::baked`], then proves the table: as facets of the complete set if possible, else as the site
+    /// file specifies.
     ///
     /// # Errors
     /// Those of [`TaskTable::baked`].
@@ -69,7 +69,7 @@ impl TaskTable {
         Ok(table)
     }
 
-    /// Returns `true` if the whole table is proven.
+    /// Returns `true` if the complete table is proven.
     #[must_use]
     pub const fn is_proven(&self) -> bool {
         self.is_proven
@@ -86,7 +86,7 @@ impl TaskTable {
         })
     }
 
-    /// Proves the whole table, unless it is proven already. Returns `true` if its bytes have changed.
+    /// Proves the complete table, unless it is already proven. Returns `true` if its bytes have changed.
     ///
     /// # Errors
     /// Those of [`TaskTable::baked`].
@@ -110,8 +110,8 @@ impl TaskTable {
         self.wider.is_some()
     }
 
-    /// Goes back to the baked table if the proof made it stricter: another set may be provable by itself. Returns
-    /// `true` if the bytes have changed. Keeps the proven bytes for later use.
+    /// Restores the baked table if the proof made it stricter: another set may be provable by itself. Returns `true`
+    /// if the bytes have changed. Keeps the proven bytes for later use.
     pub(super) fn relax(&mut self) -> bool {
         let Some(wider) = self.wider.take() else {
             return false;
@@ -131,8 +131,8 @@ impl TaskTable {
         }
     }
 
-    /// Returns the spec of facets of the whole set; `None` if the set is unbounded.
-    fn whole(&self) -> Option<TableSpec> {
+    /// Returns the spec of facets of the complete set; `None` if the set is unbounded.
+    fn complete(&self) -> Option<TableSpec> {
         let extent = bake::wide_extent(&self.success);
         let extent = extent.or_else(|| bake::extent(&self.success, None));
         extent.map(|extent| self.facets_on(extent))
@@ -147,7 +147,7 @@ impl TaskTable {
     }
 
     fn facets(&self, site: &Site) -> Option<Vec<u8>> {
-        let order = self.order(site, self.whole()?);
+        let order = self.order(site, self.complete()?);
         let mut plan = bake::facets(&order, Effort::default()).ok()?;
         plan.fit();
         bake::facets_alone(&order, &plan).ok()
@@ -161,16 +161,16 @@ impl TaskTable {
                 cause,
             },
         };
-        let whole = self.whole();
-        let wished = crate::site::chosen_table(&self.success, &self.wish);
-        let facets = whole.or_else(|| wished.map(|spec| self.facets_on(spec.extent)));
+        let complete = self.complete();
+        let chosen = crate::site::chosen_table(&self.success, &self.wish);
+        let facets = complete.or_else(|| chosen.map(|spec| self.facets_on(spec.extent)));
         let facets = facets.ok_or_else(|| PlanError::Unbounded(self.name.clone()))?;
         if let Ok((bytes, _)) = build(&self.order(site, facets), &|| ()) {
             return Ok(bytes);
         }
         let spec = TableSpec {
             layout: Layout::Auto,
-            ..wished.unwrap_or(facets)
+            ..chosen.unwrap_or(facets)
         };
         let built = build(&self.order(site, spec), &|| ());
         built.map(|(bytes, _)| bytes).map_err(failed)

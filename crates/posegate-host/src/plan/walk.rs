@@ -26,8 +26,8 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    /// Creates the state at a start. Every later Gaussian set has the start's confidence, or the site's if the
-    /// start has none.
+    /// Creates the state at a start. Every later Gaussian set has the start's confidence, or the site's if the start
+    /// has none.
     pub fn start(
         site: &Site,
         start: &ChainStart,
@@ -64,7 +64,7 @@ impl Walk {
         })
     }
 
-    /// Takes a task: a localization if `bound` is given, else work.
+    /// Evaluates a task: a localization if `bound` is given, else work.
     pub fn task(
         &mut self,
         table: &Table<'_>,

@@ -80,7 +80,7 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
     Ok((camera, named))
 }
 
-/// Returns the certified camera. Its border is widened by the farthest that the tolerance can move a point
+/// Returns the certified camera. Its border is widened by the farthest distance that the tolerance can move a point
 /// of the image.
 pub(super) fn seen(
     calibration: &Calibration,
@@ -185,7 +185,7 @@ fn of_file(table: &Table<'_>, file: &Node<'_>) -> Result<(Numbers, NamedFile), S
     calibration::read(file, size_px)
 }
 
-/// Returns which image the detector reads. `image` is required if raw and rectified image differ.
+/// Returns the image that the detector reads. `image` is required if raw and rectified image differ.
 fn image(table: &Table<'_>, numbers: &Numbers) -> Result<Image, SiteError> {
     let [fx, fy, cx, cy] = numbers.rect;
     let same = [fx, fy] == numbers.focal_px && [cx, cy] == numbers.axis_px;
@@ -227,12 +227,12 @@ fn roi(node: &Node<'_>) -> Result<Roi, SiteError> {
         width: whole(&keys::ROI_WIDTH)?,
         height: whole(&keys::ROI_HEIGHT)?,
     };
-    let is_whole = [roi.x_offset, roi.y_offset, roi.width, roi.height] == [0; 4];
+    let is_full_image = [roi.x_offset, roi.y_offset, roi.width, roi.height] == [0; 4];
     for (size, key) in [
         (roi.width, &keys::ROI_WIDTH),
         (roi.height, &keys::ROI_HEIGHT),
     ] {
-        if size == 0 && !is_whole {
+        if size == 0 && !is_full_image {
             return Err(table.required(key)?.out_of_range());
         }
     }
@@ -248,7 +248,7 @@ fn binning(node: &Node<'_>) -> Result<[u32; 2], SiteError> {
     }
 }
 
-/// Returns the error for a camera without a usable view, at the key that causes it.
+/// Returns the error for a camera without a usable view, at the key that causes the error.
 fn unseen(table: &Table<'_>, fault: LensError) -> SiteError {
     let lens = if table.has(keys::CALIBRATION.name) {
         &keys::CALIBRATION

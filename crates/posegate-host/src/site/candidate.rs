@@ -7,8 +7,8 @@ use super::reader::{Node, Table, name_fault};
 use super::{Candidate, SiteTag, keys, parse, places, row};
 use posegate::shape::{Tag, Tolerance, Wall};
 
-/// Returns the candidates of `[candidate.NAME]` and `[candidates.NAME]` tables, by name. Rows along walls depend on the
-/// sides of the walls where `goals` are.
+/// Returns the candidates of `[candidate.NAME]` and `[candidates.NAME]` tables, by name. Rows are on the sides of the
+/// walls where `goals` are.
 pub(super) fn candidates(
     root: &Table<'_>,
     tags: &BTreeMap<String, SiteTag>,
@@ -41,7 +41,7 @@ pub(super) fn candidates(
 struct Candidates<'a> {
     tags: &'a BTreeMap<String, SiteTag>,
     found: BTreeMap<String, Candidate>,
-    /// By family and number: what has it.
+    /// The owner of each number, by family and number.
     taken: BTreeMap<(String, u32), String>,
 }
 

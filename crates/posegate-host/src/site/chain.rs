@@ -24,7 +24,7 @@ pub enum StartFrame {
     /// The world.
     #[default]
     World,
-    /// The goal frame of the task to plan for: one start for all docks with equal approaches.
+    /// The goal frame of the task to plan for: one start serves all docks with equal approaches.
     Goal,
 }
 
@@ -35,9 +35,9 @@ pub struct ChainStart {
     pub frame: StartFrame,
     /// The estimated pose.
     pub pose: PoseDeg,
-    /// How far from `pose` the estimate may be when the chain begins.
+    /// The largest distance of the estimate from `pose` when the chain begins.
     pub spread: Tolerance,
-    /// How far the true pose may be from the estimate.
+    /// The largest distance of the true pose from the estimate.
     pub known: StartUncertainty,
 }
 
@@ -91,17 +91,17 @@ impl ChainStart {
     }
 }
 
-/// How far the true pose may be from an estimate.
+/// The uncertainty of an estimate: bounds or a covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartUncertainty {
-    /// Within a cylinder.
+    /// The true pose is within a cylinder around the estimate.
     Bounded {
         /// Metres, at least 0.
         translation: f64,
         /// Degrees, from 0 to 180.
         yaw_deg: f64,
     },
-    /// Gaussian, with this covariance.
+    /// The error is Gaussian with this covariance.
     Gaussian {
         /// Symmetric, no eigenvalue below 0, in m^2, m rad and rad^2, world axes.
         covariance: [[f64; 3]; 3],
@@ -117,7 +117,7 @@ pub enum ChainStep {
     Task(String),
     /// A drive.
     Navigate {
-        /// Where the path begins.
+        /// The start of the path.
         from: Estimate,
         /// The legs of the path, radians.
         legs: Vec<Leg>,
@@ -135,12 +135,12 @@ pub enum DriveModel {
     Gaussian(Odometry),
 }
 
-/// How the site's robots drive.
+/// The driving of the site's robots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Navigation {
-    /// The model of drives that have none of their own.
+    /// The model of drives without a model of their own.
     pub model: Option<DriveModel>,
-    /// How far the estimate may be from a drive's end when the controller stops.
+    /// The largest distance of the estimate from a drive's end when the controller stops.
     pub controller: Tolerance,
 }
 

@@ -11,18 +11,19 @@ use sha2::{Digest, Sha256};
 use super::sections::{NeedsFullParse, Section, Sections};
 use super::{Site, keys, parse};
 
-/// Limit on the walks through a file. Each walk follows references by one step: task, its chain, the tasks of that
-/// chain and their tags take four.
+/// Limit on the walks through a file. Each walk follows references by one step. Four steps lead from a task to its
+/// chain, the tasks of that chain and their tags.
 const WALKS: usize = 16;
-/// Lines of this many bytes, or more, are left to the full parser.
+/// Lines of this many bytes or more need the full parser.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// The task names and the digest of a site file, found from its headers and the sections that every task may depend on.
+/// The task names and the digest of a site file, found from its headers and the sections that every task may depend
+/// on.
 ///
-/// For programs that need a few tasks of a site with thousands: [`SiteIndex::part`] reads just these and everything
-/// that they refer to. The file is walked through several times, with one line in memory at a time. Only simple files
+/// For programs that need a few tasks of a site with thousands: [`SiteIndex::part`] reads only these and everything
+/// that they refer to. It walks through the file several times, with one line in memory at a time. Only simple files
 /// are supported: one header per task and per tag, strings on one line without escapes, no imports and no candidates.
-/// **In every other case the result is `None`**, with no error reported: read the whole file with [`Site::read`]
+/// **In every other case the result is `None`**, and no error is reported: read the complete file with [`Site::read`]
 /// instead.
 #[derive(Clone, Debug)]
 pub struct SiteIndex {
@@ -89,7 +90,7 @@ impl SiteIndex {
     /// `goal`, `chain`) and name, everything that they refer to, and all other sections of the file. Entries and digest
     /// are the same as in the whole site.
     ///
-    /// `None` if the file must be read as a whole: also if it has changed since, or has a fault.
+    /// `None` if the full parser is needed, if the file has changed since, or if it has a fault.
     #[must_use]
     pub fn part(&self, wanted: impl Fn(&str, &str) -> bool) -> Option<Site> {
         let site = self.named(wanted)?;

@@ -14,10 +14,10 @@ pub enum Core {
     CortexM0Plus,
 }
 
-/// What the motion controller can spend on a decision.
+/// The cycles that the motion controller can spend on a decision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller {
-    /// Its core.
+    /// The core.
     pub core: Core,
     /// The processor cycles of one control cycle that a decision may take.
     pub cycles_per_decision: u32,
@@ -26,10 +26,10 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// The cycles of an instruction if a site file states none.
+    /// The cycles of an instruction if a site file gives none.
     pub const DEFAULT_CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
-    /// Returns an upper bound on the cycles of one decision on a table, if instructions take as many cycles as stated.
+    /// Returns an upper bound on the cycles of one decision on a table, at [`Self::cycles_per_instruction`].
     #[must_use]
     pub fn cycles(&self, worst: &WorstCase) -> f64 {
         let instructions = match self.core {

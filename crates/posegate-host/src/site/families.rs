@@ -1,4 +1,4 @@
-//! The families of tags that are known by name.
+//! The families of tags that have a known name.
 
 /// The names of the families that [`Family::named`](posegate::shape::Family::named) knows.
 pub const FAMILIES: [&str; 9] = [

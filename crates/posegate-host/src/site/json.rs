@@ -60,15 +60,15 @@ impl<'a> Value<'a> {
                 let lines = text.split_inclusive('\n').take(fault.line().max(1) - 1);
                 let before: usize = lines.map(str::len).sum();
                 let at = mark + before + fault.column().saturating_sub(1);
-                let told = format!("{fault}");
-                let told = told.split(" at line ").next().unwrap_or_default();
+                let message = format!("{fault}");
+                let message = message.split(" at line ").next().unwrap_or_default();
                 let help = if text[before..].contains("NaN") || text[before..].contains("nan") {
                     "JSON has no NaN: measure the missing value, or remove the tag"
                 } else {
                     "write `{ \"tags\": [ ... ] }`, names in double quotes, commas between, none at the end"
                 };
                 Err(source
-                    .error(at..at + 1, format!("not valid JSON: {told}"))
+                    .error(at..at + 1, format!("not valid JSON: {message}"))
                     .expected("JSON")
                     .help(help))
             }

@@ -8,7 +8,7 @@ use super::{ErrorBound, SiteCamera, SiteTag, keys};
 use crate::learn::{ErrorModel, TakenWith};
 use posegate::shape::{Exclusion, Shape, Visibility};
 
-/// Refuses a model whose detections were taken with another camera or other tags, as far as both are known.
+/// Refuses a model whose detections were taken with another camera or other tags, if both are known.
 pub(super) fn same(
     node: &Node<'_>,
     model: &ErrorModel,
@@ -33,7 +33,7 @@ pub(super) fn same(
 }
 
 impl SiteCamera {
-    /// Returns what a model records of the camera with which its detections were taken.
+    /// Returns the description of this camera that a model learnt with it records.
     #[must_use]
     pub fn taken_with(&self) -> TakenWith {
         let [fx, fy] = self.calibration.focal_px;
@@ -59,7 +59,7 @@ pub(super) fn set(
 ) -> Result<Shape, SiteError> {
     let turned = 2.0 * view.tag_tolerance.turn_deg;
     let mut sets: Vec<Shape> = Vec::new();
-    // The error that remains for the detector at distance `d`, after the errors from the survey's tolerances.
+    // The error that the detector may still have at distance `d`, after the errors from the survey's tolerances.
     let allowed = |d: f64| {
         let [metres, degrees] = view.tolerance_error(d.min(view.d_max));
         [translation - metres, yaw_deg - degrees]
@@ -100,13 +100,17 @@ pub(super) fn set(
     }
     match <[Shape; 1]>::try_from(sets) {
         Ok([only]) => Ok(only),
-        Err(sets) if sets.is_empty() => Err(nowhere(limit, view, [translation, yaw_deg])),
+        Err(sets) if sets.is_empty() => Err(too_inaccurate(limit, view, [translation, yaw_deg])),
         Err(sets) => Ok(Shape::Any(sets)),
     }
 }
 
-/// Returns the error for a set without a view that is good enough.
-fn nowhere(limit: &Node<'_>, view: &Visibility, [translation, yaw_deg]: [f64; 2]) -> SiteError {
+/// Returns the error for a set in which no view is accurate enough.
+fn too_inaccurate(
+    limit: &Node<'_>,
+    view: &Visibility,
+    [translation, yaw_deg]: [f64; 2],
+) -> SiteError {
     let within = format!("within {translation} m and {yaw_deg} deg");
     if view.is_exact() {
         return limit
@@ -190,7 +194,7 @@ fn worse(a: Limit, b: Limit) -> Limit {
     }
 }
 
-/// Returns the views of a set that no error model limits: their largest error is stated in the file.
+/// Returns the views of a set without an error model: their largest error is stated in the file.
 pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
     let mut views = Vec::new();
     let mut open = std::vec![shape];
@@ -204,8 +208,8 @@ pub(crate) fn stated_views(shape: &Shape) -> Vec<&Visibility> {
     views
 }
 
-/// Returns the largest error of a task: its `error_bound` if it has one, else the success set's limit if that holds
-/// everywhere.
+/// Returns the largest error of a task: its `error_bound` if it has one. Otherwise that of the success set, if it is
+/// valid in every part of a union.
 ///
 /// # Errors
 ///

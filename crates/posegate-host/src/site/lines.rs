@@ -1,4 +1,4 @@
-//! Where in a site file's text something is written.
+//! Finds the line of a key in a site file's text.
 
 use toml::de::{DeTable, DeValue};
 
@@ -32,7 +32,7 @@ mod tests {
     use super::line_of;
 
     #[test]
-    fn keys_are_found_in_every_form() {
+    fn keys_are_found_in_every_notation() {
         let text = "[tag.a]\nid = 1\nsize = 300\n\n[tag.b]\npose = { x = 1.0,\n y = 2.0 }\ntag = 3\n[wall]\nc.z = 1\n";
         for (path, line) in [
             (&["tag", "a"][..], Some(1)),

@@ -1,8 +1,8 @@
 //! Site files: the cameras, tags and tasks of a place, in TOML.
 //!
-//! A site file states where a robot's tasks are and from which poses each of them succeeds; [`SAMPLE`] is a commented
+//! A site file states the tasks of a robot and the poses from which each of them succeeds; [`SAMPLE`] is a commented
 //! example. Numbers are kept as written: metres, pixels, and degrees if a name ends in `_deg`. A file with a fault is
-//! refused as a whole; the error states where the fault is and how to fix it ([`SiteError`]).
+//! refused; the error states the position of the fault and how to fix it ([`SiteError`]).
 //!
 //! ```
 //! use posegate_host::site::{SAMPLE, Site};
@@ -88,7 +88,7 @@ pub struct Site {
     pub goals: BTreeMap<String, PoseDeg>,
     /// Chains of tasks, by name.
     pub chains: BTreeMap<String, SiteChain>,
-    /// How the robots drive.
+    /// The driving of the robots.
     pub navigation: Navigation,
     /// The settings of the planner.
     pub planner: Planner,
@@ -193,23 +193,24 @@ impl Site {
         })
     }
 
-    /// Returns what a task's table covers: the values of the file, else the defaults. A missing extent is chosen so
-    /// that it holds the success set, at most twice as wide as the task's expected pose-set
-    /// ([`posegate::bake::extent`]). `None` if no such extent is found: if the set is unbounded and the task has no
-    /// `expected`, for example.
+    /// Returns the extent, step and layout of a task's table: the values of the file, else the defaults. A missing
+    /// extent is chosen so that it contains the success set, at most twice as wide as the task's expected pose-set
+    /// ([`posegate::bake::extent`]). `None` if no such extent is found: for example, if the set is unbounded and the
+    /// task has no `expected`.
     #[must_use]
     pub fn chosen_table(&self, task: &Task) -> Option<TableSpec> {
         chosen_table(&task.success, &task.wish)
     }
 
-    /// Returns what a task's table covers: its own table, else the site's default.
+    /// Returns the extent, step and layout of a task's table: those of the task, else the site's default.
     #[must_use]
     pub fn table_spec<'a>(&'a self, task: &'a Task) -> Option<&'a TableSpec> {
         task.table.as_ref().or(self.table.as_ref())
     }
 }
 
-/// Returns what a set's table covers: the overrides, with a chosen extent if they have none ([`Site::chosen_table`]).
+/// Returns the extent, step and layout of a set's table: the overrides, with a chosen extent if they have none
+/// ([`Site::chosen_table`]).
 pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableOverrides) -> Option<TableSpec> {
     let extent = match wish.extent {
         Some(extent) => extent,
@@ -281,7 +282,7 @@ pub struct Task {
     pub success: SuccessSet,
     /// The largest error of a localization. Every localization task has one; a work task has none.
     pub error_bound: Option<ErrorBound>,
-    /// The name of the chain from whose start the robot sets out for this task, if the file gives one.
+    /// The name of the chain from whose start the robot drives to this task, if the file gives one.
     pub from: Option<String>,
     /// The task's own table, completed with the site's defaults. `None` if the task has no table of its own.
     pub table: Option<TableSpec>,

@@ -1,4 +1,4 @@
-//! From TOML to a [`Site`].
+//! Converts TOML to a [`Site`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,7 +39,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     part(text, file, Sha256::digest(text.as_bytes()).into())
 }
 
-/// Reads a site from some of the text of a file. `sha256` is that of the whole file.
+/// Reads a site from a part of a file's text. `sha256` is that of the complete file.
 pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, SiteError> {
     let source = Source { file, text };
     let document = DeTable::parse(text).map_err(|fault| syntax(source, &fault))?;

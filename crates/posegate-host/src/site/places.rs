@@ -76,7 +76,7 @@ pub(super) fn tolerance(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     })
 }
 
-/// Reads where the robot is expected about its goal.
+/// Reads the pose-set, about its goal, in which the robot is expected.
 pub(super) fn expected(node: &Node<'_>) -> Result<Tolerance, SiteError> {
     let table = node.table(&[&keys::TOLERANCE_TRANSLATION, &keys::EXPECTED_YAW])?;
     Ok(Tolerance {
@@ -111,13 +111,13 @@ pub(super) enum SiteModel {
     Learnt(learn::ErrorModel),
 }
 
-/// The largest lean of a detector's pose that is assumed, degrees, as for the tolerance of a mount.
+/// The largest tilt of a detector's pose that is assumed, degrees, as for the tolerance of a mount.
 const LARGEST_LEAN_DEG: f64 = 20.0;
 
 /// Reads an error model. Also returns its file if it names one.
 ///
-/// The two lengths are the largest distance of a camera from the robot's reference point along the floor, and its largest height above it,
-/// metres.
+/// The two lengths, metres, are the largest distance of a camera from the robot's reference point along the floor,
+/// and its largest height above that point.
 pub(super) fn error_model(
     node: &Node<'_>,
     [lever, height]: [f64; 2],
@@ -188,7 +188,7 @@ pub(super) fn error_model(
         let mut numbers: Vec<f64> = Vec::new();
         for entry in &node.array()? {
             let number = entry.number()?;
-            // A bound may fall with psi, the last one: errors are largest head-on.
+            // Only the last coefficient may be negative: errors decrease with psi, since they are largest head-on.
             if number < 0.0 && numbers.len() < 3 {
                 return Err(entry.out_of_range());
             }
@@ -206,8 +206,8 @@ pub(super) fn error_model(
 
 /// Reads a learnt model from a file; its path is relative to the site file's folder.
 fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> {
-    let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
-    let path = beside.join(node.text()?);
+    let folder = Path::new(node.file()).parent().unwrap_or(Path::new(""));
+    let path = folder.join(node.text()?);
     let name = path.to_string_lossy();
     let bytes = input::read_file(&path, Limit::MODEL).map_err(|cause| {
         node.error(format!("the error model {name} cannot be read: {cause}"))
@@ -223,7 +223,7 @@ fn learnt(node: &Node<'_>) -> Result<(learn::ErrorModel, NamedFile), SiteError> 
     Ok((model, read))
 }
 
-/// Returns the line of a site file that states a tag's pose, exact to the last bit.
+/// Returns the `pose` line of a tag in a site file, exact to the last bit.
 #[must_use]
 pub fn pose_line(pose: &Pose3Deg) -> String {
     let Pose3Deg {

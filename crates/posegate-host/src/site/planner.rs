@@ -78,8 +78,9 @@ pub(super) fn planner(
     if let Some(look) = table.optional(&keys::PLANNER_LOOK) {
         let errors = table.required(&keys::PLANNER_R)?;
         planner.looks = looks(&look, &errors, names, true)?;
-        let hung = |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
-        let tags: BTreeMap<String, SiteTag> = candidates.iter().map(hung).collect();
+        let mounted =
+            |(name, candidate): (&String, &Candidate)| (name.clone(), candidate.tag.clone());
+        let tags: BTreeMap<String, SiteTag> = candidates.iter().map(mounted).collect();
         planner.offers = looks(
             &look,
             &errors,
@@ -94,8 +95,8 @@ pub(super) fn planner(
 }
 
 /// Makes one localization task per tag and error bound. Bounds that only the tolerances of tag and camera make
-/// impossible are skipped. If that skips all bounds of a tag, the result is an error for an existing tag (`are_there`);
-/// a candidate just gets no look.
+/// impossible are skipped. If all bounds are skipped, an existing tag (`are_there`) gives an error, and a candidate
+/// gets no look.
 fn looks(
     look: &Node<'_>,
     errors: &Node<'_>,
@@ -175,9 +176,9 @@ fn looks(
             let root = Table::root(source, &document);
             let set = root.required(&keys::SUCCESS).map_err(wrong)?;
             let shape = match made(&set, names, of).map_err(wrong)? {
-                Made::Set(shape) => *shape,
-                // The tag's tolerance may allow another one of the errors.
-                Made::NotWithTolerance(fault) => {
+                SetResult::Set(shape) => *shape,
+                // With the tag's tolerance another error may be possible.
+                SetResult::NotWithTolerance(fault) => {
                     too_poor.get_or_insert(wrong(fault));
                     continue;
                 }
@@ -213,13 +214,13 @@ fn looks(
 }
 
 /// The success set of a look.
-enum Made {
+enum SetResult {
     Set(Box<Shape>),
     /// With the tolerances of tag and camera the set is empty; without them it is not.
     NotWithTolerance(SiteError),
 }
 
-fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteError> {
+fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<SetResult, SiteError> {
     let has_views = |shape: &Result<Shape, SiteError>| {
         shape
             .as_ref()
@@ -227,7 +228,7 @@ fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteEr
     };
     let shape = success::shape(set, names);
     if has_views(&shape) {
-        return shape.map(|shape| Made::Set(Box::new(shape)));
+        return shape.map(|shape| SetResult::Set(Box::new(shape)));
     }
     // A look observes one tag, so making all tags exact affects only that one.
     let exact = SiteTag {
@@ -249,9 +250,9 @@ fn made(set: &Node<'_>, names: &Names<'_>, tag: &SiteTag) -> Result<Made, SiteEr
         ..*names
     };
     if !has_views(&success::shape(set, &exactly)) {
-        return shape.map(|shape| Made::Set(Box::new(shape)));
+        return shape.map(|shape| SetResult::Set(Box::new(shape)));
     }
-    Ok(Made::NotWithTolerance(match shape {
+    Ok(SetResult::NotWithTolerance(match shape {
         Err(fault) => fault,
         Ok(_) => set.error(
             "nowhere in the set is the bound of the error model within `r`, with the error from the tolerances of tag and camera added",

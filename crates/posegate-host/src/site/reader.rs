@@ -12,7 +12,7 @@ use super::suggest;
 /// Integers up to this magnitude are exact as `f64`.
 const EXACT_INTEGERS: u64 = 1 << 53;
 
-/// A key of the site file: its name, what its value means and an example of it.
+/// A key of the site file: its name, the meaning of its value, and an example.
 #[derive(Debug)]
 pub(super) struct Key {
     pub(super) name: &'static str,
@@ -139,7 +139,7 @@ impl<'a> Node<'a> {
         };
         if !number.is_finite() {
             return Err(self.error(format!(
-                "`{}` is {}, which is no finite number",
+                "`{}` is {}, which is not a finite number",
                 self.path,
                 self.quote()
             )));
@@ -239,12 +239,12 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns an error at the head of this table.
+    /// Returns an error at the header of this table.
     pub(super) fn error(&self, message: impl Into<Box<str>>) -> SiteError {
         self.source.error(self.span.clone(), message)
     }
 
-    /// Returns an error at one of this table's keys, or at the table's head if the key is missing.
+    /// Returns an error at one of this table's keys, or at the table's header if the key is missing.
     pub(super) fn error_at_key(&self, name: &str, message: impl Into<Box<str>>) -> SiteError {
         let span = self
             .entries
@@ -360,7 +360,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Returns why a text cannot be the name of a camera, a tag, a task or the like.
+/// Returns the fault of a text that cannot be a name of a camera, a tag, a task or the like; `None` if it can.
 pub(super) fn name_fault(name: &str) -> Option<&'static str> {
     const LONGEST: usize = 32;
     if name.is_empty() {
@@ -378,7 +378,7 @@ fn one_of(known: &[&'static Key]) -> String {
     format!("one of {}", suggest::list(known.iter().map(|key| key.name)))
 }
 
-/// Returns a hint for a key without its unit, or with another unit.
+/// Returns a hint for a key whose unit is missing or wrong.
 fn unit_hint(name: &str, known: &[&'static Key]) -> Option<String> {
     let knows = |wanted: &str| known.iter().any(|key| key.name == wanted);
     let (stem, unit) = match name.rsplit_once('_') {

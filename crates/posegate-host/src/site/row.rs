@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 /// The most candidates of one row.
 const MOST: usize = 1_000;
 
-/// Returns the candidates of a `[candidates.NAME]` table, named `NAME-1`, `NAME-2`, ... in the order along the wall, the
-/// heights of one place after each other.
+/// Returns the candidates of a `[candidates.NAME]` table, named `NAME-1`, `NAME-2`, ... in the order along the wall.
+/// The heights of one place follow each other.
 ///
-/// Each face of the wall with a goal in front of it gets a candidate `every` metres, centred on the face. If
-/// no goal is in front of any face, every face gets them. Places on keep-outs are left out.
+/// Each face of the wall with a goal in front of it gets a candidate every `every` metres, centred on the face. If no
+/// goal is in front of any face, all faces get candidates. Places on keep-outs are left out.
 pub(super) fn row(
     name: &str,
     node: &Node<'_>,
@@ -110,7 +110,7 @@ pub(super) fn row(
     Ok(found)
 }
 
-/// Returns the heights of the tags' middles. The whole tag must be on the wall.
+/// Returns the heights of the tags' centres. The complete tag must be on the wall.
 fn heights(table: &Table<'_>, wall: &Wall, half: f64) -> Result<Vec<f64>, SiteError> {
     let node = table.required(&keys::ROW_Z)?;
     let heights: Vec<f64> = node
@@ -152,30 +152,30 @@ fn places(wall: &Wall, half: f64, every: f64, goals: &[[f64; 2]]) -> Vec<Place> 
         let (a, b) = (wall.corners[i % count], wall.corners[(i + 1) % count]);
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = libm::hypot(dx, dy);
-        let way = [dx / length, dy / length];
-        // The outside of an outline that is walked counter-clockwise is to the right; a wall of two corners is walked
-        // there and back.
-        let normal = [way[1], -way[0]];
+        let direction = [dx / length, dy / length];
+        // The outside of an outline with counter-clockwise corners is to the right. A wall with two corners has an
+        // edge in each direction.
+        let normal = [direction[1], -direction[0]];
         let front = |[x, y]: &[f64; 2]| (x - a[0]) * normal[0] + (y - a[1]) * normal[1] > 0.0;
-        // The way back passes the same places.
+        // The edge back passes the same places.
         let backward = count == 2 && i == 1;
         let along = move |at: f64| {
             if backward { length - at } else { begin + at }
         };
-        let room = length - 2.0 * half;
+        let free = length - 2.0 * half;
         let mut on_it = Vec::new();
-        if room >= 0.0 {
-            let steps = libm::floor(room / every * (1.0 + 1e-12));
+        if free >= 0.0 {
+            let steps = libm::floor(free / every * (1.0 + 1e-12));
             let from = 0.5 * (length - steps * every);
-            // More than are allowed need not be exact.
+            // A number above the limit need not be exact.
             let steps = steps.min(1e4) as u32;
             on_it.extend((0..=steps).map(|k| {
                 let at = from + f64::from(k) * every;
                 Place {
                     along: along(at),
                     pose: Pose3Deg {
-                        x: a[0] + at * way[0],
-                        y: a[1] + at * way[1],
+                        x: a[0] + at * direction[0],
+                        y: a[1] + at * direction[1],
                         z: 0.0,
                         roll_deg: 0.0,
                         pitch_deg: 0.0,

@@ -5,7 +5,7 @@ use super::reader::Key;
 
 /// Sections `[KIND.NAME]` that matter only to entries that refer to them by name.
 const NAMED: [&Key; 4] = [&keys::TASKS, &keys::TAGS, &keys::GOALS, &keys::CHAINS];
-/// Sections that bring tags and goals from other files, or get numbers that depend on all tags.
+/// Sections that add tags and goals from other files, or whose numbers depend on all tags.
 const OF_ALL: [&Key; 3] = [&keys::IMPORTS, &keys::CANDIDATES, &keys::ROWS];
 
 /// The section that a line is in.
@@ -21,12 +21,12 @@ pub(super) enum Section {
     },
 }
 
-/// The file needs the full parser. It may or may not have a fault.
+/// The file needs the full parser, with or without a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NeedsFullParse;
 
-/// A walk over the lines of a site file. It supports only simple files, and stops at anything else: strings of several
-/// lines, tasks or tags without a header of their own, names with escapes, unclosed brackets.
+/// A walk over the lines of a site file. It supports only simple files. It stops at strings of several lines, tasks
+/// or tags without a header of their own, names with escapes, and unclosed brackets.
 pub(super) struct Sections {
     section: Section,
     /// `true` if the section may have keys: `false` before the first header, and under `[task]` and the like.
@@ -56,7 +56,7 @@ impl Sections {
         }
         let path = header(line);
         if self.depth > 0 && path.is_some() {
-            // If a bracket was left open by mistake, this line is a header.
+            // This line may be a header after a bracket that was not closed.
             return Err(NeedsFullParse);
         }
         let text = line.trim_matches([' ', '\t']);
@@ -163,7 +163,7 @@ fn header(line: &str) -> Option<Header<'_>> {
     (rest.is_empty() || rest.starts_with('#')).then_some(header)
 }
 
-/// Returns the section that a header begins, and whether it may have keys.
+/// Returns the section that a header begins, and `true` if the section may have keys.
 fn section(header: &Header<'_>) -> Result<(Section, bool), NeedsFullParse> {
     let first = header.path.first().ok_or(NeedsFullParse)?;
     if OF_ALL.iter().any(|key| key.name == *first) {
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_of_every_simple_kind() {
+    fn headers_of_simple_kinds_are_recognized() {
         for (header, section) in [
             ("[task.dock]", named("task", "dock")),
             (" [ task . dock ] # so", named("task", "dock")),
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn values_end_where_they_end() {
+    fn values_end_at_their_closing_bracket() {
         let text = "[task.dock]\na = \"[#'\" # [ \"no\"\nb = [ # [\n  [1, 2], 'x\"', [\n 3 ]]\nc = { d = \"y\" }";
         let strings = ["[#'", "x\"", "y"].map(ToString::to_string).to_vec();
         assert_eq!(walk(text), Ok((named("task", "dock"), strings)));
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_simple_is_beyond() {
+    fn other_syntax_needs_the_full_parser() {
         for text in [
             "task.dock.kind = \"work\"",
             "x = 1",

@@ -331,7 +331,7 @@ pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
     ])
 }
 
-/// Returns how finely the tag must be seen.
+/// Returns the smallest number of pixels per bit at which the tag must be seen.
 fn sharpness(
     table: &Table<'_>,
     camera: &SiteCamera,
@@ -359,7 +359,7 @@ fn sharpness(
         })?,
     };
     Ok(Some(Sharpness {
-        // A focal length below the calibration's makes bits narrower, so the limit rises.
+        // A focal length below the calibrated one makes bits narrower, so the limit rises.
         px_per_bit: node.number()? / (1.0 - camera.tolerance.focal),
         bits,
     }))

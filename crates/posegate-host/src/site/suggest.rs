@@ -23,7 +23,8 @@ pub fn similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&
         .map(|(_, candidate)| candidate)
 }
 
-/// Returns all known names that are as similar as the most similar one, as a question in words; `None` if all are too different.
+/// Returns all known names that are as similar as the most similar one, as a question; `None` if all are too
+/// different.
 pub fn question<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Option<String> {
     let nearest = distance(name, similar(name, known.clone())?);
     let all = known.filter(|candidate| distance(name, candidate) == nearest);
@@ -31,8 +32,7 @@ pub fn question<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) ->
     Some(format!("did you mean {}?", quoted.join(" or ")))
 }
 
-/// Returns the names in backticks, separated by commas. Names after the first `MOST` are only
-/// counted.
+/// Returns the names in backticks, separated by commas. The names after the first `MOST` are only counted.
 pub(super) fn list<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
     let first = names.by_ref().take(MOST);
     let mut quoted: Vec<String> = first

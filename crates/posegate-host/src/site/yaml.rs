@@ -15,9 +15,9 @@ use crate::site::error::{SiteError, Source};
 pub(super) struct FormatMessages {
     /// The kind of file: completes "expected ...".
     pub what: &'static str,
-    /// How the file is written.
+    /// Advice on the notation of the file.
     pub written: &'static str,
-    /// How its numbers are written.
+    /// Advice on the notation of its numbers.
     pub numbers: &'static str,
     /// Advice for a number that is not finite.
     pub not_finite: &'static str,
@@ -75,10 +75,10 @@ impl<'a> Document<'a> {
         };
         serde_saphyr::from_str_with_options(self.source.text, options).map_err(|fault| {
             let at = fault.location().map_or(0..0, |place| self.span(place));
-            let told = fault.without_snippet().to_string();
-            let told = told.split(" at line ").next().unwrap_or_default();
+            let full = fault.without_snippet().to_string();
+            let line = full.split(" at line ").next().unwrap_or_default();
             // The rest of the message is for programmers.
-            let message = told.split(", set ").next().unwrap_or_default();
+            let message = line.split(", set ").next().unwrap_or_default();
             let found = self.source.quote(at.clone());
             let found = if found.is_empty() || found.trim().is_empty() {
                 String::new()

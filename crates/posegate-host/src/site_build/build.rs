@@ -22,34 +22,35 @@ use super::store::Store;
 use crate::plan::{PlanError, Prepared};
 use crate::site::Site;
 
-/// How a shard is built.
+/// The options of a shard's build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildOptions {
     /// The shard.
     pub shard: Shard,
-    /// If `true`, valid pieces that are there are kept.
+    /// If `true`, valid existing pieces are kept.
     pub resume: bool,
-    /// Number of pieces that are made at once, each on one thread; by default one per core. The results do not depend on it.
+    /// Number of pieces that are made in parallel, each on one thread; by default one per core. The results do not
+    /// depend on it.
     pub threads: Option<NonZeroUsize>,
 }
 
 /// The result of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BuildSummary {
-    /// Number of its pieces.
+    /// Number of the shard's pieces.
     pub pieces: usize,
-    /// Number of its pieces that were kept.
+    /// Number of the shard's pieces that were kept.
     pub kept: usize,
-    /// Bytes of all files of its pieces.
+    /// Bytes of all files of the shard's pieces.
     pub bytes: u64,
 }
 
-/// Makes a shard's pieces and writes each into `output` atomically. Calls `progress` after each piece. Memory holds the site, at
-/// most one piece per thread and, if there are plans to make, the planner's library of the site.
+/// Makes a shard's pieces and writes each into `output` atomically. Calls `progress` after each piece. Memory holds
+/// the site, at most one piece per thread and, if plans are made, the planner's library of the site.
 ///
 /// # Errors
-/// [`SiteBuildError`]. Finished pieces stay, and a later build that resumes keeps them. If some pieces cannot be made, all others
-/// are ([`SiteBuildError::Refused`]).
+/// [`SiteBuildError`]. Finished pieces remain, and a later build with `resume` has_valid_file them. If some pieces cannot be
+/// made, all others are made ([`SiteBuildError::Refused`]).
 pub fn build(
     site: &Site,
     inventory: &Inventory,
@@ -84,7 +85,7 @@ pub fn build(
     })
 }
 
-/// What all threads of a build share.
+/// The data that all threads of a build share.
 struct BuildContext<'a> {
     site: &'a Site,
     recipe: &'a Recipe,
@@ -103,7 +104,7 @@ impl BuildContext<'_> {
         );
         let (mut tables, mut plans) = (Vec::new(), BTreeMap::<&str, Vec<_>>::new());
         for piece in pieces {
-            if options.resume && self.keeps(piece)? {
+            if options.resume && self.has_valid_file(piece)? {
                 (self.progress)();
                 continue;
             }
@@ -159,8 +160,8 @@ impl BuildContext<'_> {
         each(threads, group, || prepared.clone(), plan)
     }
 
-    /// Returns `true` if a valid file of a piece is there, and counts it.
-    fn keeps(&self, piece: &Piece) -> Result<bool, SiteBuildError> {
+    /// Returns `true` if a valid file of a piece exists, and counts it.
+    fn has_valid_file(&self, piece: &Piece) -> Result<bool, SiteBuildError> {
         let bytes = self.parts.read(&piece.key(self.recipe))?;
         let bytes = bytes.filter(|bytes| checked(bytes, piece, self.recipe).is_some());
         if let Some(bytes) = &bytes {
@@ -170,7 +171,7 @@ impl BuildContext<'_> {
         Ok(bytes.is_some())
     }
 
-    /// Writes the results of a piece, or records why there are none.
+    /// Writes the results of a piece, or records the reason why there are none.
     fn finish(&self, piece: &Piece, made: Result<Files, PieceError>) -> Result<(), SiteBuildError> {
         match made {
             Ok(files) => {
@@ -194,8 +195,8 @@ impl BuildContext<'_> {
     }
 }
 
-/// Calls `work` for each item, on `threads` threads with a state each, until a call fails. Each thread is a pool of its own, so
-/// none begins another item while it waits within one.
+/// Calls `work` for each item, on `threads` threads with a state each, until a call fails. Each thread is a pool of
+/// its own, so none begins another item while it waits within one.
 fn each<Item: Copy + Sync, State: Send>(
     threads: usize,
     items: &[Item],
@@ -218,7 +219,7 @@ fn each<Item: Copy + Sync, State: Send>(
             .iter()
             .map(|pool| scope.spawn(|| pool.install(turn)))
             .collect();
-        // The scope waits for those that this does not.
+        // The scope waits for the other threads.
         running.into_iter().try_for_each(|thread| {
             let ended = thread.join();
             ended.unwrap_or_else(|panic| resume_unwind(panic))

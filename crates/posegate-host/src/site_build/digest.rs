@@ -26,7 +26,7 @@ pub(super) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// Returns the SHA-256 of a file as hexadecimal digits. The file is never in memory as a whole.
+/// Returns the SHA-256 of a file as hexadecimal digits. Memory does not hold the complete file.
 pub(super) fn sha256_of_file(path: &Path) -> io::Result<String> {
     let mut digest = Sha256::new();
     // Opening a pipe would wait for a writer.
@@ -44,7 +44,8 @@ pub(super) fn sha256_of_json(value: &impl Serialize) -> io::Result<String> {
     Ok(hex(&digest.finalize()))
 }
 
-/// Returns the SHA-256 of several texts. The length of each text precedes it, so no two lists of texts are hashed alike.
+/// Returns the SHA-256 of several texts. The length of each text precedes it, so different lists of texts have
+/// different inputs.
 pub(super) fn sha256_of_texts(texts: &[&str]) -> [u8; 32] {
     let mut all = Sha256::new();
     for text in texts {
@@ -54,8 +55,8 @@ pub(super) fn sha256_of_texts(texts: &[&str]) -> [u8; 32] {
     all.finalize().into()
 }
 
-/// Returns the SHA-256 of a program's file as hexadecimal digits. It is part of every key, because another build of the
-/// program may make other results.
+/// Returns the SHA-256 of a program's file as hexadecimal digits. It is part of every key, because another build of
+/// the program may make other results.
 ///
 /// # Errors
 /// [`SiteBuildError::File`] if the file cannot be read.

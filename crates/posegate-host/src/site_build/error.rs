@@ -8,7 +8,7 @@ use crate::plan::PlanError;
 use crate::printable::printable;
 use posegate::verify::BuildError;
 
-/// Why a piece cannot be made.
+/// The reason why a piece cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PieceError {
@@ -20,12 +20,12 @@ pub enum PieceError {
     /// The table cannot be made or proven.
     #[error(transparent)]
     Table(#[from] BuildError),
-    /// The planner refuses the question.
+    /// The planner rejects the task.
     #[error(transparent)]
     Plan(#[from] PlanError),
 }
 
-/// Why a shard is not built, or nothing is merged.
+/// The reason why a shard is not built, or why shards are not merged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SiteBuildError {
@@ -34,13 +34,13 @@ pub enum SiteBuildError {
     File {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         cause: std::io::Error,
     },
     /// The output folder is a file.
     #[error("{}: is a file, and a folder is needed", shown(.0))]
     NoFolder(PathBuf),
-    /// The output folder has results of something else.
+    /// The output folder has results of another program.
     #[error(
         "{}: there is a `{name}` already that is of no site build",
         shown(folder)
@@ -51,29 +51,29 @@ pub enum SiteBuildError {
         /// The name of the results.
         name: &'static str,
     },
-    /// Pieces that cannot be made. All others are there.
+    /// Pieces cannot be made. All others were made.
     #[error("{}", refused(.0))]
     Refused(Vec<(Piece, PieceError)>),
-    /// A merge of a folder in which no shard was started.
+    /// No shard was started in the folder of a merge.
     #[error("{}: no shard was built here", shown(.0))]
     NoShards(PathBuf),
-    /// A file that this program did not write, or that was changed.
+    /// A file was not written by this program, or was changed.
     #[error("{}: {why}", shown(path))]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault of the file.
         why: String,
     },
     /// Shards of different sites, programs or options.
     #[error("shards are of different sites, programs or options{}", lines(.0))]
     Mixed(Vec<String>),
-    /// The pieces are of another site than the one that is named.
+    /// The pieces are of another site than the given one.
     #[error("the parts are of the site {parts}, and the site file is {site}")]
     OtherSite {
         /// The digest of the site of the pieces.
         parts: String,
-        /// The digest of the site that is named.
+        /// The digest of the given site.
         site: String,
     },
     /// The pieces are of another program than the one that merges.
@@ -84,16 +84,16 @@ pub enum SiteBuildError {
         /// The version and the digest of the program that merges.
         own: (String, String),
     },
-    /// Tables that are not proven, with the reason of each.
+    /// Tables are not proven, with the reason of each.
     #[error("{}", listed("tables that are NOT proven", .0))]
     Unproven(Vec<String>),
-    /// A file among the results that no merge wrote.
+    /// A file among the results was not written by a merge.
     #[error("{}: no merge has written it, and what is beside it would be replaced", shown(.0))]
     Unlisted(PathBuf),
     /// Another merge is running in the folder.
     #[error("{}: another merge is at work here", shown(.0))]
     Locked(PathBuf),
-    /// Pieces that are missing, or whose bytes are not those of this piece.
+    /// Pieces are missing or damaged.
     #[error("{}", listed("pieces that are missing or damaged", .0))]
     Missing(Vec<String>),
     /// The threads cannot be started.
@@ -102,7 +102,7 @@ pub enum SiteBuildError {
 }
 
 impl SiteBuildError {
-    /// Returns what the user can do about it.
+    /// Returns advice for the user.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {

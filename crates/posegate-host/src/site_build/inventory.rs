@@ -8,18 +8,18 @@ use super::piece::{FORMAT, Piece, Recipe};
 use super::shard::Shard;
 use crate::site::{ChainStep, Site, StartFrame, TaskKind};
 
-/// Plans per shard before another shard makes plans too. Plans share a library of the whole site, which is more expensive than
-/// some dozens of plans.
+/// Each shard that makes plans makes at least this many, if there are enough. Plans share a library of the complete
+/// site, which is more expensive than some dozens of plans.
 const PLANS_PER_SHARD: usize = 64;
 
-/// All pieces of a site in the order in which shards take turns: tables, then plans, each sorted by key. Sorting by key spreads
-/// tasks with similar names over the shards. Shards differ by one table at most. Plans are made by the last shards, as few as have
-/// 64 plans each.
+/// All pieces of a site in the order in which shards take turns: tables, then plans, each sorted by key. Sorting by
+/// key distributes tasks with similar names over the shards. The numbers of tables of two shards differ by at most
+/// one. The last shards make the plans, as few shards as have 64 plans each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Inventory {
     format: u32,
-    /// All that the results depend on.
+    /// The inputs that the results depend on.
     pub recipe: Recipe,
     pieces: Vec<Piece>,
 }
@@ -38,7 +38,7 @@ impl Inventory {
                 }
             }
             for (from, chain) in &site.chains {
-                // A start in the goal's frame has no place in the world.
+                // A start in the goal's frame has no pose in the world.
                 let last = match chain.steps.last() {
                     Some(ChainStep::Task(task)) if chain.start.frame == StartFrame::World => task,
                     _ => continue,

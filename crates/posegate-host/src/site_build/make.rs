@@ -11,7 +11,8 @@ use crate::site::Site;
 use posegate::bake::BakeInput;
 use posegate::verify::{BuildError, VerifyError, build};
 
-/// Returns a task's table, as `posegate table build` makes it, and the result of its proof. An unproven table is an error.
+/// Returns a task's table, as `posegate table build` makes it, and the result of its proof. An unproven table is an
+/// error.
 pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, PieceError> {
     // The inventory is of this site, so the site has the task.
     let Some(task) = site.tasks.get(name) else {
@@ -33,7 +34,8 @@ pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, P
     ])
 }
 
-/// Returns a plan, as `posegate plan --json` prints it. A site without a view of a tag has no plan, and the result says so.
+/// Returns a plan, as `posegate plan --json` prints it. If the site has no view of a tag, the result states that
+/// there is no plan.
 pub(super) fn plan(
     site: &Site,
     prepared: Option<&mut Prepared<'_>>,

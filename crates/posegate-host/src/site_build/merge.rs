@@ -19,14 +19,14 @@ use super::store::{STALE_AFTER, Store, fault, json, sync};
 use crate::site::Site;
 use posegate::verify::{ExpectedTable, verify};
 
-/// What a merge checks beyond checksums.
+/// The checks of a merge beyond checksums.
 #[derive(Clone, Copy, Debug)]
 pub enum MergeChecks<'a> {
-    /// Nothing: whoever can write into the folder can forge a piece.
+    /// No further checks: a program with write access to the folder can forge a piece.
     Folder,
-    /// The pieces are all those of this site.
+    /// The pieces are exactly those of this site.
     Site(&'a Site),
-    /// The same, and every table is proven again. Plans have no proof.
+    /// As for `Site`, and every table is proven again. Plans have no proof.
     Proof(&'a Site),
 }
 
@@ -44,7 +44,7 @@ impl<'a> MergeChecks<'a> {
 pub struct MergeSummary {
     /// Number of tables, each with the result of its proof.
     pub tables: usize,
-    /// Number of plans, with those that say that there is no plan.
+    /// Number of plans, including results that state that there is no plan.
     pub plans: usize,
     /// Chains and work tasks without a plan.
     pub without_plan: Vec<String>,
@@ -56,14 +56,15 @@ pub struct MergeSummary {
     pub manifest_sha256: String,
 }
 
-/// Checks that every piece is in `output` and valid, then writes `tables`, `proofs`, `plans` and, last of all, `manifest.json` with
-/// the SHA-256 of every file. Every table is read as a controller reads it, and its proof file must be of this table; `checks` says
-/// what else is checked. Pieces of another program than `program` ([`program()`](super::program())) are refused, if it is given.
-/// Calls `progress` after each piece that is checked.
+/// Checks that every piece is in `output` and valid, then writes `tables`, `proofs`, `plans` and, last of all,
+/// `manifest.json` with the SHA-256 of every file. Every table is parsed as on a controller, and its proof file must
+/// be of this table; `checks` selects further checks. If `program` is given, pieces of another program
+/// ([`program()`](super::program())) are refused. Calls `progress` after each piece that is checked.
 ///
 /// # Errors
-/// [`SiteBuildError`]. If a piece is missing, damaged or not proven, the error names all of them, and the results of an earlier
-/// merge stay as they are. A merge that is killed or fails while it writes leaves no manifest; the next merge completes it.
+/// [`SiteBuildError`]. If pieces are missing, damaged or not proven, the error names all of them, and the results of
+/// an earlier merge are unchanged. A merge that is killed or fails while it writes leaves no manifest; the next merge
+/// completes it.
 pub fn merge(
     output: &Path,
     checks: MergeChecks<'_>,
@@ -76,7 +77,7 @@ pub fn merge(
     let (inventory, shards) = records::inventory(&parts, checks.site())?;
     check_program(&inventory.recipe, program)?;
     let output = Store::new(output.into());
-    // With the lock, nobody else writes results.
+    // With the lock, no other process writes results.
     output.remove_temporary(lock.as_ref().map_or(STALE_AFTER, |_| Duration::ZERO))?;
     let merge = Merge {
         output: &output,
@@ -105,8 +106,8 @@ pub fn pieces(output: &Path, checks: MergeChecks<'_>) -> usize {
     inventory.map_or(0, |(inventory, _)| inventory.pieces().len())
 }
 
-/// Locks the folder of the parts. The system releases the lock when the process ends, however it ends. `None` if the file system
-/// has no locks.
+/// Locks the folder of the parts. The system releases the lock if the process ends for any reason. `None` if the file
+/// system has no locks.
 ///
 /// # Errors
 /// [`SiteBuildError::Locked`] if another merge has the lock.
@@ -139,7 +140,7 @@ struct Merge<'a> {
     output: &'a Store,
     parts: &'a Store,
     inventory: &'a Inventory,
-    /// Number of shards, if all were cut alike: then errors name the shard of a piece.
+    /// Number of shards, if it is equal in all records: then errors name the shard of a piece.
     shards: Option<u32>,
     checks: MergeChecks<'a>,
 }
@@ -246,8 +247,8 @@ impl Merge<'_> {
         format!("{piece}: shard {shard}/{count}, parts/{key}")
     }
 
-    /// Replaces the results of an earlier merge and returns the SHA-256 of the manifest. There is a manifest only while all files
-    /// that it lists are there, on the disk too.
+    /// Replaces the results of an earlier merge and returns the SHA-256 of the manifest. The manifest exists only
+    /// while all files that it lists exist on the disk.
     fn write(&self, manifest: &Manifest) -> Result<String, SiteBuildError> {
         let output = self.output.folder();
         let old = replaceable(output, self.parts)?;
@@ -281,7 +282,7 @@ impl Merge<'_> {
         json(&mut bytes, manifest).map_err(fault(output))?;
         self.output.write(MANIFEST, &bytes)?;
         self.output.sync()?;
-        // If it stays, it names results that the manifest lists too.
+        // If this file remains, it names only results that are also in the manifest.
         let _ = self.parts.remove(REPLACING);
         Ok(sha256(&bytes))
     }
@@ -308,7 +309,7 @@ impl Merge<'_> {
     }
 }
 
-/// Proves a table again. Returns why it is not proven, or why its proof file has other counts.
+/// Proves a table again. Returns the reason why it is not proven, or how the counts of its proof file differ.
 fn unproven(table: &[u8], counts: Counts, task: &str, site: &Site) -> Option<String> {
     let Some(of) = site.tasks.get(task) else {
         return Some("the site has no such task".into());

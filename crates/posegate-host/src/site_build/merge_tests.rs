@@ -1,4 +1,4 @@
-//! Results of a merge are replaced by those of the next one, wherever it stops; several processes write at once.
+//! A merge replaces the results of an earlier one, stopped at any file. Several processes write in parallel.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,8 @@ use super::{BuildOptions, Inventory, MergeChecks, MergeSummary, Recipe, Shard, b
 use crate::plan::Options;
 use crate::site::Site;
 
-/// Returns a site with a task whose success set is a box of twice `0.{wide}` m, and `chain`, from which there is no plan to it.
+/// Returns a site with a task whose success set is a box of twice `0.{wide}` m, and with `chain`, from which there is
+/// no plan to the task.
 fn site(wide: &str, chain: &str) -> Site {
     let text = format!(
         "[task.dock]\nkind = \"work\"\nfrom = \"{chain}\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
@@ -68,9 +69,9 @@ fn expected(site: &Site) -> Files {
     results(folder.path())
 }
 
-/// A merge that stops at any file leaves no manifest. The next one completes it, of this site or of another one.
+/// A merge that stops at any file leaves no manifest. The next merge completes it, for this site or another one.
 #[test]
-fn a_merge_that_stops_at_any_file_is_completed_by_the_next() {
+fn next_merge_completes_one_that_stopped_at_any_file() {
     let (old, new) = (site("20", "gate"), site("10", "yard"));
     let (before, after) = (expected(&old), expected(&new));
     for stop in [
@@ -96,16 +97,16 @@ fn a_merge_that_stops_at_any_file_is_completed_by_the_next() {
             std::fs::remove_dir(&stop).unwrap();
             built(next, output);
             merged(output).unwrap();
-            let wanted = if next == &old { &before } else { &after };
-            assert!(results(output) == *wanted, "{}", stop.display());
+            let expected = if next == &old { &before } else { &after };
+            assert!(results(output) == *expected, "{}", stop.display());
             assert!(!output.join("parts/replacing.json").exists());
         }
     }
 }
 
-/// A piece that is missing, or that another one is in the place of, leaves the results as they were.
+/// A missing piece, or another piece in its place, leaves the results unchanged.
 #[test]
-fn missing_and_damaged_pieces_leave_results_as_they_were() {
+fn missing_and_damaged_pieces_leave_results_unchanged() {
     let (old, new) = (site("20", "gate"), site("10", "gate"));
     let before = expected(&old);
     let folder = tempfile::tempdir().unwrap();
@@ -142,9 +143,9 @@ fn missing_and_damaged_pieces_leave_results_as_they_were() {
     assert_eq!(results(output), expected(&new));
 }
 
-/// Processes in containers may have the same number: here several stores write one file.
+/// Processes in containers may have the same process number: here several stores write one file.
 #[test]
-fn stores_of_one_folder_do_not_meet() {
+fn stores_of_one_folder_do_not_interfere() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path();
     let other = |of: u8| vec![of; 10_000];

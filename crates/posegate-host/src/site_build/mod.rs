@@ -1,8 +1,8 @@
 //! All tables, proofs and plans of a site, made in shards that any scheduler can run.
 //!
-//! Entry points: [`build()`] makes the [`Piece`]s of a [`Shard`], [`merge()`] writes the results. A piece is one file, written
-//! atomically and named by the digest of all that it depends on ([`Recipe`]). A merge checks that every piece of the
-//! [`Inventory`] is there and valid. Its results are the same bytes for any number of shards and threads.
+//! Entry points: [`build()`] makes the [`Piece`]s of a [`Shard`], [`merge()`] writes the results. A piece is one
+//! file, written atomically and named by the digest of all its inputs ([`Recipe`]). A merge checks that every piece
+//! of the [`Inventory`] exists and is valid. Its results are the same bytes for any number of shards and threads.
 //!
 //! ```
 //! use posegate_host::site::Site;

@@ -12,11 +12,11 @@ use crate::site::{Site, SiteIndex};
 /// The kind of sections that are tasks.
 const TASK: &str = "task";
 
-/// Returns, for a shard that makes tables alone, the site with the shard's own tasks and what they name, and the inventory of the
-/// whole site. Of all other tasks only the names are in memory.
+/// Returns, for a shard that makes only tables, the site with the shard's own tasks and the entries that they refer
+/// to, and the inventory of the complete site. Memory holds only the names of all other tasks.
 ///
-/// At least one shard reads each section of the file, so a fault in any section stops the build. Returns `None` if the file must be
-/// read as a whole ([`SiteIndex`]), or if there is only one shard.
+/// At least one shard reads each section of the file, so a fault in any section stops the build. Returns `None` if
+/// the file needs the full parser ([`SiteIndex`]), or if there is only one shard.
 #[must_use]
 pub fn part(path: &Path, shard: Shard, program: &str) -> Option<(Site, Inventory)> {
     if shard.count() == 1 {
@@ -32,8 +32,8 @@ pub fn part(path: &Path, shard: Shard, program: &str) -> Option<(Site, Inventory
         })
     };
     let tasks: BTreeSet<&str> = own().collect();
-    // A section goes with a piece, not with a shard: whoever makes that piece reads the section, for any number of shards. So
-    // a fault in the section leaves that piece missing, and nothing is merged.
+    // A section belongs to a piece, not to a shard: the process that makes the piece reads the section, for any
+    // number of shards. So a fault in the section leaves that piece missing, and the merge is refused.
     let pieces = inventory.pieces().len().max(1) as u64;
     let owner =
         |name: &str| inventory.owner((turn(name) % pieces) as usize, shard.count() as usize);
@@ -45,7 +45,7 @@ pub fn part(path: &Path, shard: Shard, program: &str) -> Option<(Site, Inventory
     whole.then_some((site, inventory))
 }
 
-/// Returns the number that assigns a section to a piece. Sections of one name have the same number.
+/// Returns the number that assigns a section to a piece. Sections with the same name have the same number.
 fn turn(name: &str) -> u64 {
     let mut hasher = DefaultHasher::new();
     name.hash(&mut hasher);

@@ -1,4 +1,4 @@
-//! The pieces of a site, and what each depends on.
+//! The pieces of a site, and their dependencies.
 
 use std::fmt::{self, Write as _};
 
@@ -46,7 +46,7 @@ impl Piece {
         format!("plans/{}/{}.json", file_name(from), file_name(task))
     }
 
-    /// Returns the paths of all its results, in the order in which a piece's file holds them.
+    /// Returns the paths of all the piece's results, in the order in which the piece's file contains them.
     pub(super) fn paths(&self) -> Vec<String> {
         match self {
             Self::Table { task } => vec![Self::table_path(task), Self::proof_path(task)],
@@ -54,13 +54,13 @@ impl Piece {
         }
     }
 
-    /// Returns its key: the SHA-256 of all that its results depend on, as hexadecimal digits.
+    /// Returns the piece's key: the SHA-256 of all inputs of its results, as hexadecimal digits.
     #[must_use]
     pub fn key(&self, recipe: &Recipe) -> String {
         hex(&self.digest(recipe))
     }
 
-    /// Returns its key as bytes.
+    /// Returns the piece's key as bytes.
     pub(super) fn digest(&self, recipe: &Recipe) -> [u8; 32] {
         let format = format!("posegate piece {FORMAT}");
         let common = [
@@ -89,7 +89,8 @@ impl fmt::Display for Piece {
     }
 }
 
-/// Returns a name in which every byte other than a letter, a digit, `-`, `_` and an inner `.` is `%` and two digits.
+/// Returns a name in which every byte other than a letter, a digit, `-`, `_` and an inner `.` is replaced by `%` and
+/// two digits.
 pub(super) fn file_name(name: &str) -> String {
     let mut safe = String::with_capacity(name.len());
     for (at, byte) in name.bytes().enumerate() {
@@ -105,7 +106,7 @@ pub(super) fn file_name(name: &str) -> String {
     safe
 }
 
-/// All that the results depend on.
+/// The inputs that the results depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -113,9 +114,10 @@ pub struct Recipe {
     pub site_digest: String,
     /// The version of this program.
     pub tool_version: String,
-    /// SHA-256 of the program's file ([`program()`](super::program())), as hexadecimal digits: a version may have many builds.
+    /// SHA-256 of the program's file ([`program()`](super::program())), as hexadecimal digits, because a version may
+    /// have several builds.
     pub program: String,
-    /// Options of the plans; without them no plan is made.
+    /// Options of the plans; `None` if no plan is made.
     pub plans: Option<PlanOptions>,
 }
 
@@ -139,7 +141,7 @@ impl PlanOptions {
         )
     }
 
-    /// Returns the planner's options. Drives cost what the site says.
+    /// Returns the planner's options. The costs of drives are those of the site.
     pub(super) fn options(&self) -> Options {
         Options {
             most_risk: self.most_risk,
@@ -151,14 +153,14 @@ impl PlanOptions {
 }
 
 impl Recipe {
-    /// Returns the recipe of a site and the digest of the program that builds it. Without `plans` it has tables and proofs
-    /// alone. Costs of drives that a user gives ([`Options::costs`]) are left out.
+    /// Returns the recipe of a site and the digest of the program that builds it. Without `plans` it has only tables
+    /// and proofs. Costs of drives that a user gives ([`Options::costs`]) are not used.
     #[must_use]
     pub fn new(site: &Site, plans: Option<&Options>, program: &str) -> Self {
         Self::from_digest(site.digest, plans, program)
     }
 
-    /// Returns what [`Self::new`] does, from the site's digest ([`Site::digest`]).
+    /// Like [`Self::new`], from the site's digest ([`Site::digest`]).
     #[must_use]
     pub fn from_digest(site: [u8; 32], plans: Option<&Options>, program: &str) -> Self {
         Self {

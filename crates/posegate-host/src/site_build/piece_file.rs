@@ -10,11 +10,11 @@ use super::proof::{Counts, checked_counts};
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ResultFile {
-    /// Its path below the results' folder.
+    /// The file's path below the results' folder.
     pub path: String,
-    /// Its length, bytes.
+    /// The file's length, bytes.
     pub bytes: u64,
-    /// The SHA-256 of its bytes.
+    /// The SHA-256 of the file's bytes.
     pub sha256: String,
 }
 
@@ -47,15 +47,16 @@ pub(super) fn encode(
         piece: piece.clone(),
         files: listed.collect(),
     };
-    let mut whole = serde_json::to_vec(&head)?;
-    whole.push(b'\n');
+    let mut file = serde_json::to_vec(&head)?;
+    file.push(b'\n');
     for (_, bytes) in files {
-        whole.extend_from_slice(bytes);
+        file.extend_from_slice(bytes);
     }
-    Ok(whole)
+    Ok(file)
 }
 
-/// Returns the results in a piece's file; `None` if the bytes are not the whole file of this piece, or a checksum is wrong.
+/// Returns the results in a piece's file; `None` if the bytes are not the complete file of this piece, or a checksum
+/// is wrong.
 pub(super) fn decode<'a>(
     bytes: &'a [u8],
     piece: &Piece,
@@ -68,7 +69,7 @@ pub(super) fn decode<'a>(
     if head.format != FORMAT || head.key != key || head.piece != *piece {
         return None;
     }
-    // All results of the piece, each once, and no other path: nothing else is ever written.
+    // The results of the piece, each once, and no other path, so that no other file is ever written.
     let paths = head.files.iter().map(|listed| &listed.path);
     if !paths.eq(&piece.paths()) {
         return None;
@@ -85,22 +86,22 @@ pub(super) fn decode<'a>(
     rest.is_empty().then_some(files)
 }
 
-/// The results of a finished piece, and what they say.
+/// The results of a finished piece, and their content.
 pub(super) struct Finished<'a> {
     pub files: Vec<(ResultFile, &'a [u8])>,
     pub content: Content<'a>,
 }
 
-/// What the results of a piece say.
+/// The content of a piece's results.
 pub(super) enum Content<'a> {
     /// A table and the counts of its proof.
     Table(&'a [u8], Counts),
-    /// Whether there is a plan.
+    /// `true` if there is a plan.
     Plan(bool),
 }
 
-/// Returns what a piece's file holds. `None` if [`decode`] returns it, if the proof is not of this table, if the table is of
-/// another task, site or version, or if the plan does not say whether there is one.
+/// Returns the content of a piece's file. `None` if [`decode`] returns it, if the proof is not of this table, or if
+/// the table is of another task, site or version. Also `None` if the plan does not state if there is one.
 pub(super) fn checked<'a>(bytes: &'a [u8], piece: &Piece, recipe: &Recipe) -> Option<Finished<'a>> {
     let files = decode(bytes, piece, &piece.key(recipe))?;
     let content = match (piece, files.as_slice()) {

@@ -7,7 +7,7 @@ use super::piece::{Piece, Recipe};
 use posegate::table::{Table, TableError};
 use posegate::verify::Proof;
 
-/// What a proof counted.
+/// The counts of a proof.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Counts {
@@ -74,8 +74,8 @@ pub(super) fn encode(
     Ok(bytes)
 }
 
-/// Returns the counts in a proof file. `None` if the table is not of this task, site and version, or if the file is not, byte
-/// for byte, what [`encode`] writes for this table. This proves nothing.
+/// Returns the counts in a proof file. `None` if the table is not of this task, site and version, or if the file is
+/// not, byte for byte, the output of [`encode`] for this table. This proves nothing.
 pub(super) fn checked_counts(
     task: &str,
     table: &[u8],

@@ -1,4 +1,4 @@
-//! What the shards in a folder were asked for: each records the inventory of which it makes a part.
+//! Records of the shards in a folder: each shard records the inventory whose part it makes.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,16 +10,16 @@ use super::shard::Shard;
 use super::store::{Store, fault, parsed};
 use crate::site::Site;
 
-/// The last thing that a shard was asked for.
+/// The record of a shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct ShardRecord {
     format: u32,
     recipe: Recipe,
-    /// SHA-256 of the inventory, which names its file.
+    /// SHA-256 of the inventory, from which its file name is made.
     inventory: String,
 }
 
-/// What one or more shards were asked for.
+/// The common record of one or more shards.
 struct Build {
     record: ShardRecord,
     shards: Vec<Shard>,
@@ -33,7 +33,7 @@ fn inventory_name(sha256: &str) -> String {
     format!("inventory-{sha256}.json")
 }
 
-/// Writes what a shard is asked for: the inventory, unless it is there, and the shard's record.
+/// Writes the record of a shard, and the inventory unless it exists.
 pub(super) fn write(
     parts: &Store,
     inventory: &Inventory,
@@ -52,8 +52,8 @@ pub(super) fn write(
     parts.write_json(&record_name(shard), &record)
 }
 
-/// Returns the inventory that all shards were asked for, and their number if it is the same for all. With a site, shards that
-/// were asked for another site are left out, and the inventory must list the pieces of this site.
+/// Returns the inventory that all shards record, and their number if it is the same for all. If a site is given,
+/// shards of other sites are ignored, and the inventory must list the pieces of this site.
 ///
 /// # Errors
 /// [`SiteBuildError::NoShards`], [`SiteBuildError::OtherSite`], [`SiteBuildError::Mixed`] and [`SiteBuildError::Damaged`].
@@ -84,7 +84,7 @@ pub(super) fn inventory(
     Ok((read_inventory(parts, record, site)?, count))
 }
 
-/// Returns all that shards were asked for, in the order of their names.
+/// Returns all builds that shards record, in the order of their names.
 fn builds(parts: &Store) -> Result<Vec<Build>, SiteBuildError> {
     let mut builds: Vec<Build> = Vec::new();
     for name in parts.names()? {
@@ -139,7 +139,7 @@ fn mixed(builds: &[Build]) -> SiteBuildError {
     SiteBuildError::Mixed(builds.collect())
 }
 
-/// Returns the inventory that a record names, compared with the pieces of `site`.
+/// Returns the inventory of a record, compared with the pieces of `site`.
 fn read_inventory(
     parts: &Store,
     record: &ShardRecord,

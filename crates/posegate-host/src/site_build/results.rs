@@ -1,4 +1,4 @@
-//! The folder of the results: the manifest, and which files a merge may replace.
+//! The folder of the results: the manifest, and the files that a merge may replace.
 
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
@@ -22,8 +22,8 @@ pub const MERGE_WRITES: [&str; 5] = [PARTS, "tables", "proofs", "plans", MANIFES
 const RESULTS: [&str; 3] = ["tables", "proofs", "plans"];
 /// The list of the results.
 pub(super) const MANIFEST: &str = "manifest.json";
-/// A file among the parts, present while a merge replaces results: the paths of the results before and after. If the merge is
-/// killed, the next one may replace these.
+/// A file among the parts that exists while a merge replaces results: the paths of the results before and after. If
+/// the merge is killed, the next one may replace these.
 pub(super) const REPLACING: &str = "replacing.json";
 
 /// The content of the list of the results.
@@ -38,7 +38,7 @@ pub(super) struct Manifest {
     pub files: Vec<ResultFile>,
 }
 
-/// The part of a manifest, of this version or an older one, by which its files can be replaced.
+/// The part of a manifest, of this version or an older one, that is needed to replace its files.
 #[derive(Deserialize)]
 struct PreviousManifest {
     format: u32,
@@ -68,7 +68,8 @@ fn parts(output: &Path) -> Result<Store, SiteBuildError> {
     Ok(Store::new(output.join(PARTS)))
 }
 
-/// Returns the parts of an output folder for a shard, without what killed shards left. Makes the folder if it does not exist.
+/// Returns the parts of an output folder for a shard, without temporary files of killed shards. Makes the folder if
+/// it does not exist.
 ///
 /// # Errors
 /// [`SiteBuildError::Foreign`] if the output folder has results, but neither parts nor a manifest.
@@ -102,10 +103,11 @@ pub(super) fn parts_to_merge(output: &Path) -> Result<Store, SiteBuildError> {
     }
 }
 
-/// Returns the paths of all files among the results. A merge wrote all of them, so the next one may replace them.
+/// Returns the paths of all files among the results. A merge wrote all of them, so the next merge may replace them.
 ///
 /// # Errors
-/// [`SiteBuildError::Foreign`] for a manifest of something else, [`SiteBuildError::Unlisted`] for a file that no merge wrote.
+/// [`SiteBuildError::Foreign`] for a manifest of another program, [`SiteBuildError::Unlisted`] for a file that no
+/// merge wrote.
 pub(super) fn replaceable(
     output: &Path,
     parts: &Store,

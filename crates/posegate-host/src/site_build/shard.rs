@@ -1,4 +1,4 @@
-//! Which part of a site a process makes.
+//! The part of a site that a process makes.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,7 +13,7 @@ pub struct Shard {
 /// The largest number of shards.
 const MAX_COUNT: u32 = 1_000_000;
 
-/// Why a text or two numbers are not a shard.
+/// The reason why a text or two numbers are not a shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParseShardError {
@@ -40,7 +40,7 @@ pub enum ParseShardError {
 }
 
 impl Shard {
-    /// The only shard of a site that is not cut.
+    /// The only shard of a site that is not divided.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 
     /// Returns the shard `index`, from 0, of `count`, which is 1 to 1,000,000.
@@ -86,7 +86,7 @@ impl FromStr for Shard {
     }
 }
 
-/// Parses the index of a shard or a number of shards: digits alone, no sign.
+/// Parses the index of a shard or a number of shards: only digits, no sign.
 ///
 /// # Errors
 /// [`ParseShardError::NoNumber`].

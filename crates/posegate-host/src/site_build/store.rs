@@ -15,10 +15,10 @@ use crate::input::{self, Limit};
 
 /// First bytes of the names of temporary files.
 const TEMPORARY: &str = ".posegate-";
-/// Age of a temporary file that nobody writes to any more: its process was killed.
+/// Age at which no process writes to a temporary file any more: its process was killed.
 pub(super) const STALE_AFTER: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// A folder that processes on several machines may write to at once.
+/// A folder that processes on several machines may write to in parallel.
 pub(super) struct Store {
     folder: PathBuf,
     /// Prefix of the names of this store's temporary files. It is random, because processes in containers share their numbers.
@@ -26,7 +26,7 @@ pub(super) struct Store {
     written: AtomicU64,
 }
 
-/// Returns what makes an error of the system one about a path.
+/// Returns a function that adds a path to an error of the system.
 pub(super) fn fault(path: &Path) -> impl FnOnce(io::Error) -> SiteBuildError + '_ {
     |cause| SiteBuildError::File {
         path: path.into(),
@@ -35,7 +35,7 @@ pub(super) fn fault(path: &Path) -> impl FnOnce(io::Error) -> SiteBuildError + '
 }
 
 impl Store {
-    /// Names a folder, which need not exist.
+    /// Returns a store of a folder, which need not exist.
     pub(super) fn new(folder: PathBuf) -> Self {
         let random = RandomState::new().hash_one((std::process::id(), SystemTime::now()));
         Self {
@@ -50,12 +50,12 @@ impl Store {
         &self.folder
     }
 
-    /// Returns the path of a file in it.
+    /// Returns the path of a file in the folder.
     pub(super) fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Returns the names in it, sorted; none if it does not exist.
+    /// Returns the names in the folder, sorted; empty if it does not exist.
     pub(super) fn names(&self) -> Result<Vec<String>, SiteBuildError> {
         let entries = match std::fs::read_dir(&self.folder) {
             Err(cause) if cause.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
@@ -107,7 +107,7 @@ impl Store {
         age.is_some_and(|age| age >= than)
     }
 
-    /// Writes a file atomically: under a temporary name, to the disk, then renamed. `name` may be in a folder below.
+    /// Writes a file atomically: under a temporary name, to the disk, then renamed. `name` may be in a subfolder.
     pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), SiteBuildError> {
         self.write_by(name, |file| file.write_all(bytes))
     }
@@ -148,19 +148,19 @@ impl Store {
         done.map_err(fault(&path))
     }
 
-    /// Writes the names in it to the disk.
+    /// Synchronizes the names in the folder to the disk.
     pub(super) fn sync(&self) -> Result<(), SiteBuildError> {
         sync(&self.folder)
     }
 }
 
-/// Writes the names in a folder to the disk.
+/// Synchronizes the names in a folder to the disk.
 pub(super) fn sync(folder: &Path) -> Result<(), SiteBuildError> {
     let done = File::open(folder).and_then(|open| open.sync_all());
     done.map_err(fault(folder))
 }
 
-/// Writes a value as JSON with a line end. The text is never in memory as a whole.
+/// Writes a value as JSON with a line end. Memory does not hold the complete text.
 pub(super) fn json(mut to: impl Write, value: &impl Serialize) -> io::Result<()> {
     serde_json::to_writer_pretty(&mut to, value)?;
     to.write_all(b"\n")

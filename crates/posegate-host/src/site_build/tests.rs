@@ -44,7 +44,7 @@ fn shards_are_counted_from_zero() {
 }
 
 #[test]
-fn names_of_files_are_harmless() {
+fn file_names_have_no_special_characters() {
     for (name, safe) in [
         ("dock-1_a.b", "dock-1_a.b"),
         ("../etc", "%2E.%2Fetc"),
@@ -57,9 +57,10 @@ fn names_of_files_are_harmless() {
     }
 }
 
-/// Every piece is in one share, and no two shares differ by more than one table; few plans are made by one shard.
+/// Every piece is in one share, and the numbers of tables of two shares differ by at most one; a few plans are all
+/// made by one shard.
 #[test]
-fn shares_are_all_and_even() {
+fn shares_are_complete_and_even() {
     let site = Site::parse(
         include_str!("../../../../examples/sites/docks.toml"),
         "docks.toml",
@@ -93,9 +94,9 @@ fn shares_are_all_and_even() {
     assert_eq!(tables.pieces().len(), 3);
 }
 
-/// A key changes with each thing that the results depend on, and a table's not with what plans are asked for.
+/// A key changes with each input of the results. A table's key does not change with the plans.
 #[test]
-fn keys_tell_what_results_depend_on() {
+fn key_depends_on_all_inputs_of_the_results() {
     let plan = |from: &str, task: &str| Piece::Plan {
         from: from.into(),
         task: task.into(),
@@ -137,9 +138,9 @@ fn keys_tell_what_results_depend_on() {
     assert_eq!(keys.len(), 8);
 }
 
-/// Nothing but the very bytes that were written is taken: no bit may be another one, and none may be missing.
+/// Only the exact bytes that were written are accepted: no bit may differ, and no byte may be missing.
 #[test]
-fn a_finished_piece_is_taken_whole() {
+fn only_the_exact_bytes_of_a_piece_are_accepted() {
     let recipe = recipe();
     let key = table().key(&recipe);
     let files = vec![
@@ -167,7 +168,7 @@ fn a_finished_piece_is_taken_whole() {
         task: "see-t7".into(),
     };
     assert!(decode(&bytes, &other, &key).is_none());
-    // What a piece does not own is not written; what it owns is there once.
+    // A path that a piece does not own is refused; each path that it owns is there once.
     let outside = ("../dock.posegate".to_string(), vec![1]);
     let [one, other] = [files[0].clone(), files[1].clone()];
     for wrong in [
@@ -185,9 +186,9 @@ fn a_finished_piece_is_taken_whole() {
     }
 }
 
-/// A plan says whether it is one; a table that is none is not taken, whatever stands beside it.
+/// A plan states if there is one. Bytes that are not a table are refused, for any proof file.
 #[test]
-fn what_a_finished_piece_holds_is_read() {
+fn content_of_a_finished_piece_is_read() {
     let recipe = recipe();
     let plan = Piece::Plan {
         from: "gate".into(),

@@ -1,10 +1,10 @@
-//! How much of the truth a table accepts: the largest scale at which the gate permits a pose-set over
-//! the largest at which the set is truly inside, on reference set A.
+//! The accuracy of tables on reference set A: the largest scale at which the gate permits a pose-set, divided by the
+//! largest scale at which the set is truly inside.
 //!
-//! `ci.sh accuracy [N [SEED]]` prints one line per layout. It fails if the facets' mean is below
-//! 0.95 or their tenth percentile below 0.90, or if any set is accepted beyond its true scale. The
-//! pose-sets: half with deviations of 5 to 30 cm and 0.2 to 2 deg, half of 0.5 to 5 cm and 0.05 to
-//! 0.5 deg, correlations up to 0.6, estimates evenly over the part of the extent that is inside.
+//! `ci.sh accuracy [N [SEED]]` prints one line per layout. It fails if the facets' mean is below 0.95 or their tenth
+//! percentile below 0.90, or if any set is accepted beyond its true scale. Half of the pose-sets have deviations of 5
+//! to 30 cm and 0.2 to 2 deg, the others of 0.5 to 5 cm and 0.05 to 0.5 deg. Correlations are up to 0.6, and
+//! estimates are evenly distributed over the part of the extent that is inside.
 
 mod turning;
 mod unions;

@@ -1,5 +1,5 @@
-//! The same ratio for sets that turn, up to half a turn, and with correlations up to 0.999: a footprint in a hall, and a tag that is
-//! seen. Only sets whose scale is bounded count.
+//! The same ratio for sets with large yaw errors, up to half a turn, and with correlations up to 0.999: a footprint
+//! in a hall, and a visible tag. Only sets whose scale is bounded count.
 
 use crate::oracle::{Camera, PoseSet, Rng, SetDeg, scale};
 use crate::{Case, core_set, q16, world};
@@ -79,10 +79,10 @@ fn case(rng: &mut Rng, set: &SetDeg, reach: [f64; 2], spread: f64) -> Case {
             rng.within(-spread, spread) * 0.3,
         ];
         let r2 = 743_499.0 / 65_536.0;
-        let wanted = rng.within(reach[0], reach[1]);
-        let yaw = wanted / f64::sqrt(r2);
+        let intended = rng.within(reach[0], reach[1]);
+        let yaw = intended / f64::sqrt(r2);
         let sigma = [rng.log_within(0.01, 0.4), rng.log_within(0.01, 0.4), yaw];
-        // Strong correlations as often as weak ones.
+        // Strong correlations are as frequent as weak ones.
         let share = 1.0 - rng.log_within(1e-3, 1.0);
         let direction = rng.within(0.0, std::f64::consts::TAU);
         let (xt, yt) = (share * direction.cos(), share * direction.sin());
@@ -94,7 +94,7 @@ fn case(rng: &mut Rng, set: &SetDeg, reach: [f64; 2], spread: f64) -> Case {
         if !(truth > 0.3 && truth < 3.0) {
             continue;
         }
-        if (reach[0]..reach[1]).contains(&(wanted * truth)) {
+        if (reach[0]..reach[1]).contains(&(intended * truth)) {
             return Case {
                 estimate,
                 set,
@@ -104,7 +104,7 @@ fn case(rng: &mut Rng, set: &SetDeg, reach: [f64; 2], spread: f64) -> Case {
     }
 }
 
-/// Prints a line for each set and range. Returns `true` if one falls short of its goals.
+/// Prints a line for each set and range. Returns `true` if one misses its goals.
 pub fn turning(count: u64, seed: u64) -> bool {
     let text = SITE.to_string() + &hall::task([0.0; 3]);
     let site = Site::parse(&text, "site.toml").expect("the site is valid");

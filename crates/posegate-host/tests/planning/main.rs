@@ -104,7 +104,7 @@ fn number(name: &str, default: u64) -> u64 {
 
 /// At least 200 random sites and a million runs in all, in the deep job; a fifth of the sites in the fast suite.
 #[test]
-fn plans_keep_their_promise() {
+fn plans_fail_no_more_often_than_stated() {
     let fewer = if counts::is_deep() { 220 } else { 44 };
     let sites = number("POSEGATE_PLANNED_SITES", fewer);
     let runs = number("POSEGATE_PLAN_RUNS", 5_000);
@@ -144,7 +144,7 @@ fn plans_keep_their_promise() {
         for other in &planned.contingencies {
             assert!(other.plan.report().succeeds(), "{text}");
             // The steps up to the failed look, then the plan without its tag.
-            let mut way: Vec<Step> = steps(&site, plan)[..other.step].to_vec();
+            let mut path: Vec<Step> = steps(&site, plan)[..other.step].to_vec();
             let rest = steps(&site, &other.plan);
             assert!(
                 other
@@ -153,25 +153,25 @@ fn plans_keep_their_promise() {
                     .iter()
                     .all(|step| step.tags.iter().all(|tag| !other.tags.contains(tag)))
             );
-            way.extend(rest);
+            path.extend(rest);
             let before: f64 = plan.steps[..other.step]
                 .iter()
                 .map(|step| step.report.risk)
                 .sum();
             assert!((before - other.risk_before).abs() < 1e-12);
-            ways.push((before + other.plan.risk, way));
+            ways.push((before + other.plan.risk, path));
             rescues += 1;
         }
-        for (risk, way) in ways {
-            looks += way
+        for (risk, path) in ways {
+            looks += path
                 .iter()
                 .filter(|step| matches!(step, Step::Look { .. }))
                 .count();
-            let failed = failures(seed, runs, start, &robot, &way);
+            let failed = failures(seed, runs, start, &robot, &path);
             executed += runs;
             assert!(
                 least_rate(failed, runs) <= risk,
-                "{failed} of {runs} runs failed, promised {risk}:\n{text}\n{way:?}"
+                "{failed} of {runs} runs failed, promised {risk}:\n{text}\n{path:?}"
             );
         }
     }
@@ -186,7 +186,7 @@ fn plans_keep_their_promise() {
 
 /// The judge detects that a chain with the paper's assumption, the estimate at each task's goal, fails too often.
 #[test]
-fn recentring_that_is_ignored_is_caught() {
+fn ignored_recentring_is_detected() {
     let site = Site::parse(
         &format!(
             "{}[task.dock]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
@@ -199,9 +199,9 @@ fn recentring_that_is_ignored_is_caught() {
     )
     .unwrap();
     let chain = &site.chains["now"];
-    let told = |assume| evaluate(&site, "now", chain, assume).unwrap();
-    assert!(told(StartAssumption::AtGoal).succeeds());
-    assert!(!told(StartAssumption::General).succeeds());
+    let evaluated = |assume| evaluate(&site, "now", chain, assume).unwrap();
+    assert!(evaluated(StartAssumption::AtGoal).succeeds());
+    assert!(!evaluated(StartAssumption::General).succeeds());
     let steps = [
         Step::Look {
             set: tag(&site, "t"),
@@ -218,7 +218,7 @@ fn recentring_that_is_ignored_is_caught() {
     };
     let failed = failures(1, 10_000, &chain.start, &robot, &steps);
     assert!(
-        least_rate(failed, 10_000) > told(StartAssumption::AtGoal).risk,
+        least_rate(failed, 10_000) > evaluated(StartAssumption::AtGoal).risk,
         "{failed}"
     );
 }
@@ -231,10 +231,10 @@ const LOOK: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\
     success = { shape = \"visibility\", camera = \"front\", tag = \"t\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }\n\
     error_bound = { translation = 0.05, yaw_deg = 2.0, coverage = 0.9 }\n";
 
-/// Each look fails once in ten times, and never two looks in one run. The sum of the risks bounds the failure rate. A
-/// product, which assumes independence, does not.
+/// Each look fails with probability 1/10, and two looks never fail in one run. The sum of the risks bounds the
+/// failure rate. A product, which assumes independence, does not.
 #[test]
-fn products_of_risks_are_caught() {
+fn product_of_risks_is_detected() {
     let looks = 6;
     let steps: Vec<&str> = std::iter::repeat_n("{ task = \"see\" }", looks).collect();
     let site = Site::parse(

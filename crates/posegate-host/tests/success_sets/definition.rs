@@ -1,4 +1,4 @@
-//! Success sets by their definitions, with everything displaced within its tolerance.
+//! Success sets by their definitions, with tag, camera and dock displaced within their tolerances.
 
 use crate::random::{Random, Tree, View, World};
 use posegate::shape::{Tolerance, Wall};
@@ -82,7 +82,7 @@ impl Nature {
         }
     }
 
-    /// Returns why a pose of the goal frame is not in the set, or `None` if it is in the set.
+    /// Returns the reason why a pose of the goal frame is not in the set; `None` if it is in the set.
     pub fn fault(&self, world: &World, pose: [f64; 3]) -> Option<String> {
         self.tree(&world.tree, world, pose).err()
     }
@@ -177,7 +177,7 @@ impl Nature {
         // The tag.
         let tag = set.tag.pose;
         let by = set.tag_tolerance;
-        let hung = |p: Point| {
+        let to_world = |p: Point| {
             let p = fixed_axes(tag.roll_deg, tag.pitch_deg, tag.yaw_deg, p);
             turn_about(UP, self.tag.turn * by.turn_deg.to_radians(), p)
         };
@@ -185,9 +185,9 @@ impl Nature {
             [tag.x, tag.y, tag.z],
             scaled(self.tag.translation, by.translation),
         );
-        let normal = hung([1.0, 0.0, 0.0]);
+        let normal = to_world([1.0, 0.0, 0.0]);
         let half = 0.5 * set.tag.size;
-        let on_face = |[y, z]: [f64; 2]| add(centre, hung([0.0, y * half, z * half]));
+        let on_face = |[y, z]: [f64; 2]| add(centre, to_world([0.0, y * half, z * half]));
         for corner in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
             let ray = minus(on_face(corner), camera);
             let [depth, left, up] = axes.map(|axis| dot(axis, ray));
@@ -236,7 +236,8 @@ impl Nature {
             };
             let step = 1e-4 * bit;
             for way in [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
-                let [a, b] = [0.5, -0.5].map(|s| image(add(centre, hung(scaled(way, s * step)))));
+                let [a, b] =
+                    [0.5, -0.5].map(|s| image(add(centre, to_world(scaled(way, s * step)))));
                 let width = (a[0] - b[0]).hypot(a[1] - b[1]) / step * bit;
                 most("px_per_bit", sharp.px_per_bit, width * (1.0 + 1e-6))?;
             }
@@ -280,8 +281,8 @@ impl Nature {
 
 const UP: Point = [0.0, 0.0, 1.0];
 
-/// Returns the length of a line of sight inside a wall, metres. For a thin wall: how far within its rectangle the line
-/// crosses.
+/// Returns the length of a line of sight inside a wall, metres. For a thin wall: the depth within its rectangle at
+/// which the line crosses.
 fn within(wall: &Wall, from: Point, to: Point) -> f64 {
     let way = minus(to, from);
     let length = dot(way, way).sqrt();

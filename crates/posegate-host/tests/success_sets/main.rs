@@ -42,7 +42,7 @@ struct Tally {
 }
 
 #[test]
-fn what_a_table_holds_is_in_the_set() {
+fn all_poses_of_a_table_are_in_the_set() {
     let (sets, samples) = (
         number("POSEGATE_SETS", counts::cases(1000)),
         number("POSEGATE_SAMPLES", 1000),
@@ -92,7 +92,7 @@ fn what_a_table_holds_is_in_the_set() {
 
 /// A set that is empty because a union in it is empty has no table, even if the set without that union has one.
 #[test]
-fn what_nothing_holds_is_not_proven() {
+fn empty_sets_have_no_table() {
     let site = Site::parse(
         include_str!("../../../../examples/sites/dock.toml"),
         "dock.toml",
@@ -144,8 +144,8 @@ fn what_nothing_holds_is_not_proven() {
 
 /// Without tolerances membership agrees with the definition, on both sides of every border.
 #[test]
-fn membership_is_as_defined() {
-    // Metres or radians. The definition samples outlines and the tag's face, so it is not more exact than this.
+fn membership_agrees_with_the_definition() {
+    // Metres or radians. The definition samples outlines and the tag's face, so this is its accuracy.
     const NEAR: f64 = 0.02;
     let (mut inside, mut outside) = (0u64, 0u64);
     let (skipped, step) = counts::part(4);
@@ -170,7 +170,7 @@ fn membership_is_as_defined() {
             ]);
             // A displacement at a wall next to the tag moves the border of the camera's places by more.
             let near = |(name, slack): &(&str, f64)| {
-                // A wall that contains the tag hides it from everywhere.
+                // A wall that contains the tag hides it from all poses.
                 !slack.is_finite() || slack.abs() < if *name == "wall" { 0.15 } else { NEAR }
             };
             if membership.slack.iter().any(near) {

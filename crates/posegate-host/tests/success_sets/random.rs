@@ -236,7 +236,8 @@ impl Random {
                             yaw_deg: [0.1, 0.05, 0.2, 0.6],
                         }
                     } else {
-                        // Of a tag seen head-on the yaw has the largest error, and sometimes the position too.
+                        // For a tag that is seen head-on the yaw has the largest error, and sometimes the position
+                        // too.
                         let falls = if translation < 0.08 { 0.02 } else { -0.03 };
                         ErrorModel {
                             translation: [0.07, 0.002, 0.01, falls],

@@ -35,7 +35,7 @@ impl Line {
         self.start + ms(self.now_ms)
     }
 
-    /// Lets the time pass for both.
+    /// Advances the time of both.
     fn pass(&mut self, passed_ms: u64) {
         self.now_ms += passed_ms;
         self.clock_ms = self.clock_ms.wrapping_add(passed_ms as u32);
@@ -57,7 +57,7 @@ impl Line {
         }
     }
 
-    /// Sends a report, and returns the message that names it.
+    /// Sends a report, and returns the telemetry that names it.
     fn answered(&mut self) -> Telemetry {
         self.sequence += 1;
         let (sequence, now) = (self.sequence, self.now());
@@ -95,7 +95,7 @@ impl Line {
 }
 
 #[test]
-fn a_permit_without_a_round_trip_is_none() {
+fn permit_without_a_round_trip_does_not_count() {
     let mut line = Line::new(7);
     for _ in 0..100 {
         let said = line.permitting();
@@ -109,7 +109,7 @@ fn a_permit_without_a_round_trip_is_none() {
 }
 
 #[test]
-fn a_silent_controller_permits_no_longer_than_the_limit() {
+fn silent_controller_permits_until_the_limit() {
     // The age counts from before the report was sent, 10 ms ago. The clock wraps meanwhile.
     for clock_ms in [0, u32::MAX - 50] {
         let mut line = Line::open(clock_ms);
@@ -121,7 +121,7 @@ fn a_silent_controller_permits_no_longer_than_the_limit() {
 }
 
 #[test]
-fn telemetry_prolongs_by_the_controllers_clock() {
+fn telemetry_extends_the_bound_by_the_controllers_clock() {
     let mut line = Line::open(u32::MAX - 500);
     for _ in 0..200 {
         line.pass(10);
@@ -129,7 +129,7 @@ fn telemetry_prolongs_by_the_controllers_clock() {
         line.arrive(&said);
         assert!(line.permits());
     }
-    // Three hundredths of two seconds are taken off.
+    // Three hundredths of two seconds are subtracted.
     assert_eq!(line.link.age(line.now()), Some(ms(10 + 60)));
     // Then another round trip is needed.
     line.pass(10);
@@ -141,9 +141,10 @@ fn telemetry_prolongs_by_the_controllers_clock() {
     assert!(line.permits());
 }
 
-/// A line that delivers everything a second late, of a controller whose clock is fast: no state is ever taken for a young one.
+/// A line that delivers all telemetry a second late, from a controller with a fast clock: no state ever counts as
+/// young.
 #[test]
-fn a_late_line_of_a_fast_clock_never_permits() {
+fn late_line_of_a_fast_clock_never_permits() {
     for per_mille in [0u64, 1, 5, 10, 20, 30] {
         let mut link = Link::new();
         let start = Instant::now();
@@ -191,7 +192,7 @@ fn a_late_line_of_a_fast_clock_never_permits() {
 
 /// The answer to a report of another source names no report of this end.
 #[test]
-fn another_sources_answer_is_no_round_trip() {
+fn answer_to_another_source_is_not_a_round_trip() {
     let mut line = Line::new(7);
     let answer = line.answered();
     let of_another = answer.weighed.map(|report| ReportOutcome {
@@ -206,7 +207,7 @@ fn another_sources_answer_is_no_round_trip() {
 }
 
 #[test]
-fn what_the_controller_denies_is_denied_at_once() {
+fn denial_of_the_controller_counts_immediately() {
     type Change = fn(&mut Telemetry);
     let changes: [Change; 5] = [
         |said| said.permitted = false,
@@ -226,7 +227,7 @@ fn what_the_controller_denies_is_denied_at_once() {
 }
 
 #[test]
-fn bytes_that_come_again_are_no_news() {
+fn repeated_bytes_do_not_extend_a_permit() {
     let mut line = Line::open(0);
     let said = line.permitting();
     line.arrive(&said);
@@ -238,9 +239,9 @@ fn bytes_that_come_again_are_no_news() {
     assert_eq!(line.link.counts().repeated, 20);
 }
 
-/// A recorded stretch that is played again and again, as a hung adapter does.
+/// A recorded interval that is played repeatedly, as by a blocked adapter.
 #[test]
-fn a_stretch_that_is_repeated_permits_nothing() {
+fn repeated_interval_permits_nothing() {
     let mut line = Line::new(0);
     let mut stretch = vec![line.answered()];
     for _ in 0..9 {
@@ -262,12 +263,12 @@ fn a_stretch_that_is_repeated_permits_nothing() {
 }
 
 #[test]
-fn telemetry_that_is_always_late_permits_nothing() {
+fn late_telemetry_permits_nothing() {
     let mut line = Line::open(0);
     let mut delayed = VecDeque::new();
     for _ in 0..300 {
         line.pass(10);
-        // Reports are answered, but what the controller says arrives 200 ms later.
+        // Reports are answered, but the telemetry arrives 200 ms later.
         let said = line.answered();
         delayed.push_back(said);
         if delayed.len() > 10 {
@@ -282,7 +283,7 @@ fn telemetry_that_is_always_late_permits_nothing() {
 }
 
 #[test]
-fn a_controller_that_starts_again_must_answer_first() {
+fn restarted_controller_must_answer_first() {
     let mut line = Line::open(50_000);
     line.pass(20);
     // It starts at another time, and claims to permit at once.
@@ -300,7 +301,7 @@ fn a_controller_that_starts_again_must_answer_first() {
 }
 
 #[test]
-fn a_clock_that_jumps_ahead_is_another_clock() {
+fn clock_that_jumps_ahead_counts_as_another_clock() {
     let mut line = Line::open(0);
     line.clock_ms += 1_000;
     let said = line.permitting();
@@ -310,7 +311,7 @@ fn a_clock_that_jumps_ahead_is_another_clock() {
 }
 
 #[test]
-fn a_closed_line_is_forgotten() {
+fn closing_the_line_forgets_its_telemetry() {
     let mut line = Line::open(0);
     line.link.close();
     assert!(!line.permits() && line.link.last().is_none());
@@ -320,7 +321,7 @@ fn a_closed_line_is_forgotten() {
 }
 
 #[test]
-fn the_controllers_clock_is_never_ahead() {
+fn estimated_controller_clock_is_never_ahead() {
     let mut line = Line::new(1_000);
     let said = line.permitting();
     // 30 ms on the line.
@@ -332,9 +333,9 @@ fn the_controllers_clock_is_never_ahead() {
 }
 
 proptest! {
-    /// Damaged bytes between and within messages never permit what no sound message said.
+    /// Damaged bytes between and within messages never cause a permit that no valid message contained.
     #[test]
-    fn garbage_permits_nothing(
+    fn random_bytes_permit_nothing(
         steps in proptest::collection::vec((any::<u64>(), any::<bool>(), proptest::collection::vec(any::<u8>(), 0..40)), 1..60),
     ) {
         let mut line = Line::open(0);

@@ -59,7 +59,7 @@ fn odometry_at(ms: u32, x: f64) -> Odometry {
     }
 }
 
-/// A gate that has been opened by good poses up to this moment, milliseconds after the start.
+/// The moment up to which valid poses have opened the gate, milliseconds after the start.
 const OPENED: u32 = 1_000;
 
 fn opened<'a>(settings: &'a NodeSettings, gate: &'a Settings<'a>) -> PermitGate<'a> {
@@ -80,7 +80,7 @@ fn opened<'a>(settings: &'a NodeSettings, gate: &'a Settings<'a>) -> PermitGate<
 }
 
 #[test]
-fn good_poses_open_and_silence_closes() {
+fn valid_poses_open_and_silence_closes() {
     let settings = settings(STILL);
     let gate = settings.gate();
     let mut node = opened(&settings, &gate);
@@ -94,9 +94,9 @@ fn good_poses_open_and_silence_closes() {
     assert_eq!(node.tick(at(ms)).reason(), Some(Reason::Silent));
 }
 
-/// With odometry, a pose of no known time would be carried as if it were of a guessed one.
+/// With odometry, a pose without a known time would be carried from a guessed time.
 #[test]
-fn a_pose_without_a_time_is_not_carried() {
+fn pose_without_a_time_is_not_carried() {
     let settings = settings(&format!("{STILL} {ODOMETRY}"));
     let gate = settings.gate();
     let next = i64::from(OPENED / 100) + 1;
@@ -107,7 +107,7 @@ fn a_pose_without_a_time_is_not_carried() {
         message.header.stamp = Time { sec: 0, nanosec };
         let answer = node.pose(at(now), &message, origin(next));
         assert!(!answer.is_open, "{nanosec}");
-        // The odometry that follows has no fix to carry.
+        // The next odometry has no fix to carry.
         for ms in (now + 20..now + 400).step_by(20) {
             let _ = node.odometry(at(ms), &odometry_at(ms, 0.0), origin(i64::from(ms / 20)));
             assert!(!node.tick(at(ms)).is_open, "{nanosec} {ms}");
@@ -116,7 +116,7 @@ fn a_pose_without_a_time_is_not_carried() {
 }
 
 #[test]
-fn reports_that_do_not_count_close_the_gate() {
+fn invalid_reports_close_the_gate() {
     let settings = settings(STILL);
     let gate = settings.gate();
     let next = i64::from(OPENED / 100) + 1;
@@ -165,7 +165,7 @@ fn two_publishers_never_open_the_gate() {
 }
 
 #[test]
-fn movement_is_added_to_the_set() {
+fn motion_bounds_enlarge_the_set() {
     let still = settings(STILL);
     let moving = settings("-p max_speed:=0.02 -p max_yaw_rate_deg:=1.0 -p cross_terms:=filled");
     let margins = [&still, &moving].map(|settings| {
@@ -181,7 +181,7 @@ fn movement_is_added_to_the_set() {
 }
 
 #[test]
-fn a_fix_is_carried_and_a_broken_way_closes() {
+fn fix_is_carried_and_a_broken_path_closes() {
     let settings = settings(
         &format!("{STILL} {ODOMETRY} -p odometry_maximum_gap_ms:=60")
             .replace(
@@ -197,7 +197,8 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
     let gate = settings.gate();
     let number = i64::from(OPENED / 20);
 
-    // Without a new fix the permit stays, because the odometry carries the old one, until the robot is too far.
+    // Without a new fix the permit remains, because the odometry carries the old one, until the robot is too far
+    // away.
     let mut node = opened(&settings, &gate);
     let mut answer = node.tick(at(OPENED));
     let mut steps = 0;
@@ -214,7 +215,7 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
     assert!((5..30).contains(&steps), "{steps}");
     assert_eq!(answer.reason(), Some(Reason::NotContained));
 
-    // A jump, another publisher, another frame, another point of the robot, a gap, a message that cannot be read.
+    // A jump, another publisher, another frame, another point of the robot, a gap, a message that cannot be decoded.
     let next = number + 1;
     let now = OPENED + 20;
     let elsewhere = Odometry {
@@ -256,7 +257,7 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
             (false, Some(expected)),
             "{message:?}"
         );
-        // The way is broken: odometry alone opens nothing again.
+        // The path is broken: odometry alone never opens the gate again.
         for k in 1..100u32 {
             let ms = now + 20 * k;
             let answer = node.odometry(at(ms), &odometry_at(ms, 0.0), origin);
@@ -270,14 +271,14 @@ fn a_fix_is_carried_and_a_broken_way_closes() {
     while node.tick(at(ms)).is_open {
         ms += 20;
     }
-    // What the robot can have moved since the last odometry may close the gate before the gap does.
+    // The possible motion since the last odometry may close the gate before the gap does.
     assert!(ms - OPENED <= 80, "{ms}");
     let later = node.tick(at(OPENED + 100));
     assert_eq!(later.reason(), Some(Reason::OdometryGap));
 }
 
 #[test]
-fn a_reset_closes_and_the_gate_qualifies_again() {
+fn reset_closes_and_the_gate_qualifies_again() {
     let settings = settings(&format!("{STILL} -p restart:=on_reset"));
     let gate = settings.gate();
     let mut node = opened(&settings, &gate);

@@ -60,7 +60,8 @@ const NAMES: [&str; 44] = [
     "valid_ms",
 ];
 
-/// What a node with a controller may be given. Everything else is a setting of the gate or of odometry, which such a node does not have.
+/// The parameters of a node with a controller. All others are settings of the gate or of odometry, which such a node
+/// does not have.
 const WITH_CONTROLLER: [&str; 9] = [
     "cycle_ms",
     "frame_id",
@@ -73,7 +74,7 @@ const WITH_CONTROLLER: [&str; 9] = [
     "valid_ms",
 ];
 
-/// What counts only if detections are used.
+/// Parameters that are allowed only if detections are used.
 const OF_DETECTIONS: [&str; 6] = [
     "camera",
     "camera_info_reliability",
@@ -83,10 +84,11 @@ const OF_DETECTIONS: [&str; 6] = [
     "max_hamming",
 ];
 
-/// What counts only for poses. The covariance from corners has all its terms.
+/// Parameters that are allowed only for poses. The covariance from corners has all its terms.
 const OF_POSES: [&str; 3] = ["cross_terms", "pose_durability", "pose_reliability"];
 
-/// The standard deviation of a corner's coordinates, pixels. Detectors are often better; what is measured with the own camera counts.
+/// The standard deviation of a corner's coordinates, pixels. Detectors are often better; use a value measured with
+/// the robot's own camera.
 const CORNER_SIGMA_PX: f64 = 0.5;
 
 const TIME: &str = "milliseconds, a whole number from 1 to 60000";
@@ -315,7 +317,8 @@ impl Reader<'_> {
         Ok(Some(Detector::new(site, camera.as_deref(), settings)?))
     }
 
-    /// Returns the delivery of a topic of which only the last message counts: best effort is received from every publisher.
+    /// Returns the delivery of a topic of which only the last message counts: best effort is received from every
+    /// publisher.
     pub(super) fn best_effort(&self, reliability: &'static str) -> Result<Delivery, SettingsError> {
         let choices = ["best_effort", "reliable"];
         let reliable = self.choice(reliability, choices, "`reliable` or `best_effort`")? == 1;
@@ -360,7 +363,7 @@ impl Reader<'_> {
         let [Some(along), across, Some(turn)] = speeds else {
             return Err(SettingsError::NoMotionBounds);
         };
-        // A robot that is stated not to move at all is one that stands still: that has its own parameter.
+        // A robot that is stated not to move at all needs the parameter `stands_still`.
         let across = across.unwrap_or(0.0);
         if along + across + turn == 0.0 {
             return Err(SettingsError::NoMotionBounds);
@@ -401,7 +404,7 @@ impl Reader<'_> {
         };
         Ok(Delivery {
             reliable,
-            // Messages from before can only be kept for a reliable subscription.
+            // Only reliable subscriptions receive earlier messages.
             transient_local: transient_local && reliable,
         })
     }

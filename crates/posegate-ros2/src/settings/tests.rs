@@ -29,7 +29,7 @@ fn other_site() -> String {
 }
 
 #[test]
-fn a_site_file_gives_the_detector() {
+fn site_file_gives_the_detector() {
     let line = format!("--site {} {DETECTIONS} -p max_hamming:=1", site());
     let given = settings(&line).unwrap();
     let detector = given.detector.as_ref().unwrap();
@@ -40,7 +40,7 @@ fn a_site_file_gives_the_detector() {
     assert_eq!(given.trust.cross_terms, CrossTerms::Filled);
     let [detections, camera_info] = [given.detections_delivery, given.camera_info_delivery];
     assert!(detections.reliable && !detections.transient_local && !camera_info.reliable);
-    // The file alone is checked, too.
+    // The site file is also checked without detections.
     let alone = settings(&format!("--site {} {STILL}", site())).unwrap();
     assert!(alone.site_is_checked && alone.detector.is_none());
 }
@@ -73,7 +73,7 @@ fn parameters_become_settings() {
     assert_eq!(still.bounds, MotionBounds::STANDS_STILL);
 }
 
-/// The tracker and the gate's source must not both apply the trust, and one of them must.
+/// Exactly one of the tracker and the gate's source must apply the trust.
 #[test]
 fn trust_is_applied_once() {
     let line = format!(
@@ -94,7 +94,7 @@ fn trust_is_applied_once() {
 }
 
 #[test]
-fn wrong_parameters_are_refused_with_words() {
+fn invalid_parameters_have_their_own_errors() {
     let digest = settings(STILL).unwrap().site();
     let other = digest.replace(|c: char| c != '0', "0");
     for (line, words) in [
@@ -204,7 +204,7 @@ fn wrong_parameters_are_refused_with_words() {
 }
 
 #[test]
-fn bytes_that_are_no_table_are_refused() {
+fn invalid_table_bytes_are_refused() {
     let Ok(Command::Run(arguments)) = Command::parse(["x".to_owned()]) else {
         panic!("a table");
     };
@@ -212,7 +212,7 @@ fn bytes_that_are_no_table_are_refused() {
     assert!(matches!(refused, Err(SettingsError::Table(_))));
 }
 
-/// The gate is on the controller: what the node is given for a gate would decide nothing, so it is refused.
+/// The gate is on the controller: settings of a gate in the node would have no effect, so they are refused.
 #[test]
 fn with_a_controller_only_settings_of_the_node_are_accepted() {
     let line = "--serial /dev/ttyUSB0 --baud 921600 --ros-args -p link_timeout_ms:=200 -p valid_ms:=300 -p task:=dock";

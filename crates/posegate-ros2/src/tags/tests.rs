@@ -14,7 +14,7 @@ use posegate_host::site::Site;
 
 const SITE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/tags.toml");
 const START: i128 = 1_800_000_000_000_000_000;
-/// The goal, and the place from which tag 7 looks nearly the same: mirrored about its normal.
+/// The goal, and the place from which tag 7 looks almost the same: mirrored about its normal.
 const GOAL: [f64; 3] = [0.0, 0.0, 0.0];
 const MIRRORED_DEG: f64 = 40.0;
 const LINE: &str =
@@ -144,7 +144,7 @@ fn info() -> CameraInfo {
     }
 }
 
-/// A node for a test: images every 100 ms.
+/// A node under test: images every 100 ms.
 struct Node<'a> {
     gate: PermitGate<'a>,
     ms: u32,
@@ -191,13 +191,13 @@ fn with_node(line: &str, test: impl FnOnce(Node<'_>)) {
 }
 
 #[test]
-fn a_tag_with_one_pose_permits() {
+fn tag_with_one_pose_permits() {
     with_node(LINE, |mut node| {
         node.open();
         assert_eq!(node.problem(), "");
         let answer = node.look(vec![detection(8, [0.2, 0.0, 0.0])]);
         assert!(!answer.is_open && node.problem().is_empty());
-        // The other place of tag 8 is excluded by the two tags together, too.
+        // The other place of tag 8 is also excluded by the two tags together.
         node.open();
         let both = vec![detection(7, GOAL), detection(8, GOAL)];
         let answer = node.look(both);
@@ -206,9 +206,10 @@ fn a_tag_with_one_pose_permits() {
     });
 }
 
-/// The robot is not at the goal, but the small tag fits nearly as well from there. The pose at the goal alone would be permitted.
+/// The robot is not at the goal, but the small tag also fits a view from there. The pose at the goal alone would be
+/// permitted.
 #[test]
-fn a_wrong_pose_that_would_permit_alone_does_not_permit() {
+fn second_pose_denies_although_the_first_alone_would_be_permitted() {
     with_node(LINE, |mut node| {
         for truth in [mirrored(), GOAL] {
             let found = vec![detection(7, truth)];
@@ -271,7 +272,7 @@ fn a_wrong_pose_that_would_permit_alone_does_not_permit() {
 }
 
 #[test]
-fn detections_without_a_camera_info_give_nothing_and_say_so() {
+fn detections_without_camera_info_give_no_pose_and_a_reason() {
     with_node(LINE, |mut node| {
         let table = table();
         let settings = settings(&table, LINE);
@@ -292,7 +293,7 @@ fn detections_without_a_camera_info_give_nothing_and_say_so() {
         );
         assert_eq!(fresh.gate.tags().unwrap().status().level, ERROR);
         assert!(fresh.gate.last().is_none());
-        // One that is not the site's, or cannot be read, also takes back the one before.
+        // A camera info that is not the site's, or cannot be decoded, also removes the earlier one.
         let half = CameraInfo {
             binning_x: 2,
             binning_y: 2,
@@ -330,7 +331,7 @@ fn detections_without_a_camera_info_give_nothing_and_say_so() {
 }
 
 #[test]
-fn unknown_tags_are_no_report_and_contradictions_close_at_once() {
+fn unknown_tags_are_ignored_and_contradictions_close_immediately() {
     with_node(LINE, |mut node| {
         let mut other = detection(8, GOAL);
         other.id = 9;
@@ -345,7 +346,7 @@ fn unknown_tags_are_no_report_and_contradictions_close_at_once() {
             (vec![hamming], "1 corrected bits"),
         ] {
             node.open();
-            // No gap in the sequence for what was no report.
+            // A message that was not a report leaves no gap in the sequence.
             assert!(node.look(found).is_open, "{words}");
             assert!(node.problem().contains(words), "{}", node.problem());
             assert!(node.look(vec![detection(8, GOAL)]).is_open, "{words}");
@@ -374,7 +375,7 @@ fn unknown_tags_are_no_report_and_contradictions_close_at_once() {
             .gate
             .detections(at(node.ms + 50), &elsewhere, origin(node.number));
         assert!(!answer.is_open && node.problem().contains("of two cameras"));
-        // A lost message is a gap, also if the next one is no report.
+        // A lost message is a gap, even if the next one is not a report.
         node.ms += 50;
         node.open();
         node.number += 1;
@@ -384,7 +385,7 @@ fn unknown_tags_are_no_report_and_contradictions_close_at_once() {
     });
 }
 
-/// With odometry: one pose is carried. Two poses are not, and are judged with the inflation.
+/// With odometry, one pose is carried. Two poses are not carried, and are evaluated with the inflation.
 #[test]
 fn two_poses_are_not_carried_along_odometry() {
     let odometry = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p odometry_rad_per_sqrt_rad:=0.001 \

@@ -1,4 +1,4 @@
-"""What peers on bare DDS (Cyclone DDS, without rclpy) share: loopback alone, messages of std_msgs, quality of service."""
+"""Shared code of peers on bare DDS (Cyclone DDS, without rclpy): loopback only, messages of std_msgs, quality of service."""
 
 import os
 

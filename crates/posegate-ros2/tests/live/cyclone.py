@@ -58,7 +58,7 @@ def main():
                 covariance[35] = 1e-5
                 writer.write(PoseStamped(bare_dds.header("map"), [x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], covariance))
             for message in reader.take(N=10):
-                # Not the news that the publisher has left.
+                # Ignores the notification that the publisher has left.
                 if isinstance(message, Array):
                     watch.heartbeat(message, time.time_ns(), time.monotonic_ns())
             if until(watch.permitted(time.monotonic_ns())):

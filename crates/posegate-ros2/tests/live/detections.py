@@ -101,7 +101,7 @@ class Camera:
         self.due = 0.0
 
     def drive(self, seconds, found, info=camera_info, until=None):
-        """Publishes for a time, or until a condition holds. Returns whether it held."""
+        """Publishes for a time, or until a condition is true. Returns True if it became true."""
         begin = time.monotonic()
         while time.monotonic() - begin < seconds:
             if time.monotonic() >= self.due:
@@ -117,11 +117,11 @@ class Camera:
     def says(self, found, info, words):
         """Publishes until the diagnostics contain the words, and requires that nothing is permitted meanwhile."""
 
-        def told():
+        def reported():
             state = self.peer.states.get("posegate: tags")
             return state is not None and words in state.message
 
-        require(self.drive(5.0, found, info, told), f"not in the diagnostics: {words}")
+        require(self.drive(5.0, found, info, reported), f"not in the diagnostics: {words}")
         require(not self.peer.listener.permitted(), f"permitted: {words}")
 
 
@@ -138,7 +138,7 @@ def main():
         )
         peer = Peer(qos=None)
         camera = Camera(peer)
-        # Without the camera info nothing is used, and the diagnostics say so.
+        # Without the camera info no detection is used, and the diagnostics report it.
         camera.says([8], None, "no camera info has arrived on /camera_info")
         camera.says([8], lambda: camera_info(width=640), "is for an image of 640 x 960")
         permitted = peer.listener.permitted

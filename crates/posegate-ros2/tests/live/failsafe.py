@@ -1,4 +1,4 @@
-"""The permit ends at the consumer within its stated time, whatever stops: the node, the source of poses, or order itself."""
+"""The permit ends at the consumer within its stated time if the node or the source of poses stops, or if messages are out of order."""
 
 import random
 import signal
@@ -11,7 +11,7 @@ RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 10
 # valid_ms, and the resolution of the clocks.
 STATED_MS = 250
 LATE_MS = 5
-# The node notices a silent source when its last permit has been held for permit_hold_ms; then it says so.
+# The node notices a silent source when its last permit has been held for permit_hold_ms; it then publishes a denial.
 HOLD_MS = 500
 
 
@@ -25,7 +25,7 @@ def stops(name, stop, limit_ms, go_on=None):
         peer.drive(random.uniform(0.0, 0.1))
         require(peer.listener.permitted(), f"no permit before: {peer.listener.reason()}")
         stop(node)
-        # The last moment at which the consumer was permitted counts, not when this program came to ask again.
+        # The last moment of a permit at the consumer counts, not the time of the next query.
         begin = last = time.monotonic()
         keeps_driving = name != "the source of poses"
         while True:
@@ -53,7 +53,7 @@ def after_a_pause(node, peer):
     before = len(peer.heartbeats)
     node.send_signal(signal.SIGCONT)
     begin = time.monotonic()
-    # Without new poses it stays closed for ever.
+    # Without new poses it stays closed.
     while time.monotonic() - begin < 1.0:
         peer.spin(0.002)
         require(not peer.listener.permitted(), "a permit after a pause")

@@ -34,7 +34,7 @@ def heartbeat(ros_ns=NOW, sequence=1, **changed):
 
 
 def decides(message, ros_ns=NOW, site=None):
-    """Returns whether a new watch permits on a message."""
+    """Returns True if a new watch permits on a message."""
     watch = PermitWatch("dock", site)
     watch.heartbeat(message, ros_ns, 0)
     return watch.permitted(0)
@@ -88,7 +88,7 @@ def main():
     require(not watch.permitted(5_140 * MS), "a permit that has ended came back")
     watch.heartbeat(heartbeat(sequence=2), NOW, 6_000 * MS)
     require(watch.permitted(6_000 * MS), "no second permit")
-    # An older or repeated one of the same run ends it too; a new run begins anew.
+    # An older or repeated heartbeat of the same run also ends it; a new run starts again.
     watch.heartbeat(heartbeat(sequence=2), NOW, 6_001 * MS)
     require(not watch.permitted(6_001 * MS), "a repeated heartbeat permits")
     watch.heartbeat(heartbeat(sequence=1, run="r2"), NOW, 6_002 * MS)

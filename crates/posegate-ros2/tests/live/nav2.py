@@ -29,7 +29,7 @@ def program(*words, codes=(0,)):
 
 
 def recorded():
-    """Returns the messages in their order: whether it is a pose, its stamp (s), its bytes."""
+    """Returns the messages in their order: True for a pose, the stamp (s), the bytes."""
     with open(BAG, "rb") as file:
         found = []
         for _, channel, message in make_reader(file).iter_messages(topics=["/amcl_pose", "/odom"]):

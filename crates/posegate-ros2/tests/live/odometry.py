@@ -10,7 +10,7 @@ SLOW = ("max_speed:=0.03", "max_yaw_rate_deg:=0.5", "cross_terms:=filled", "maxi
 
 
 class Wheels:
-    """Publishes odometry of a robot that stands, at 50 Hz."""
+    """Publishes odometry of a robot that does not move, at 50 Hz."""
 
     def __init__(self, peer):
         self.publisher = peer.node.create_publisher(Odometry, "/odom", 10)
@@ -32,7 +32,7 @@ class Wheels:
         self.publisher.publish(message)
 
     def drive(self, seconds, fixes_every=None, until=None):
-        """Publishes odometry, and fixes now and then. Returns whether a condition held."""
+        """Publishes odometry, and fixes at intervals. Returns True if a condition became true."""
         begin = time.monotonic()
         due = begin
         while time.monotonic() - begin < seconds:
@@ -63,7 +63,7 @@ def main():
     require(wheels.drive(0.3, until=lambda: listener.reason() == "odometry_jump"), f"a jump: {listener.reason()}")
     figure("a jump of the odometry ends the permit", 1, "permits", 1)
     require(wheels.drive(15.0, 1.0, listener.permitted), "no permit after the jump")
-    # The odometry stops: fixes alone give nothing.
+    # The odometry stops: fixes alone give no permit.
     begin = time.monotonic()
     ended = peer.wait(2.0, lambda: not listener.permitted())
     require(ended is not None and ended < 0.5, f"no odometry: {ended}")

@@ -51,7 +51,7 @@ def gives_and_ends():
     peer.open()
     answer = peer.call("/posegate/explain", pose)
     require(answer.message == "permit", answer)
-    # An orderly end says so, and faster than silence does.
+    # An orderly end publishes a denial, which is faster than silence.
     peer.open()
     peer.drive(0.2)
     require(peer.listener.permitted(), f"no permit before SIGTERM: {peer.listener.reason()}")
@@ -81,13 +81,13 @@ def resets():
 
 
 def words_of(peer, make, name):
-    """Returns what the diagnostics say after a second of poses."""
+    """Returns the message of the diagnostics after a second of poses."""
     peer.drive(1.6, make)
     return peer.states[name].message if name in peer.states else ""
 
 
-def tells_what_is_missing():
-    """No publisher, two publishers, best effort, volatile: each is in the diagnostics, and none opens the gate."""
+def reports_faults_of_the_graph():
+    """No publisher, two publishers, best effort, volatile: each is in the diagnostics and does not open the gate."""
     node = start(*STILL)
     peer = Peer(qos=None)
     peer.wait(5.0, lambda: "posegate: pose" in peer.states)
@@ -126,7 +126,7 @@ def tells_what_is_missing():
 
 
 def refuses():
-    """Wrong arguments are refused with words and exit code 2."""
+    """Invalid arguments are refused with a message and exit code 2."""
     refused = 0
     for words in [
         [],
@@ -143,5 +143,5 @@ def refuses():
 refuses()
 gives_and_ends()
 resets()
-tells_what_is_missing()
+reports_faults_of_the_graph()
 end()

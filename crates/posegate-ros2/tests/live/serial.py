@@ -38,7 +38,7 @@ class Line:
         tty.setraw(near)
         self.device = os.ttyname(near)
         os.close(near)
-        # What the board says while the node is away is dropped, not kept for later.
+        # Output of the board is dropped while the node is disconnected.
         os.set_blocking(self.far, False)
 
     def boot(self):
@@ -69,7 +69,7 @@ class Line:
                         if data:
                             os.write(self.far, data)
                 except OSError:
-                    # The board was reset, or the node is away.
+                    # The board was reset, or the node is disconnected.
                     time.sleep(0.002)
 
     def cut(self, _):
@@ -86,7 +86,7 @@ class Line:
         return random.randbytes(max(len(data), 64))
 
     def replay(self):
-        """Returns a damage that repeats what the board said while it permitted."""
+        """Returns a damage that repeats the output of the board during a permit."""
         held = bytearray()
         at = 0
 
@@ -127,7 +127,7 @@ def ended(cause, act, undo=None, good=True, more_ms=0):
     longest = 0.0
     for _ in range(RUNS):
         opened()
-        # The last moment at which the consumer was permitted counts, not when this program came to ask again.
+        # The last moment of a permit at the consumer counts, not the time of the next query.
         begin = last = time.monotonic()
         act()
         while True:
@@ -186,7 +186,7 @@ ended("the source of poses stops", act=lambda: None, good=False)
 ended("the line is cut", act=lambda: set_damage(line.cut), undo=lambda: set_damage(None))
 ended("every message is damaged", act=lambda: set_damage(line.garble), undo=lambda: set_damage(None))
 ended("noise alone", act=lambda: set_damage(line.garbage), undo=lambda: set_damage(None))
-# What it repeats is news the first time, for a tenth of a second.
+# The first repetition may count as new, for a tenth of a second.
 ended("the line repeats itself", act=lambda: set_damage(line.replay()), undo=lambda: set_damage(None), more_ms=150)
 ended("the controller is reset", act=line.boot)
 # The firmware may take the jump of its clock for a fault, which only a reset ends.

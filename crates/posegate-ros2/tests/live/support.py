@@ -1,4 +1,4 @@
-"""What the live tests share: the node as a process, a peer of rclpy, results as JSON lines. Loopback only."""
+"""Shared code of the live tests: the node as a process, a peer of rclpy, results as JSON lines. Loopback only."""
 
 import ctypes
 import json
@@ -15,7 +15,7 @@ NODE = os.environ["POSEGATE_NODE"]
 PROGRAM = os.environ["POSEGATE"]
 TABLE = ROOT / "examples/tables/dock.posegate"
 SITE = ROOT / "examples/sites/dock.toml"
-# A domain of its own for each test: nothing else on this machine is heard.
+# A domain of its own for each test: no other program on this machine is received.
 os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(10, 100))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["RMW_IMPLEMENTATION"] = "rmw_fastrtps_cpp"
@@ -44,7 +44,7 @@ def figure(name, value, unit, goal=None, at_least=True):
 
 
 def require(holds, what):
-    """Ends the test unless the condition holds."""
+    """Ends the test unless the condition is true."""
     if not holds:
         end(f"failed: {what}")
 
@@ -119,7 +119,7 @@ class Peer:
             rclpy.spin_once(self.node, timeout_sec=0.002)
 
     def drive(self, seconds, make=pose, period=0.05, until=None):
-        """Publishes poses for a time, or until a condition holds. Returns whether it held."""
+        """Publishes poses for a time, or until a condition is true. Returns True if it became true."""
         end_s = time.monotonic() + seconds
         while time.monotonic() < end_s:
             # Also across calls: two poses of one millisecond are refused.
@@ -136,7 +136,7 @@ class Peer:
         require(self.drive(20.0, until=self.listener.permitted), f"no permit: {self.listener.reason()}")
 
     def wait(self, seconds, condition):
-        """Receives until a condition holds, and returns for how long. None if it does not hold in time."""
+        """Receives until a condition is true, and returns the elapsed time. None if it is not true in time."""
         begin = time.monotonic()
         while time.monotonic() - begin < seconds:
             if condition():

@@ -1,4 +1,4 @@
-//! One tag on a mounting sheet: where it belongs, its image, and room for what is measured.
+//! One tag on a mounting sheet: its planned pose, its image, and a table for the measured values.
 
 use super::elevation::{elevation, from_above, front_view};
 use super::place::OnWall;
@@ -49,7 +49,7 @@ pub(super) fn draw(picture: &mut Picture, top: f64, mounted: &Mounted, walls: &[
 }
 
 fn degrees(value: f64) -> String {
-    // No minus before zero.
+    // Avoids a minus sign before zero.
     signed(libm::round(value * 10.0) / 10.0)
 }
 
@@ -62,7 +62,7 @@ fn metres(value: f64) -> String {
     }
 }
 
-/// Returns what the installer must know, with what each line is about.
+/// Returns the instructions for the installer: the subject and the text of each line.
 fn lines(mounted: &Mounted, on: Option<&OnWall>) -> Vec<(&'static str, String)> {
     let pose = mounted.tag.pose;
     let mut lines = Vec::new();

@@ -58,11 +58,11 @@ pub(super) fn elevation(
     let [x, y] = at(on.along, mounted.tag.pose.z);
     square(picture, [x, y], mounted, scale);
     // The height, beyond the right end.
-    let beside = ends[1][0] + 22.0;
-    picture.line(&[[x, y], [beside, y]], &DIMENSION.dashed("3 3"));
-    picture.arrow([beside, floor], [beside, y], &DIMENSION);
+    let right = ends[1][0] + 22.0;
+    picture.line(&[[x, y], [right, y]], &DIMENSION.dashed("3 3"));
+    picture.arrow([right, floor], [right, y], &DIMENSION);
     let up = format!("{:.3} m", mounted.tag.pose.z);
-    picture.text([beside + 6.0, 0.5 * (floor + y) + 4.0], &up, &LABEL);
+    picture.text([right + 6.0, 0.5 * (floor + y) + 4.0], &up, &LABEL);
     // The distance from corner A, below the floor.
     let below = floor + 10.0;
     picture.line(&[[left, floor], [left, below + 4.0]], &DIMENSION);
@@ -72,7 +72,7 @@ pub(super) fn elevation(
     picture.text([left, below + 16.0], &along, &LABEL);
 }
 
-/// Draws the tag to scale, or as the smallest square that is seen.
+/// Draws the tag to scale, or as the smallest visible square.
 fn square(picture: &mut Picture, [x, y]: [f64; 2], mounted: &Mounted, scale: f64) {
     let edge = |edge: f64| {
         let edge = (edge * scale).max(SMALLEST);
@@ -101,11 +101,11 @@ pub(super) fn front_view(picture: &mut Picture, [left, top]: [f64; 2], mounted: 
     );
     picture.text([left + 226.0, floor + 4.0], "floor", &CAPTION);
     square(picture, [x, y], mounted, scale);
-    let beside = left + 160.0;
-    picture.arrow([beside, floor], [beside, y], &DIMENSION);
-    picture.line(&[[x, y], [beside, y]], &DIMENSION.dashed("3 3"));
+    let right = left + 160.0;
+    picture.arrow([right, floor], [right, y], &DIMENSION);
+    picture.line(&[[x, y], [right, y]], &DIMENSION.dashed("3 3"));
     let up = format!("{z:.3} m");
-    picture.text([beside + 6.0, 0.5 * (floor + y) + 4.0], &up, &LABEL);
+    picture.text([right + 6.0, 0.5 * (floor + y) + 4.0], &up, &LABEL);
 }
 
 /// Draws the tag from above, with the site's axes. The point is the upper left corner.
@@ -117,10 +117,10 @@ pub(super) fn from_above(picture: &mut Picture, [left, top]: [f64; 2], tag: &Tag
     );
     let [normal, across, _] = axes(&tag.pose);
     let [x, y] = [left + 104.0, top + 56.0];
-    let at = |along: f64, beside: f64| {
+    let at = |along: f64, right: f64| {
         [
-            x + along * normal[0] + beside * across[0],
-            y - along * normal[1] - beside * across[1],
+            x + along * normal[0] + right * across[0],
+            y - along * normal[1] - right * across[1],
         ]
     };
     picture.line(&[at(0.0, -20.0), at(0.0, 20.0)], &palette::TAG);

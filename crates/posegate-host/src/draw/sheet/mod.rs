@@ -1,4 +1,4 @@
-//! The mounting sheet: A4 pages with one block per tag, for the person who mounts the tags and measures where they are.
+//! The mounting sheet: A4 pages with one block per tag, for the person who mounts the tags and measures their poses.
 
 mod block;
 mod elevation;
@@ -15,15 +15,15 @@ use posegate::shape::{Tag, Tolerance, Wall};
 /// A tag that is to be mounted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mounted {
-    /// Its name in the site file.
+    /// The tag's name in the site file.
     pub name: String,
-    /// Its family, `tag36h11`.
+    /// The tag's family, such as `tag36h11`.
     pub family: String,
-    /// Its number, size and pose.
+    /// The tag's number, size and pose.
     pub tag: Tag,
     /// Installation error for which the tasks are proven; `None` if none is known.
     pub reserve: Option<Tolerance>,
-    /// What is left beyond the reserve, in centimetres and degrees; `None` if it is not known.
+    /// The additional error beyond the reserve, in centimetres and degrees; `None` if it is not known.
     pub left: Option<f64>,
 }
 
@@ -79,7 +79,7 @@ pub fn mounting_sheet(sheet: &MountingSheet<'_>) -> String {
     )
 }
 
-/// Returns the sheet as an HTML file that prints on A4, one page of it on each sheet of paper.
+/// Returns the sheet as an HTML file that prints each page on one sheet of A4 paper.
 #[must_use]
 pub fn mounting_sheet_html(sheet: &MountingSheet<'_>) -> String {
     let title_text = escaped(sheet.title);

@@ -1,4 +1,4 @@
-//! Where a tag is on a wall, as an installer measures it: along the wall from a corner, and up from the floor.
+//! The place of a tag on a wall as an installer measures it: along the wall from a corner, and up from the floor.
 
 use crate::draw::ingredients::axes;
 use posegate::shape::{Pose3Deg, Wall};
@@ -28,7 +28,8 @@ pub(super) struct OnWall {
 }
 
 impl OnWall {
-    /// Returns a tag's place on the nearest wall face that the tag is parallel to and touches; `None` if it is on no wall.
+    /// Returns a tag's place on the nearest wall face that the tag is parallel to and touches; `None` if the tag is
+    /// not on a wall.
     #[must_use]
     pub fn of(pose: &Pose3Deg, walls: &[Wall]) -> Option<Self> {
         let found = walls.iter().flat_map(|wall| faces(pose, wall));
@@ -38,7 +39,7 @@ impl OnWall {
     }
 }
 
-/// Returns the faces of a wall that a tag is flat on, with its distance from them.
+/// Returns the wall faces on which a tag is flat, with its distance from each.
 fn faces(pose: &Pose3Deg, wall: &Wall) -> Vec<(f64, OnWall)> {
     let count = wall.corners.len();
     let edges = if count == 2 { 1 } else { count };
@@ -129,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn the_left_end_is_that_of_a_viewer() {
+    fn left_end_is_left_for_a_viewer_of_the_wall() {
         // A viewer south of the wall looks north: west is on the left.
         let north = wall(&[[-2.0, 4.0], [12.0, 4.0]], vec![[[1.0, 2.0], [0.0, 1.0]]]);
         let south_face = OnWall::of(&pose(1.0, 4.0, -90.0), std::slice::from_ref(&north)).unwrap();
@@ -145,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_have_faces_outside_alone() {
+    fn blocks_have_only_outer_faces() {
         let block = wall(
             &[[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]],
             vec![[[4.25, 4.5], [0.0, 2.0]]],

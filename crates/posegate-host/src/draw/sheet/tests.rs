@@ -88,7 +88,7 @@ fn check(page: &str) {
 }
 
 #[test]
-fn texts_never_overlap() {
+fn texts_do_not_overlap() {
     let walls = [
         wall(
             "a wall with a name that is longer than any column of the sheet",
@@ -135,7 +135,7 @@ fn texts_never_overlap() {
 }
 
 #[test]
-fn a_block_says_what_is_measured_on_the_wall() {
+fn block_lists_the_values_to_measure_on_the_wall() {
     let walls = [wall("north", &[[-2.0, 4.0], [12.0, 4.0]], 2.5)];
     let mut tag = mounted("north-3", "tag36h11", 0, [4.5, 4.0, 0.6, -90.0]);
     tag.reserve = Some(Tolerance {

@@ -3,18 +3,20 @@
 use super::{Cells, Document, ErrorModel};
 
 impl ErrorModel {
-    /// Returns the model for tags of another size (m), seen by the camera of the data at the same mount. `lever` is the distance of
-    /// the camera from the robot's reference point along the floor, and `rise` how far a lean of the detector's pose moves the camera
-    /// along the floor: its height above the reference point times the sine of the largest lean, 0 for fits on the floor; both in
-    /// metres, or more. `None` if the model does not state the size of its tags, or a number is impossible.
+    /// Returns the model for tags of another size (m), seen by the camera of the data at the same mount. `lever` is
+    /// an upper bound of the distance of the camera from the robot's reference point along the floor. `rise` bounds
+    /// the displacement of the camera along the floor by a tilt of the detector's pose: its height above the
+    /// reference point times the sine of the largest tilt, 0 for fits on the floor. Both are in metres. `None` if the
+    /// model does not state the size of its tags, or a number is impossible.
     ///
-    /// A tag that is k times as large has the same image at k times the distance. So at the distance d the detector errs as it
-    /// does at d / k with the tags of the data: by the same angles, and by k times the length from tag to camera. The
-    /// robot's reference point is `lever` from the camera, and this length does not grow: with the bounds E (m) and Y
-    /// (rad) at d / k, the position errs by at most `k E + |1 - k| (Y lever + rise)`, and the yaw by Y. The share of the observations
-    /// for which both bounds hold is still [`ErrorModel::coverage`].
+    /// A tag that is k times as large has the same image at k times the distance. So at distance d, the angular
+    /// errors are those at d / k with the tags of the data, and lengths from tag to camera are k times as wrong. The
+    /// robot's reference point is `lever` from the camera, and this length does not grow. With the bounds E (m) and Y
+    /// (rad) at d / k, the position error is at most `k E + |1 - k| (Y lever + rise)`, and the yaw error Y. The share
+    /// of the observations within both bounds is still [`ErrorModel::coverage`].
     ///
-    /// Focal lengths are not scaled: another one changes the perspective in the image, and so the errors of the angles.
+    /// Focal lengths are not scaled: another focal length changes the perspective in the image, and thus the errors
+    /// of the angles.
     #[must_use]
     pub fn for_tags_of(&self, size: f64, lever: f64, rise: f64) -> Option<Self> {
         let taken_with = self.document.taken_with.clone()?;
@@ -46,7 +48,8 @@ impl ErrorModel {
                 Some((scaled, logits.clone()))
             }
         };
-        // Between corners the logarithms are linear. That of a sum is convex, so it is at most what its corners give.
+        // Between corners the logarithms are linear. The logarithm of a sum is convex, so it is at most the
+        // interpolation between the corners.
         let scaled = |[translation, yaw]: &[[f64; 8]; 2]| {
             let moved = |n: usize| {
                 let turned = (1.0 - k).abs() * (libm::exp(yaw[n]) * lever + rise);

@@ -1,19 +1,20 @@
-//! Every pose of the robot that the corners of tags leave open: one, or two if the tag's mirrored orientation fits too.
+//! Every pose of the robot that fits the corners of tags: one, or two if the tag's mirrored orientation fits too.
 //!
-//! At a fixed heading the least squares have one minimum over the position, and it is nearly quadratic. So the poses that fit within
-//! the wanted confidence are followed heading by heading from each minimum, outwards to where no position fits, or to the saddle
-//! that leads to the other minimum. The ellipsoid of a minimum is then grown until it holds all of these poses
-//! ([`covering`]). A valley that is curved or flat gives a large set, not a wrong one.
+//! At a fixed heading the sum of squares has one minimum over the position and is nearly quadratic. From each
+//! minimum, the poses that fit within the wanted confidence are followed heading by heading. A side ends where no
+//! position fits, or at the saddle that leads to the other minimum. The ellipsoid of a minimum is then grown until it
+//! contains all of these poses ([`covering`]). A curved or flat valley gives a large set, not a wrong one.
 //!
-//! **When the second minimum is left out.** If its sum of squares over sigma^2 is above that of the best one by at least 16, and by at
-//! least 1.5 times the squared radius of the pose-sets. For one tag, sigma = 0.3 px and confidence 0.99 this is
-//! `rms_2^2 >= rms_1^2 + 2.13 sigma^2`: a ratio of at least 2.1 for the usual `rms_1 = 0.61 sigma`. Noise makes the true pose fit worse
-//! than another one by d with a probability of about `exp(-d / 2)`, 2e-4 here. [`MARGIN`] makes up for that in the sets that are
-//! kept. If tags or camera have a tolerance, the difference is that of the worst place within it: a second minimum is left out only
-//! if it is clearly worse for all of them (to first order, as in `survey.rs`).
+//! **When the second minimum is excluded.** If its sum of squares over sigma^2 is above that of the best one by at
+//! least 16, and by at least 1.5 times the squared radius of the pose-sets. For one tag, sigma = 0.3 px and
+//! confidence 0.99 this is `rms_2^2 >= rms_1^2 + 2.13 sigma^2`: a ratio of at least 2.1 for the usual `rms_1 = 0.61
+//! sigma`. Noise makes the true pose fit worse than another pose by d with a probability of about `exp(-d / 2)`, 2e-4
+//! here. [`MARGIN`] compensates for that in the remaining sets. If tags or camera have a tolerance, the difference is
+//! that of the worst place within it: a second minimum is excluded only if it is clearly worse for all places (to
+//! first order, as in `survey.rs`).
 //!
-//! **Cost:** 2 ms on a PC, the mean of the poses in the tests; more for a tag that is seen head-on. No unbounded loop: a valley of more than [`MOST_STEPS`] steps is
-//! refused.
+//! **Cost:** 2 ms on a PC, the mean over the poses in the tests; more for a tag that is seen head-on. Every loop is
+//! bounded: a valley of more than [`MOST_STEPS`] steps is refused.
 
 use super::{
     APART, Fix, FixError, MountedCamera, STEP, TagObservation, View, apart, clearer, dot, misfit,
@@ -26,10 +27,11 @@ mod tests;
 
 /// Most poses of one observation.
 const MOST: usize = 2;
-/// By how much the covariance is larger than one that holds the sampled poses. The steps along the valley are small against it, and so
-/// is the probability that the true pose was left out: a chi-square quantile that is 4 % larger leaves room for at least 10 % of 1 - epsilon.
+/// The covariance is this much larger than one that contains the sampled poses. The steps along the valley are small
+/// compared with it. The probability that the true pose was excluded is small too: a chi-square quantile that is 4 %
+/// larger leaves a slack of at least 10 % of 1 - epsilon.
 const MARGIN: f64 = 1.04;
-/// Steps from a minimum to where the heading alone, to first order, leaves the ellipsoid.
+/// Steps from a minimum to the heading at which, to first order, the ellipsoid ends.
 const HEADINGS: f64 = 16.0;
 /// The largest step, radians.
 const LONGEST_STEP: f64 = 0.01;
@@ -41,18 +43,19 @@ const AROUND: f64 = 1.02;
 /// Most steps of a search at a fixed heading, and of the growth of one direction.
 const PLACE_STEPS: u32 = 30;
 const GROWTH_STEPS: u32 = 12;
-/// Most times that a search is continued, and how near to its start it then ends: metres and radians.
+/// Most times that a search is continued. It ends if it moves by less than this: metres and radians.
 const SEARCHES: u32 = 6;
 const SETTLED: f64 = 1e-6;
 
-/// Estimates the robot's pose: the best fit first, then the other one if the corners leave it open. The robot is at one of them. The
+/// Estimates the robot's pose: the best fit first, then the second one if the corners do not exclude it. The
 /// arguments are those of [`super::locate`].
 ///
-/// The union of the ellipsoids holds the true pose with the confidence of `radius_squared`, if the errors of the corners are independent
-/// and normal with at most the deviation `sigma_px`, and tags and camera are within their tolerances.
+/// The union of the ellipsoids contains the true pose with the confidence of `radius_squared`. This requires
+/// independent normal errors of the corners with at most the deviation `sigma_px`, and tags and camera within their
+/// tolerances.
 ///
 /// # Errors
-/// [`FixError`]; [`FixError::Ambiguous`] if more than two poses fit, or the poses that fit have no end.
+/// [`FixError`]; [`FixError::Ambiguous`] if more than two poses fit, or if the poses that fit are unbounded.
 pub fn locate_all(
     eye: &MountedCamera,
     seen: &[TagObservation<'_>],
@@ -67,11 +70,12 @@ pub fn locate_all(
         return Err(FixError::Misfit);
     }
     let balls = survey::balls(&view, eye, seen);
-    let room = radius_squared * variance;
+    let slack = radius_squared * variance;
     let mut basins: Vec<Basin> = Vec::new();
     let clearer = clearer(radius_squared) * variance;
     for found in found {
-        // A search that has not come to an end is no minimum: what matters is where it leads, or that it fits where it is.
+        // A search that has not converged is not a minimum: use the minimum that it leads to, or its own pose if that
+        // fits.
         let settled = view.settled(found);
         let minimum = settled.unwrap_or(found);
         if basins.iter().any(|basin| basin.has(&minimum)) {
@@ -88,9 +92,9 @@ pub fn locate_all(
         if basins.len() == MOST {
             return Err(FixError::Ambiguous);
         }
-        basins.push(view.basin(minimum, variance, room)?);
+        basins.push(view.basin(minimum, variance, slack)?);
     }
-    // Behind a saddle that fits there is another minimum: it must be known.
+    // Behind a saddle that fits is another minimum, which must be known.
     let is_known = |from: &Basin, minimum: &(f64, Vector3<f64>)| {
         let mut others = basins.iter().filter(|other| other.pose != from.pose);
         others.any(|other| other.has(minimum))
@@ -126,11 +130,11 @@ struct Basin {
     covariance: Matrix3<f64>,
     /// The step of the heading, radians.
     step: f64,
-    /// Its range relative to the minimum's, up to where no position fits or to a saddle.
+    /// The range of headings relative to the minimum's, up to a heading without a position that fits, or to a saddle.
     ends: [f64; 2],
     /// The minima behind its saddles, if a position fits at the saddle.
     behind: Vec<(f64, Vector3<f64>)>,
-    /// Poses relative to the minimum whose hull holds all that fit.
+    /// Poses relative to the minimum; their hull contains all poses that fit.
     points: Vec<Vector3<f64>>,
 }
 
@@ -156,11 +160,11 @@ impl View<'_> {
         &self,
         (cost, pose): (f64, Vector3<f64>),
         variance: f64,
-        room: f64,
+        slack: f64,
     ) -> Result<Basin, FixError> {
         let (information, _) = self.normal_equations(&pose).ok_or(FixError::NoPose)?;
         let covariance = information.cholesky().ok_or(FixError::NoPose)?.inverse() * variance;
-        let reach = libm::sqrt(covariance[(2, 2)] * room / variance);
+        let reach = libm::sqrt(covariance[(2, 2)] * slack / variance);
         let mut basin = Basin {
             pose,
             cost,
@@ -170,7 +174,7 @@ impl View<'_> {
             behind: Vec::new(),
             points: Vec::new(),
         };
-        let level = cost + room;
+        let level = cost + slack;
         let middle = self.place(pose).ok_or(FixError::NoPose)?;
         self.positions(&mut basin, &middle, level)?;
         for (side, sign) in [(0, -1.0), (1, 1.0)] {
@@ -179,7 +183,8 @@ impl View<'_> {
         Ok(basin)
     }
 
-    /// Follows the valley to one side, up to where no position fits; or over a saddle to the minimum behind it.
+    /// Follows the valley to one side, up to a heading at which no position fits, or over a saddle to the minimum
+    /// behind it.
     fn follow(
         &self,
         basin: &mut Basin,
@@ -198,7 +203,7 @@ impl View<'_> {
             let place = self.place(start);
             if !falls {
                 basin.ends[side] = yaw;
-                // Behind the camera nothing fits.
+                // Nothing fits behind the camera.
                 let Some(place) = &place else {
                     return Ok(());
                 };
@@ -206,7 +211,7 @@ impl View<'_> {
                 if !(place.cost < level) {
                     return Ok(());
                 }
-                // Not the last bits of a flat valley.
+                // Ignores rounding errors in a flat valley.
                 falls = place.cost < highest - 1e-9 * level;
             } else if !place.as_ref().is_some_and(|place| place.cost < highest) {
                 let behind = self.descended(before).ok_or(FixError::Ambiguous)?;
@@ -219,7 +224,7 @@ impl View<'_> {
         Err(FixError::Ambiguous)
     }
 
-    /// Returns the position that fits best at the heading of a pose, from its position on.
+    /// Returns the position that fits best at the heading of a pose, searched from its position.
     fn place(&self, start: Vector3<f64>) -> Option<Place> {
         let mut pose = start;
         let mut cost = self.cost(&pose)?;
@@ -248,9 +253,9 @@ impl View<'_> {
         })
     }
 
-    /// Returns `J'J` and `J'e` by the position alone.
+    /// Returns `J'J` and `J'e` with respect to the position alone.
     fn position_equations(&self, pose: &Vector3<f64>) -> Option<(Matrix2<f64>, Vector2<f64>)> {
-        let left = self.residuals(pose)?;
+        let residuals = self.residuals(pose)?;
         let column = |axis: Vector3<f64>| {
             let step = axis * STEP;
             slopes(
@@ -260,11 +265,11 @@ impl View<'_> {
         };
         let columns = [column(Vector3::x())?, column(Vector3::y())?];
         let information = Matrix2::from_fn(|r, c| dot(&columns[r], &columns[c]));
-        let gradient = Vector2::from_fn(|r, _| dot(&columns[r], &left));
+        let gradient = Vector2::from_fn(|r, _| dot(&columns[r], &residuals));
         Some((information, gradient))
     }
 
-    /// Adds poses whose hull holds all positions that fit at a heading.
+    /// Adds poses whose hull contains all positions that fit at a heading.
     fn positions(&self, basin: &mut Basin, place: &Place, level: f64) -> Result<(), FixError> {
         let yaw = Vector3::new(0.0, 0.0, wrapped(place.pose.z - basin.pose.z));
         let to = |pose: Vector3<f64>| {
@@ -272,21 +277,21 @@ impl View<'_> {
             Vector3::new(away.x, away.y, 0.0) + yaw
         };
         let mut points = vec![to(place.pose)];
-        let room = level - place.cost;
-        if room > 0.0 {
+        let slack = level - place.cost;
+        if slack > 0.0 {
             let factor = place.information.cholesky().ok_or(FixError::NoPose)?;
             for k in 0..DIRECTIONS {
                 let turn = core::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
-                let unit = Vector2::new(libm::cos(turn), libm::sin(turn)) * libm::sqrt(room);
-                let way = factor
+                let unit = Vector2::new(libm::cos(turn), libm::sin(turn)) * libm::sqrt(slack);
+                let direction = factor
                     .l()
                     .transpose()
                     .try_inverse()
                     .ok_or(FixError::NoPose)?
                     * unit;
-                let way = Vector3::new(way.x, way.y, 0.0);
+                let direction = Vector3::new(direction.x, direction.y, 0.0);
                 let fits = |share: f64| {
-                    let cost = self.cost(&(place.pose + way * share));
+                    let cost = self.cost(&(place.pose + direction * share));
                     cost.is_some_and(|cost| cost < level)
                 };
                 let mut share = AROUND;
@@ -298,14 +303,14 @@ impl View<'_> {
                         return Err(FixError::Ambiguous);
                     }
                 }
-                points.push(to(place.pose + way * share));
+                points.push(to(place.pose + direction * share));
             }
         }
         basin.points.extend(points);
         Ok(())
     }
 
-    /// Continues a search until it stays where it is. `None` if it does not.
+    /// Continues a search until it no longer moves. `None` if it does not converge.
     fn settled(&self, found: (f64, Vector3<f64>)) -> Option<(f64, Vector3<f64>)> {
         let mut now = found;
         for _ in 0..SEARCHES {
@@ -318,7 +323,8 @@ impl View<'_> {
         None
     }
 
-    /// Returns by how much tags and camera within their tolerances can change the difference of the costs of two minima, to first order.
+    /// Returns how much tags and camera within their tolerances can change the difference of the costs of two minima,
+    /// to first order.
     fn bias(
         &self,
         best: &(f64, Vector3<f64>),
@@ -327,10 +333,10 @@ impl View<'_> {
     ) -> f64 {
         let own = other.0 - best.0;
         let difference = |view: &View<'_>| {
-            let (best, beside) = view.descended(best.1)?;
+            let (best, neighbour) = view.descended(best.1)?;
             let minimum = view.descended(other.1).filter(|(_, pose)| {
-                // Not if the other minimum is gone, and the search leads to the best one.
-                apart(pose, &beside) > 0.5 * apart(&other.1, &beside)
+                // The other minimum may be gone, so that the search leads to the best one.
+                apart(pose, &neighbour) > 0.5 * apart(&other.1, &neighbour)
             });
             let other = minimum
                 .map(|(cost, _)| cost)
@@ -352,11 +358,11 @@ impl View<'_> {
     }
 }
 
-/// Returns a covariance whose ellipsoid holds all poses of a basin, and the largest ratio to the first-order one in any direction.
-/// `None` if the first-order one is not positive definite.
+/// Returns a covariance whose ellipsoid contains all poses of a basin, and the largest ratio to the first-order one
+/// in any direction. `None` if the first-order one is not positive definite.
 ///
-/// Each pose that is outside stretches the ellipsoid along the direction to it, so that it is on the border: the smallest
-/// ellipsoid about the same centre that holds the one before and the pose.
+/// Each pose outside of the ellipsoid stretches it along the direction to that pose, which is then on the border. The
+/// result is the smallest ellipsoid about the same centre that contains the previous one and the pose.
 fn covering(basin: &Basin, radius_squared: f64) -> Option<(Matrix3<f64>, f64)> {
     let first = basin.covariance * radius_squared;
     let mut shape = first;

@@ -2,19 +2,18 @@
 //!
 //! If a tag or the camera is off by theta, the least-squares pose is off by `(J'J)^-1 J' K theta`, K being the Jacobian
 //! of the projection by theta (to first order, like the covariance). Each tolerance is a ball of theta: a translation
-//! of the tag, its rotation about the vertical, a translation of the camera, its rotation about any axis. So each one
-//! moves the pose within an ellipsoid. The sum of these ellipsoids and that of the noise lies in the ellipsoid
-//! `(sum p) (sum Q / p)`, for all numbers p above 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the size of each
-//! ellipsoid in the metric of the noise. Unlike a 6-DoF pose of one tag, a fit on the floor mistakes a leaning camera
-//! for a nearer or farther tag, so a small angle may have a large effect.
-//! one tag, a fit on the floor takes a camera that leans for a tag that is nearer or farther: a small angle may do much.
+//! of the tag, its rotation about the vertical, a translation of the camera, its rotation about any axis. So each
+//! tolerance moves the pose within an ellipsoid. The sum of these ellipsoids and that of the noise lies in the
+//! ellipsoid `(sum p) (sum Q / p)`, for all numbers p above 0 (Kurzhanski and Valyi, Ellipsoidal Calculus); p is the
+//! size of each ellipsoid in the metric of the noise. Unlike a 6-DoF pose of one tag, a fit on the floor mistakes a
+//! tilted camera for a nearer or farther tag, so a small angle may have a large effect.
 
 use super::{MountedCamera, STEP, TagObservation, View, dot, slopes};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// A tolerance: a ball of displacements of a tag or of the camera.
 pub(super) struct Ball<'v, 'e> {
-    /// Its radius, metres or radians, above 0.
+    /// The ball's radius, metres or radians, above 0.
     pub(super) size: f64,
     /// The view after a displacement along each of its axes.
     pub(super) axes: Vec<Moved<'v, 'e>>,
@@ -107,8 +106,8 @@ pub(super) fn shifts(
     Some(all)
 }
 
-/// Returns a covariance whose ellipsoid with this radius holds every sum of an error of the given covariance and of the
-/// shifts; `None` if the given one is not positive definite.
+/// Returns a covariance whose ellipsoid with this radius contains every sum of an error of the given covariance and
+/// of the shifts; `None` if the given covariance is not positive definite.
 pub(super) fn widened(
     covariance: Matrix3<f64>,
     radius_squared: f64,

@@ -69,7 +69,7 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
 /// The image for Reference set A's camera and tag, computed by hand: a tag straight ahead is a square of 615 * 0.3 /
 /// 3.75 pixels around the image centre. The first corner is the bottom left one.
 #[test]
-fn corners_are_where_they_are_by_hand() {
+fn projected_corners_equal_hand_computed_ones() {
     let eye = MountedCamera {
         mount: Pose3Deg {
             x: 0.25,
@@ -95,7 +95,7 @@ fn corners_are_where_they_are_by_hand() {
 }
 
 #[test]
-fn exact_corners_give_the_pose_back() {
+fn exact_corners_give_the_true_pose() {
     let eye = eye();
     for (pose, tag) in [
         ([0.0, 0.0, 0.0], tag(2.0, 0.8, 205.0)),
@@ -115,9 +115,9 @@ fn exact_corners_give_the_pose_back() {
     }
 }
 
-/// 4,000 noisy observations per pose: the reported covariance is that of the fixes, and e' P^-1 e is 3 on average.
+/// 4,000 noisy observations per pose: the reported covariance is that of the fixes, and the mean of e' P^-1 e is 3.
 #[test]
-fn the_covariance_is_that_of_simulated_noise() {
+fn covariance_equals_that_of_simulated_noise() {
     let eye = eye();
     let pose = [0.3, -0.2, 0.1];
     let (one, two) = (tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0));
@@ -126,7 +126,7 @@ fn the_covariance_is_that_of_simulated_noise() {
         let mut noise = normal(0x9e37_79b9_7f4a_7c15 + seed);
         let mut scaled = || sigma * noise();
         let mut sum = Matrix3::<f64>::zeros();
-        let mut told = Matrix3::<f64>::zeros();
+        let mut reported = Matrix3::<f64>::zeros();
         let mut nees = 0.0;
         for _ in 0..rounds {
             let seen: Vec<TagObservation<'_>> = tags
@@ -142,18 +142,21 @@ fn the_covariance_is_that_of_simulated_noise() {
             let covariance = Matrix3::from_fn(|r, c| fix.covariance[r][c]) / fix.grown;
             let error = Vector3::from_fn(|r, _| fix.pose[r] - pose[r]);
             sum += error * error.transpose();
-            told += covariance;
+            reported += covariance;
             nees += (covariance.try_inverse().unwrap() * error).dot(&error);
         }
-        let (sum, told) = (sum / f64::from(rounds), told / f64::from(rounds));
+        let (sum, reported) = (sum / f64::from(rounds), reported / f64::from(rounds));
         // The variance of 4,000 draws has a standard deviation of 2.2 %.
         for axis in 0..3 {
-            let ratio = sum[(axis, axis)] / told[(axis, axis)];
+            let ratio = sum[(axis, axis)] / reported[(axis, axis)];
             assert!((ratio - 1.0).abs() < 0.09, "axis {axis}: {ratio}");
         }
         for (r, c) in [(0, 1), (0, 2), (1, 2)] {
-            let size = libm::sqrt(told[(r, r)] * told[(c, c)]);
-            assert!((sum[(r, c)] - told[(r, c)]).abs() < 0.09 * size, "{r} {c}");
+            let size = libm::sqrt(reported[(r, r)] * reported[(c, c)]);
+            assert!(
+                (sum[(r, c)] - reported[(r, c)]).abs() < 0.09 * size,
+                "{r} {c}"
+            );
         }
         // Its standard deviation is sqrt(6 / 4,000).
         let mean = nees / f64::from(rounds);
@@ -163,7 +166,7 @@ fn the_covariance_is_that_of_simulated_noise() {
 
 /// Far away and head-on, noise hides the difference between the tag's two possible orientations.
 #[test]
-fn poses_that_pixels_do_not_tell_apart_are_no_fix() {
+fn ambiguous_pixels_give_no_fix() {
     let eye = eye();
     let far = tag(6.0, 1.2, 190.0);
     let mut noise = normal(77);
@@ -180,7 +183,7 @@ fn poses_that_pixels_do_not_tell_apart_are_no_fix() {
 }
 
 #[test]
-fn what_does_not_fit_is_told() {
+fn corners_that_do_not_fit_are_an_error() {
     let eye = eye();
     let near = tag(2.0, 0.4, 205.0);
     let mut pixels = corners(&eye, &near, [0.0; 3], &mut || 0.0);
@@ -209,10 +212,10 @@ fn what_does_not_fit_is_told() {
     }
 }
 
-/// Six poses in front of the dock's camera and tag, from oblique to head-on, with 600 observations each, with exactly
-/// the stated noise. Of the accepted fixes at each pose, 99 % of the sets contain the truth.
+/// Six poses in front of the dock's camera and tag, from oblique to head-on, with 600 observations each and exactly
+/// the stated noise. At each pose, 99 % of the sets of accepted fixes contain the truth.
 #[test]
-fn sets_of_accepted_fixes_hold_the_truth() {
+fn sets_of_accepted_fixes_contain_the_truth() {
     let level = Pose3Deg {
         x: 0.25,
         y: 0.0,
@@ -235,7 +238,7 @@ fn sets_of_accepted_fixes_hold_the_truth() {
         [0.0, 0.0, 0.0],
         [-1.0, 1.5, -0.3],
     ];
-    let told: Vec<(f64, f64)> = poses
+    let counts: Vec<(f64, f64)> = poses
         .par_iter()
         .enumerate()
         .map(|(k, pose)| {
@@ -259,19 +262,19 @@ fn sets_of_accepted_fixes_hold_the_truth() {
             (accepted, held)
         })
         .collect();
-    for ((accepted, held), pose) in told.iter().zip(poses) {
+    for ((accepted, held), pose) in counts.iter().zip(poses) {
         // With a coverage of 99 %, fewer hits than this happen once in 1,000 times (3.1 standard deviations, and one).
         let least = 0.99 * accepted - 3.1 * libm::sqrt(0.0099 * accepted) - 1.0;
-        assert!(*held >= least, "{pose:?}: {held} of {accepted}; {told:?}");
+        assert!(*held >= least, "{pose:?}: {held} of {accepted}; {counts:?}");
     }
     // Oblique observations are accepted.
-    assert!(told[0].0 > 300.0, "{told:?}");
+    assert!(counts[0].0 > 300.0, "{counts:?}");
 }
 
-/// Tag and camera at the ends of their tolerances, or anywhere within: the set around the fix contains the true pose.
-/// The set computed without the tolerances does not.
+/// Tag and camera at the ends of their tolerances or within them: the set around the fix contains the true pose. The
+/// set computed without the tolerances does not.
 #[test]
-fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
+fn set_contains_pose_for_tag_and_camera_within_tolerance() {
     let mut state = normal(77);
     let mut direction = move || loop {
         let v = Vector3::from_fn(|_, _| state());
@@ -297,8 +300,8 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
     let (mut fixes, mut missed, mut farthest) = (0, 0, 0.0f64);
     for round in 0..800 {
         let pose = [0.3, -0.2, 0.1];
-        let hung = [tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0)];
-        let hung = &hung[..1 + round % 2];
+        let mounted = [tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0)];
+        let mounted = &mounted[..1 + round % 2];
         // The true places of tag and camera.
         let turned = |pose: &Pose3Deg, turn: Vector3<f64>, way: Vector3<f64>| {
             let own = isometry(pose);
@@ -322,7 +325,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             ),
             ..exact
         };
-        let looks: Vec<[[f64; 2]; 4]> = hung
+        let looks: Vec<[[f64; 2]; 4]> = mounted
             .iter()
             .map(|tag| {
                 let sign = if direction().x > 0.0 { 1.0 } else { -1.0 };
@@ -336,7 +339,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             .collect();
         // The square of the pose's relative position between the centre (0) and the border (1) of the set.
         let share = |eye: &MountedCamera, tolerance: Tolerance| {
-            let seen: Vec<TagObservation<'_>> = hung
+            let seen: Vec<TagObservation<'_>> = mounted
                 .iter()
                 .zip(&looks)
                 .map(|(tag, corners_px)| TagObservation {
@@ -352,7 +355,7 @@ fn the_set_holds_the_pose_wherever_tag_and_camera_are() {
             Some((away.transpose() * covariance.cholesky()?.solve(&away)).x / R2)
         };
         let share_without = |eye: &MountedCamera| share(eye, Tolerance::NONE).unwrap_or(0.0);
-        // A displaced tag may fit no pose: then neither variant has a fix.
+        // No pose may fit a displaced tag: then neither variant has a fix.
         if let Some(share) = share(&tolerant, off) {
             assert!(share <= 1.0, "round {round}: {share}");
             farthest = farthest.max(share);

@@ -44,7 +44,7 @@ fn tag() -> FoundTag {
 }
 
 #[test]
-fn a_known_tag_gives_a_pose() {
+fn known_tag_gives_a_pose() {
     let detector = detector();
     let camera = detector.camera(&info()).unwrap();
     let other = FoundTag { id: 99, ..tag() };
@@ -56,7 +56,7 @@ fn a_known_tag_gives_a_pose() {
 }
 
 #[test]
-fn detections_that_cannot_be_used_are_named() {
+fn unusable_detections_have_their_own_errors() {
     let detector = detector();
     let camera = detector.camera(&info()).unwrap();
     let change = |change: &dyn Fn(&mut FoundTag)| {
@@ -115,7 +115,7 @@ fn detections_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn a_calibration_that_is_not_the_sites_is_refused() {
+fn calibration_of_another_camera_is_refused() {
     let detector = detector();
     let change = |change: &dyn Fn(&mut CameraInfo)| {
         let mut info = info();
@@ -145,7 +145,7 @@ fn a_calibration_that_is_not_the_sites_is_refused() {
             "`plumb_bob` with 3 coefficients",
         ),
     ] {
-        // The rectified image of a pinhole site is compared too: give it the same fault.
+        // The rectified image of a pinhole site is also compared: give it the same fault.
         let mut info = info;
         info.p = [
             info.k[0], 0.0, info.k[2], 0.0, 0.0, info.k[4], info.k[5], 0.0, 0.0, 0.0, 1.0, 0.0,
@@ -163,13 +163,13 @@ fn a_calibration_that_is_not_the_sites_is_refused() {
     });
     let camera = detector.camera(&lens).unwrap().camera;
     assert_eq!((camera.fx, camera.lens()), (615.0, Lens::Pinhole));
-    // A small difference is the calibration's, and its numbers are used.
+    // A small difference is accepted, and the published numbers are used.
     let near = change(&|info| info.k[0] = 616.0);
     assert_eq!(detector.camera(&near).unwrap().camera.fx, 616.0);
 }
 
 #[test]
-fn a_site_without_the_camera_is_refused() {
+fn site_without_the_camera_is_refused() {
     let mut site = Site::parse(SAMPLE, "site.toml").unwrap();
     let error = |site: &Site, name| Detector::new(site, name, SETTINGS).unwrap_err().to_string();
     assert!(error(&site, Some("rear")).contains("no camera `rear`: it has front"));
@@ -183,19 +183,19 @@ fn a_site_without_the_camera_is_refused() {
     assert!(error(&site, None).contains("no tag: add"));
 }
 
-/// Two tags that look the same would be taken for each other, and a calibration that may be off is in no pose-set.
+/// Tags with equal family and number cannot be identified. The tolerance of a calibration is not in the pose-set.
 #[test]
-fn sites_that_an_image_does_not_tell_apart_are_refused() {
+fn equal_tags_and_calibration_tolerance_are_refused() {
     let new = |site: &str| {
         let site = Site::parse(site, "site.toml").unwrap();
         Detector::new(&site, Some("front"), SETTINGS).map(|_| ())
     };
     let twin = "[tag.other]\nid = 7\nfamily = \"36h11\"\nsize = 0.3\npose = { x = 9.0, y = 9.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
-    let alike = DetectorError::Alike(AlikeTags {
+    let expected = DetectorError::Alike(AlikeTags {
         first: "other".into(),
         second: "t7".into(),
     });
-    assert_eq!(new(&format!("{SAMPLE}\n{twin}")), Err(alike));
+    assert_eq!(new(&format!("{SAMPLE}\n{twin}")), Err(expected));
     assert_eq!(
         new(&format!("{SAMPLE}\n{}", twin.replace("id = 7", "id = 8"))),
         Ok(())
@@ -207,9 +207,9 @@ fn sites_that_an_image_does_not_tell_apart_are_refused() {
     assert_eq!(new(&loose), Err(DetectorError::Calibration("front".into())));
 }
 
-/// A copy with corrected bits is a copy all the same.
+/// A second detection of a tag is a contradiction even if it has corrected bits.
 #[test]
-fn a_tag_that_is_seen_twice_is_a_contradiction_whatever_its_bits() {
+fn tag_detected_twice_is_a_contradiction() {
     let detector = detector();
     let camera = detector.camera(&info()).unwrap();
     let weak = FoundTag {

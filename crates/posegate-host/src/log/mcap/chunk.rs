@@ -1,4 +1,4 @@
-//! The records of a chunk, after the whole chunk was checked.
+//! The records of a chunk, after the complete chunk was checked.
 
 use super::records::{BadRecord, channel, chunk, message, schema};
 use super::unpack::{BadData, Compression, unpacked};
@@ -27,12 +27,12 @@ pub(in crate::log) enum BadChunk {
     /// The stated size is larger than its compressed bytes can hold.
     #[error("a chunk of {size} bytes in {compressed} compressed ones")]
     Ratio { size: u64, compressed: usize },
-    /// All chunks together are too many times larger than the file.
+    /// All chunks together exceed the allowed ratio to the size of the file.
     #[error(
         "the chunks are together more than {times} times as large as the file: a chunk of {size} bytes"
     )]
     Bomb { size: u64, times: u64 },
-    /// Its records cannot be decompressed.
+    /// The chunk's records cannot be decompressed.
     #[error(transparent)]
     Data(#[from] BadData),
     /// The records do not have the stated checksum.
@@ -47,7 +47,7 @@ pub(in crate::log) struct Budget {
 }
 
 impl Budget {
-    /// Recordings of robots that stand still compress by a factor of some hundred.
+    /// Recordings of robots that do not move compress by a factor of some hundred.
     const TIMES: u64 = 1000;
     /// The number of bytes that even a small file may produce.
     const AT_LEAST: u64 = 1 << 28;
@@ -74,7 +74,7 @@ impl Budget {
 /// messages are readable.
 ///
 /// # Errors
-/// [`BadChunk`]: nothing of the chunk may be used.
+/// [`BadChunk`]: no part of the chunk may be used.
 pub(in crate::log) fn records(body: &[u8], budget: &mut Budget) -> Result<Vec<u8>, BadChunk> {
     let chunk = chunk(body)?;
     let size = chunk.uncompressed_size;

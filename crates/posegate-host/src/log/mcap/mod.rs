@@ -1,7 +1,7 @@
 //! MCAP files, <https://mcap.dev/spec>: reads the records of a recording, writes the channels of a replay.
 //!
-//! Entry points: [`records`] and [`chunk`] parse records, [`Writer`] writes a file. Every length is compared with the bytes that are
-//! there before anything is reserved for it.
+//! Entry points: [`records`] and [`chunk`] parse records, [`Writer`] writes a file. Every length is compared with the
+//! existing bytes before memory is reserved for it.
 
 pub(super) use self::writer::{Head, Writer};
 

@@ -1,5 +1,5 @@
-//! The records of an MCAP file that are read: every length is checked against the bytes that are there, and nothing is reserved
-//! for it.
+//! The records of an MCAP file that are read. Every length is compared with the existing bytes, so no memory is
+//! reserved for missing ones.
 
 use std::str;
 
@@ -54,7 +54,7 @@ pub(in crate::log) struct Chunk<'b> {
     pub data: &'b [u8],
 }
 
-/// The fields of a record, taken from its start.
+/// The unread fields of a record.
 struct Fields<'b>(&'b [u8]);
 
 impl<'b> Fields<'b> {
@@ -167,7 +167,7 @@ mod tests {
 
     /// Each topic stores the names of its schema: a name of 16 MiB with a hundred topics would take 1.6 GB.
     #[test]
-    fn long_names_are_refused() {
+    fn names_above_the_limit_are_refused() {
         for (length, is_name) in [(LONGEST_NAME, true), (LONGEST_NAME + 1, false)] {
             let mut body = Vec::from([1, 0]);
             body.extend((length as u32).to_le_bytes());
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn cut_records_are_refused_at_every_length() {
+    fn truncated_records_are_refused_at_every_length() {
         let schema_bytes = [[1, 0].to_vec(), text("a/B"), text("ros2msg"), text("x")].concat();
         let channel_bytes = [[1, 0, 2, 0].to_vec(), text("/t"), text("cdr")].concat();
         assert_eq!(schema(&schema_bytes).map(|s| s.definition), Ok(&b"x"[..]));

@@ -92,7 +92,7 @@ fn after_skippable(data: &[u8]) -> Option<&[u8]> {
         return None;
     }
     let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
-    // A frame that is cut off skips everything: the records are then too short.
+    // A truncated frame skips everything: the records are then too short.
     Some(rest.get(length..).unwrap_or_default())
 }
 
@@ -109,10 +109,10 @@ fn zstd_frame(data: &mut &[u8], output: &mut Vec<u8>, size: usize) -> Result<(),
     let mut decoded = 0;
     loop {
         let step = STEP.min(needed - decoded + 1);
-        let is_whole = decoder
+        let is_complete = decoder
             .decode_blocks(&mut *data, BlockDecodingStrategy::UptoBytes(step))
             .map_err(|error| damaged(&error))?;
-        if !is_whole {
+        if !is_complete {
             decoded += step;
         }
         if decoded > needed || decoder.can_collect() > size - output.len() {
@@ -121,7 +121,7 @@ fn zstd_frame(data: &mut &[u8], output: &mut Vec<u8>, size: usize) -> Result<(),
         decoder
             .collect_to_writer(&mut *output)
             .map_err(|error| damaged(&error))?;
-        if is_whole {
+        if is_complete {
             break;
         }
     }
@@ -134,7 +134,7 @@ fn zstd_frame(data: &mut &[u8], output: &mut Vec<u8>, size: usize) -> Result<(),
 
 /// Decodes one LZ4 frame. The decoder holds a few blocks, at most 4 MiB each (8 MiB in the legacy format).
 fn lz4_frame(data: &mut &[u8], output: &mut Vec<u8>, size: usize) -> Result<(), BadData> {
-    // One byte more tells a longer frame from one that fits. `take` keeps the output from growing further.
+    // One extra byte distinguishes a longer frame from a frame of the stated size. `take` limits the output.
     let needed = (size - output.len()) as u64 + 1;
     Lz4::new(data)
         .take(needed)
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_give_back_their_content() {
+    fn frames_decompress_to_their_content() {
         for length in [0, 1, 1000, 200_000, 5_000_000] {
             let content = content(length);
             for (compression, data) in [
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn several_frames_are_one_content() {
+    fn content_of_several_frames_is_joined() {
         let mut skippable = (SKIPPABLE + 3).to_le_bytes().to_vec();
         skippable.extend([3, 0, 0, 0, 9, 9, 9]);
         let content = content(300_000);
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn other_sizes_than_stated_are_errors() {
+    fn content_of_another_size_than_stated_is_an_error() {
         let content = content(3_000_000);
         for (compression, data) in [
             (Compression::None, content.clone()),

@@ -59,14 +59,14 @@ pub fn absolute(matched: &Matched) -> Errors {
 /// P, for every pair (i, j).
 #[must_use]
 pub fn relative(matched: &Matched, pairs: Pairs) -> Errors {
-    let way = |from: &Stamped, to: &Stamped| -> (Vector3<f64>, UnitQuaternion<f64>) {
+    let motion = |from: &Stamped, to: &Stamped| -> (Vector3<f64>, UnitQuaternion<f64>) {
         let back = from.rotation.inverse();
         (back * (to.position - from.position), back * to.rotation)
     };
     let mut errors = Errors::default();
     for (i, j) in pairs.of(&matched.estimate) {
-        let (moved, turned) = way(&matched.reference[i], &matched.reference[j]);
-        let (own, own_turned) = way(&matched.estimate[i], &matched.estimate[j]);
+        let (moved, turned) = motion(&matched.reference[i], &matched.reference[j]);
+        let (own, own_turned) = motion(&matched.estimate[i], &matched.estimate[j]);
         errors.push((own - moved).norm(), &(turned.inverse() * own_turned));
     }
     errors

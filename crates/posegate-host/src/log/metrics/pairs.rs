@@ -12,7 +12,7 @@ pub enum PairError {
         "the largest difference of times is {0} s; expected a finite number that is not below 0"
     )]
     Difference(f64),
-    /// No two times are near enough.
+    /// No two times are close enough.
     #[error(
         "no pose of one has a pose of the other within {most} s: the reference is from {reference:?} s, the estimate from {estimate:?} s; expected the same clock"
     )]
@@ -84,7 +84,7 @@ pub fn associated(
     }
 }
 
-/// Which pairs of poses relative errors are computed for.
+/// The pairs of poses for which relative errors are computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pairs {
     /// This many poses apart, one pair after the other: (0, n), (n, 2 n), ...

@@ -39,7 +39,7 @@ fn rmse(reference: &[Stamped], estimate: &[Stamped], align: Align) -> [f64; 2] {
 }
 
 #[test]
-fn alignments_undo_what_they_can() {
+fn alignment_removes_rotation_shift_and_scale() {
     let reference = curve(50, 0.1, 0.0);
     for (scale, align, exact) in [
         (1.0, Align::Se3, true),
@@ -73,7 +73,7 @@ fn alignments_undo_what_they_can() {
     let mut mirrored = curve(50, 0.1, 0.0);
     mirrored.iter_mut().for_each(|pose| pose.position.z *= -1.0);
     assert!(rmse(&reference, &mirrored, Align::Se3)[0] > 0.05);
-    // Along a line no rotation is the best one.
+    // Along a line all rotations about the line fit equally well.
     let mut line = curve(50, 0.1, 0.0);
     line.iter_mut()
         .for_each(|pose| pose.position = Vector3::new(pose.t_s, 0.0, 0.0));
@@ -83,7 +83,7 @@ fn alignments_undo_what_they_can() {
 }
 
 #[test]
-fn poses_are_matched_by_time() {
+fn poses_are_matched_to_the_nearest_time() {
     let (reference, estimate) = (curve(100, 0.1, 0.0), curve(30, 0.25, 0.04));
     // 0.04, 0.29, 0.54, ...: 0.04 or 0.01 away.
     assert_eq!(
@@ -156,7 +156,7 @@ fn pairs_are_frames_or_metres_apart() {
 }
 
 #[test]
-fn statistics_of_four() {
+fn statistics_of_four_errors_equal_hand_computed_ones() {
     let of = Statistics::of(&[4.0, 1.0, 2.0, 2.0]).unwrap();
     assert_eq!(
         (of.count, of.mean, of.median, of.min, of.max),
@@ -178,7 +178,7 @@ fn statistics_of_four() {
 
 /// An error in the estimate's own frame, compared with a set that is longer than wide.
 #[test]
-fn errors_are_held_against_the_task() {
+fn errors_are_compared_with_the_success_set() {
     let site = Site::parse(SAMPLE, "site.toml").unwrap();
     let dock = &site.tasks["dock"].success;
     let at = |x: f64, y: f64, yaw: f64| Stamped {
@@ -187,7 +187,7 @@ fn errors_are_held_against_the_task() {
         rotation: UnitQuaternion::from_euler_angles(0.0, 0.0, yaw),
     };
     let quarter = core::f64::consts::FRAC_PI_2;
-    // 7 cm ahead of the estimate is inside, 7 cm beside it is not.
+    // 7 cm ahead of the estimate is inside, 7 cm to its side is not.
     let matched = Matched {
         reference: std::vec![
             at(5.0, 3.07, quarter),

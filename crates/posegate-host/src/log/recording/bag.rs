@@ -1,7 +1,7 @@
 //! ROS 2 bags in MCAP, read from start to end. No index is needed, and memory does not grow with the file.
 
+use super::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 use super::message::{Content, Kind, Message, decoded};
-use super::told::{ReaderDiagnostics, SkipReason, Skipped};
 use super::transforms::{Composer, FrameNames, Pose, Transform};
 use super::{Exact, Item, Recording, RecordingError, Sample, TruePose};
 use crate::log::mcap::chunk::{self, Budget, LARGEST};
@@ -20,7 +20,7 @@ const LONGEST_NAMED: usize = 1 << 20;
 const MOST_NAMED: usize = 1 << 25;
 /// The longest record that is skipped, bytes: reading an endless input must stop.
 const FARTHEST: u64 = 1 << 34;
-/// The most pairs of frames of transforms that are named.
+/// The most pairs of frames of transforms that are counted by name.
 const MOST_EDGES: usize = 64;
 /// The length of a footer record, bytes.
 const FOOTER: u64 = 20;
@@ -88,7 +88,7 @@ enum Stage {
     Start,
     Records,
     /// After the footer.
-    Whole,
+    Complete,
     Broken,
 }
 
@@ -112,7 +112,7 @@ impl<R: Read> Bag<R> {
                 frame: None,
                 composers: BTreeMap::new(),
                 names: FrameNames::default(),
-                told: ReaderDiagnostics::default(),
+                diagnostics: ReaderDiagnostics::default(),
             },
             budget: Budget::new(),
             body: Vec::new(),
@@ -134,32 +134,31 @@ impl<R: Read> Bag<R> {
 
     /// Reports something that was left out. Only the first report keeps its place and reason.
     fn left_out(&mut self, what: &str, why: &str) {
-        if self.notes.told.damage.is_none() {
+        if self.notes.diagnostics.damage.is_none() {
             let bytes = self.bytes;
-            self.notes.told.damage = Some(format!(
+            self.notes.diagnostics.damage = Some(format!(
                 "after {bytes} bytes: {why}; the {what} is left out"
             ));
         }
     }
 
     fn chunk_left_out(&mut self, why: &str) {
-        self.notes.told.bad_chunks += 1;
+        self.notes.diagnostics.bad_chunks += 1;
         self.left_out("chunk", why);
     }
 
     fn record_left_out(&mut self, why: &str) {
-        self.notes.told.bad_records += 1;
+        self.notes.diagnostics.bad_records += 1;
         self.left_out("record", why);
     }
 
-    /// Stops at a damaged place. Everything before it remains valid.
+    /// Stops at a damaged place. All items before it remain valid.
     fn broken(&mut self, why: &str) {
         self.stage = Stage::Broken;
-        self.notes.told.damage = Some(format!("after {} bytes: {why}", self.bytes));
+        self.notes.diagnostics.damage = Some(format!("after {} bytes: {why}", self.bytes));
     }
 
-    /// Reads `length` bytes into [`Self::body`], or as many as exist: memory is reserved only for existing
-    /// bytes.
+    /// Reads `length` bytes into [`Self::body`], or as many as exist. Memory is reserved only for existing bytes.
     fn read(&mut self, length: usize, what: &str) -> Result<(), Stop> {
         self.body.clear();
         let count = (&mut self.input)
@@ -259,16 +258,16 @@ impl<R: Read> Bag<R> {
         if self.body != MAGIC {
             return Err(Stop::Broken("its last bytes are not those of MCAP".into()));
         }
-        self.stage = Stage::Whole;
-        let told = &mut self.notes.told;
-        told.indexed = Some(self.indices > 0);
+        self.stage = Stage::Complete;
+        let diagnostics = &mut self.notes.diagnostics;
+        diagnostics.indexed = Some(self.indices > 0);
         if let Some(lost) = self
             .indices
             .checked_sub(self.chunks)
             .filter(|lost| *lost > 0)
         {
-            told.bad_chunks += lost;
-            told.damage.get_or_insert_with(|| {
+            diagnostics.bad_chunks += lost;
+            diagnostics.damage.get_or_insert_with(|| {
                 format!("somewhere: {lost} chunks that its index names are missing")
             });
         }
@@ -291,7 +290,7 @@ impl<R: Read> Recording for Bag<R> {
                     Err(why) => self.record_left_out(&why.to_string()),
                 }
             }
-            if matches!(self.stage, Stage::Whole | Stage::Broken) {
+            if matches!(self.stage, Stage::Complete | Stage::Broken) {
                 return Ok(None);
             }
             match self.step() {
@@ -309,7 +308,7 @@ impl<R: Read> Recording for Bag<R> {
     }
 
     fn told(&self) -> &ReaderDiagnostics {
-        &self.notes.told
+        &self.notes.diagnostics
     }
 
     fn bytes(&self) -> u64 {
@@ -328,7 +327,7 @@ struct Notes {
     /// The transforms of each channel that has them.
     composers: BTreeMap<u16, Composer>,
     names: FrameNames,
-    told: ReaderDiagnostics,
+    diagnostics: ReaderDiagnostics,
 }
 
 /// The reason why a record of a schema, a channel or a message is left out.
@@ -366,7 +365,7 @@ impl Notes {
             }
             op::MESSAGE => {
                 let message = records::message(data)?;
-                self.told.message_bytes += message.data.len() as u64;
+                self.diagnostics.message_bytes += message.data.len() as u64;
                 return Ok(self.message(message.channel_id, message.logged_ns, message.data));
             }
             _ => {}
@@ -394,7 +393,10 @@ impl Notes {
         };
         let used = match used {
             Ok(used) => {
-                self.told.read.entry(channel.topic.into()).or_insert(0);
+                self.diagnostics
+                    .read
+                    .entry(channel.topic.into())
+                    .or_insert(0);
                 used
             }
             Err(why) => {
@@ -407,7 +409,7 @@ impl Notes {
                     messages: 0,
                 };
                 let topic = channel.topic.into();
-                self.told.skipped.entry(topic).or_insert(skipped);
+                self.diagnostics.skipped.entry(topic).or_insert(skipped);
                 Use::Skip
             }
         };
@@ -426,12 +428,12 @@ impl Notes {
             return None;
         };
         let Use::Read { kind, role } = channel.used else {
-            if let Some(skipped) = self.told.skipped.get_mut(&channel.topic) {
+            if let Some(skipped) = self.diagnostics.skipped.get_mut(&channel.topic) {
                 skipped.messages += 1;
             }
             return None;
         };
-        if let Some(count) = self.told.read.get_mut(&channel.topic) {
+        if let Some(count) = self.diagnostics.read.get_mut(&channel.topic) {
             *count += 1;
         }
         match decoded(kind, data) {
@@ -445,9 +447,9 @@ impl Notes {
     }
 
     fn undecodable(&mut self, words: impl FnOnce() -> String) {
-        self.told.undecodable += 1;
-        if self.told.first_undecodable.is_none() {
-            self.told.first_undecodable = Some(words());
+        self.diagnostics.undecodable += 1;
+        if self.diagnostics.first_undecodable.is_none() {
+            self.diagnostics.first_undecodable = Some(words());
         }
     }
 
@@ -458,7 +460,7 @@ impl Notes {
         let mut newest: Option<(i64, String, Pose)> = None;
         for transform in transforms {
             let edge = (transform.parent.clone(), transform.child.clone());
-            let named = &mut self.told.transforms;
+            let named = &mut self.diagnostics.transforms;
             if named.len() < MOST_EDGES || named.contains_key(&edge) {
                 *named.entry(edge).or_insert(0) += 1;
             }

@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_names_are_refused() {
+    fn names_above_the_limit_are_refused() {
         for (length, is_name) in [(LONGEST_NAME, true), (LONGEST_NAME + 1, false)] {
             let mut bytes = (length as u32 + 1).to_le_bytes().to_vec();
             bytes.resize(4 + length, b'a');
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_end_before_their_nul() {
+    fn text_excludes_its_nul() {
         let text = |bytes: &[u8]| Cdr::new(bytes, false).text().map(str::len);
         assert_eq!(text(&[4, 0, 0, 0, b'm', b'a', b'p', 0]), Ok(3));
         assert_eq!(text(&[1, 0, 0, 0, 0]), Ok(0));

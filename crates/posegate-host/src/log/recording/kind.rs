@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_are_known_by_their_first_bytes() {
+    fn format_follows_from_the_first_bytes() {
         for (start, format) in [
             (&b"\x89MCAP0\r\n"[..], Format::Mcap),
             (b"SQLite format 3\0", Format::Sqlite),

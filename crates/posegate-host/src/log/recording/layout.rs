@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 const DEEPEST: u32 = 12;
 /// The most fields of a layout: more than any supported message has.
 const MOST: usize = 4096;
-/// The most bytes in the names of those fields. (A list is one field, whose name holds those of its elements.)
+/// The most bytes in the names of those fields. (A list is one field; its name contains those of its elements.)
 const MOST_BYTES: usize = 1 << 16;
 /// The most lines that are followed. (Types without fields that refer to each other multiply the lines at every level.)
 const MOST_LINES: u32 = 1 << 16;
@@ -158,7 +158,7 @@ mod tests {
         MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
 
     #[test]
-    fn types_in_types_are_one_line() {
+    fn nested_types_are_one_line() {
         assert_eq!(
             layout(ARRAY, "apriltag_msgs/msg/AprilTagDetectionArray").as_deref(),
             Some("int32 uint32 string sequence<string int32x2 float32x2 float64x19>")
@@ -167,7 +167,7 @@ mod tests {
 
     /// Empty types have no fields, so a limit on fields does not bound the time.
     #[test]
-    fn empty_types_are_followed_in_bounded_time() {
+    fn empty_types_take_bounded_time() {
         let empty = "Nothing[9999999999999] x\n====================\nMSG: a/Nothing\nuint8 A=1\n";
         assert_eq!(layout(empty, "a/msg/T").as_deref(), Some(""));
         let mut nested = String::new();
@@ -179,9 +179,9 @@ mod tests {
         assert_eq!(layout(&format!("T0 x\n{nested}"), "a/msg/T"), None);
     }
 
-    /// Each list is one field, so the number of fields bounds nothing: these 327 bytes would produce names of 172 GB.
+    /// Each list is one field, so the number of fields is not a bound: these 327 bytes would produce names of 172 GB.
     #[test]
-    fn lists_in_lists_are_followed_in_bounded_memory() {
+    fn nested_lists_take_bounded_memory() {
         let mut text = String::from("A0[] x\n");
         for level in 0..4 {
             text += &format!(
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_followed_is_none() {
+    fn invalid_definition_has_no_layout() {
         for bad in [
             "Point p\n",
             "float64\n",

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// A camera and the tags that it may observe.
 #[derive(Clone, Debug)]
 pub struct TagLocalizer {
-    eye: MountedCamera,
+    camera: MountedCamera,
     tags: KnownTags,
     sigma_px: f64,
     radius_squared: f64,
@@ -22,12 +22,12 @@ pub struct TagLocalizer {
 }
 
 impl TagLocalizer {
-    /// Returns a localizer for the tags of a site. `sigma_px` is the standard deviation of a corner's coordinates, pixels;
-    /// `radius_squared` is that of the pose-sets. A tag that an image does not identify counts as unknown.
+    /// Returns a localizer for the tags of a site. `sigma_px` is the standard deviation of a corner's coordinates,
+    /// pixels; `radius_squared` is that of the pose-sets. A tag that an image does not identify counts as unknown.
     #[must_use]
-    pub fn new(eye: MountedCamera, tags: KnownTags, sigma_px: f64, radius_squared: f64) -> Self {
+    pub fn new(camera: MountedCamera, tags: KnownTags, sigma_px: f64, radius_squared: f64) -> Self {
         Self {
-            eye,
+            camera,
             tags,
             sigma_px,
             radius_squared,
@@ -78,7 +78,7 @@ impl TagLocalizer {
             })
             .collect();
         self.unknown += (found.len() - seen.len()) as u64;
-        let fix = locate(&self.eye, &seen, self.sigma_px, self.radius_squared);
+        let fix = locate(&self.camera, &seen, self.sigma_px, self.radius_squared);
         match fix {
             Ok(_) => self.fixes += 1,
             Err(why) => *self.counts.entry(why).or_default() += 1,

@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn both_byte_orders_are_read() {
+    fn big_and_little_endian_messages_are_read() {
         for big in [false, true] {
             let message = decoded(Kind::Pose, &pose_bytes(big)).unwrap();
             assert_eq!(
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_no_message_are_told() {
+    fn invalid_bytes_are_errors() {
         let good = pose_bytes(false);
         let padded: Vec<u8> = good.iter().copied().chain([0; 3]).collect();
         assert!(decoded(Kind::Pose, &padded).is_ok());
@@ -295,7 +295,7 @@ mod tests {
     /// A detection array written by hand: stamp, frame, count, then for each detection its family, four numbers of 32 bits and
     /// 19 floats.
     #[test]
-    fn detections_are_read_and_no_count_takes_more_than_the_bytes_hold() {
+    fn detections_are_read_and_their_count_is_bounded_by_the_bytes() {
         let mut bytes = vec![0, 1, 0, 0];
         for value in [7, 0, 1] {
             bytes.extend(u32::to_le_bytes(value));
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_definitions_are_known() {
+    fn kinds_are_recognized_by_name_and_definition() {
         assert_eq!(Kind::of("nav_msgs/Odometry"), Some(Kind::Odometry));
         assert_eq!(Kind::of("nav_msgs/msg/Path"), None);
         let time = "builtin_interfaces/Time stamp\nstring frame_id\n";

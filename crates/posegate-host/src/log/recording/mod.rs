@@ -22,23 +22,23 @@
 //! ```
 
 pub use self::bag::{Bag, Role, Wanted};
+pub use self::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::findings::Findings;
 pub use self::kind::{Format, format_of};
 pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
 pub use self::text::Text;
-pub use self::told::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::transforms::FrameNames;
 
 mod bag;
 mod cdr;
+mod diagnostics;
 mod findings;
 mod kind;
 mod layout;
 mod looks;
 mod message;
 mod text;
-mod told;
 mod transforms;
 
 pub(crate) use self::bag::yaw_of;
@@ -125,7 +125,7 @@ pub enum Item {
     Estimate(Sample),
     /// A true pose, from the topic that was named as the truth, or a pose of the odometry in its own frame.
     Truth(TruePose),
-    /// An observation of tags. Whoever knows the cameras must turn it into an estimate.
+    /// An observation of tags. The caller turns it into an estimate ([`TagLocalizer`]).
     Detections {
         /// Index of the wanted topic.
         source: u8,
@@ -168,7 +168,7 @@ pub trait Recording {
     /// [`RecordingError`]: the file is not a recording, or cannot be read.
     fn next(&mut self) -> Result<Option<Item>, RecordingError>;
 
-    /// Returns the counts of everything that is not an item.
+    /// Returns the counts of all messages that are not items.
     fn told(&self) -> &ReaderDiagnostics;
 
     /// Returns the number of bytes that were read from the file.

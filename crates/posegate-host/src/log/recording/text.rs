@@ -1,6 +1,6 @@
 //! CSV and TUM files as streams of estimates.
 
-use super::told::ReaderDiagnostics;
+use super::diagnostics::ReaderDiagnostics;
 use super::{Item, Recording, RecordingError, Sample};
 use crate::input::Lines as Limited;
 use crate::log::estimates::Rows;
@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Text<R: Read> {
     lines: Lines<R>,
     file: String,
-    told: ReaderDiagnostics,
+    diagnostics: ReaderDiagnostics,
     bytes: Arc<AtomicU64>,
     covariance: bool,
 }
@@ -75,7 +75,7 @@ impl<R: Read> Text<R> {
         }
     }
 
-    /// Also reads the time since the last fix from a column of a CSV, seconds. Returns whether the header has it.
+    /// Also reads the time since the last fix from a column of a CSV, seconds. Returns `true` if the header has it.
     pub fn reads_since_fix(&mut self, column: &str) -> bool {
         match &mut self.lines {
             Lines::Csv(rows) => rows.reads_since_fix(column),
@@ -98,7 +98,7 @@ impl<R: Read> Text<R> {
         Self {
             lines,
             file: file.into(),
-            told: ReaderDiagnostics::default(),
+            diagnostics: ReaderDiagnostics::default(),
             bytes,
             covariance,
         }
@@ -157,7 +157,7 @@ impl<R: Read> Recording for Text<R> {
     }
 
     fn told(&self) -> &ReaderDiagnostics {
-        &self.told
+        &self.diagnostics
     }
 
     fn bytes(&self) -> u64 {

@@ -1,15 +1,15 @@
 //! Transforms of `/tf`: the pose of the robot in the world, composed of two of them as tf2 does.
 //!
-//! A localization publishes the transform from the world frame to the odometry's frame (map to odom), the odometry that from its frame to
-//! the robot (odom to base_link). The pose at a time needs both. As tf2's lookup at time 0, the composition is at the *latest common
-//! time*: the older one of the newest two stamps. If one of them is no longer published the time stands still, so a gate gets no new
-//! estimates.
+//! A localization publishes the transform from the world frame to the odometry's frame (map to odom), the odometry
+//! that from its frame to the robot (odom to base_link). The pose at a time needs both. Like tf2's lookup at time 0,
+//! the composition is at the *latest common time*: the older one of the two newest stamps. If one of the transforms
+//! is no longer published, this time does not advance, so a gate gets no new estimates.
 
 use std::collections::VecDeque;
 
-/// How long transforms are kept, as in tf2, nanoseconds.
+/// Transforms are kept for this time, as in tf2, nanoseconds.
 const KEPT_NS: i64 = 10_000_000_000;
-/// The most transforms that are kept of one edge.
+/// The most transforms of one edge that are kept.
 const MOST_KEPT: usize = 1 << 14;
 /// The robot's frame if none is named.
 const BASES: [&str; 2] = ["base_link", "base_footprint"];
@@ -21,7 +21,8 @@ pub struct FrameNames {
     pub world: String,
     /// The odometry's frame.
     pub odometry: String,
-    /// The robot's frame; `None` takes `base_link` or `base_footprint`, whichever is a child of the odometry's frame first.
+    /// The robot's frame; `None` selects the first child of the odometry's frame that is `base_link` or
+    /// `base_footprint`.
     pub base: Option<String>,
 }
 
@@ -53,7 +54,7 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// Returns the pose of a frame in `self`'s parent, of its pose in `self`.
+    /// Converts a pose in `self` to a pose in the parent of `self`.
     fn of(&self, inner: &Self) -> Self {
         let [x, y, z] = rotated(self.orientation, inner.position);
         let [a, b, c] = self.position;
@@ -63,8 +64,8 @@ impl Pose {
         }
     }
 
-    /// Returns the pose at a share of the way to another one. The length of the quaternion is interpolated too, so that one that is not
-    /// a unit quaternion stays visible.
+    /// Returns the pose at a share of the path to another pose. The length of the quaternion is interpolated too, so
+    /// a quaternion that is not a unit quaternion remains detectable.
     fn towards(&self, other: &Self, share: f64) -> Self {
         let part = |a: f64, b: f64| a + share * (b - a);
         let [p, q] = [self.orientation, other.orientation];
@@ -129,7 +130,7 @@ impl Edge {
         self.kept.back().map(|(stamp, _)| *stamp)
     }
 
-    /// Adds a transform. One that is not newer than all before is ignored.
+    /// Adds a transform. A transform that is not newer than all before is ignored.
     fn push(&mut self, stamp_ns: i64, pose: Pose) {
         if self.newest_ns().is_some_and(|newest| stamp_ns <= newest) {
             return;
@@ -241,9 +242,9 @@ mod tests {
         [pose.position[0], pose.position[1], yaw_of(pose.orientation)]
     }
 
-    fn is_near(pose: &Pose, wanted: [f64; 3]) -> bool {
+    fn is_near(pose: &Pose, expected: [f64; 3]) -> bool {
         let near = |(a, b): (f64, f64)| (a - b).abs() < 1e-9;
-        level(pose).into_iter().zip(wanted).all(near)
+        level(pose).into_iter().zip(expected).all(near)
     }
 
     const CORRECTION: [&str; 2] = ["map", "odom"];
@@ -251,7 +252,7 @@ mod tests {
 
     /// The correction is turned by a quarter: 1 m ahead in the odometry's frame is 1 m to the left in the world.
     #[test]
-    fn a_pose_is_the_correction_then_the_odometry() {
+    fn pose_is_odometry_transformed_by_the_correction() {
         let quarter = core::f64::consts::FRAC_PI_2;
         let mut composer = Composer::default();
         assert_eq!(
@@ -272,7 +273,7 @@ mod tests {
         assert!(is_near(&pose, [4.7, 8.4, quarter + 0.1]), "{pose:?}");
     }
 
-    /// Between two corrections the pose is between; after the last one the time stands still.
+    /// Between two corrections the pose is interpolated. After the last correction the time does not advance.
     #[test]
     fn corrections_are_interpolated_and_never_extrapolated() {
         let mut composer = Composer::default();
@@ -295,7 +296,7 @@ mod tests {
             composer.add(&transform(4.0, ODOMETRY, [2.0, 0.0, 0.0])),
             None
         );
-        // One that goes back is ignored.
+        // A transform with an earlier stamp is ignored.
         assert_eq!(
             composer.add(&transform(1.5, CORRECTION, [9.0, 0.0, 0.0])),
             None
@@ -307,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn other_frames_are_named_and_not_used() {
+    fn other_frames_are_ignored() {
         let mut composer = Composer::new(FrameNames {
             world: "hall".into(),
             odometry: "/odom".into(),
@@ -320,16 +321,16 @@ mod tests {
         );
         assert!(!composer.is_odometry(&transform(1.0, ODOMETRY, [0.0; 3])));
         assert!(composer.is_odometry(&transform(1.0, ["odom", "/robot"], [0.0; 3])));
-        // A frame that is no robot's does not become the robot's.
+        // A child frame with another name does not become the robot's frame.
         let mut composer = Composer::default();
         assert!(!composer.is_odometry(&transform(1.0, ["odom", "imu"], [0.0; 3])));
         assert!(composer.is_odometry(&transform(1.0, ["odom", "base_footprint"], [0.0; 3])));
         assert!(!composer.is_odometry(&transform(1.0, ODOMETRY, [0.0; 3])));
     }
 
-    /// A quaternion that is not of length 1, or no number, stays one.
+    /// A quaternion that is not of length 1 or not a number is not corrected.
     #[test]
-    fn impossible_numbers_stay_impossible() {
+    fn invalid_numbers_stay_invalid() {
         for factor in [0.5, f64::NAN] {
             let mut composer = Composer::default();
             let mut bad = transform(1.0, CORRECTION, [0.0; 3]);

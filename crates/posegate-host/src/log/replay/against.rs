@@ -39,7 +39,7 @@ impl TruthComparison {
         let error = Vector3::new(truth[0] - x, truth[1] - y, turn);
         let error_m = libm::hypot(error.x, error.y);
         let (mut nees, mut scale) = (None, None);
-        // An impossible estimate has no pose-set, whatever its numbers; a stale one has.
+        // An impossible estimate has no pose-set, even if its numbers are finite. A stale estimate has a pose-set.
         let possible = row.possible;
         match (row.spread, trust) {
             (Some(Uncertainty::Gaussian(covariance)), Some(trust)) => {
@@ -83,8 +83,8 @@ fn form(covariance: &[[f64; 3]; 3], error: &Vector3<f64>) -> Option<f64> {
     form.is_finite().then_some(form)
 }
 
-/// Returns the covariance grown by the source's trust; `None` for a kind of cross terms that this program does not
-/// know.
+/// Returns the covariance grown by the source's trust; `None` for a kind of cross terms that is not
+/// supported.
 fn believed(covariance: &[[f64; 3]; 3], trust: Trust) -> Option<[[f64; 3]; 3]> {
     let grown = f64::from(trust.inflation.q16()) / 65536.0;
     let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = *covariance;

@@ -1,10 +1,10 @@
-//! How long the interlock was open, why it was shut otherwise, and which setting kept it shut all the time.
+//! The time for which the interlock was open, the reasons why it was shut, and the setting that kept it shut.
 
 use super::{Lanes, Row};
 use posegate::gate::{Reason, Settings, State};
 use std::collections::{BTreeMap, VecDeque};
 
-/// How long the interlock was open and shut.
+/// The times for which the interlock was open and shut.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterlockTimes {
     /// From the first to the last estimate, seconds.
@@ -26,10 +26,10 @@ pub struct InterlockTimes {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Last {
     at_s: f64,
-    /// The time until which what the step gave stands without a further step.
+    /// The time until which the state remains valid without a further step.
     until_s: f64,
     is_open: bool,
-    /// Why the interlock is shut until then, and after it.
+    /// The reasons why the interlock is shut until then, and after it.
     reasons: [Reason; 2],
 }
 
@@ -56,23 +56,23 @@ impl InterlockTimes {
         }
     }
 
-    /// Adds a state of the gate, given by an estimate of an age in seconds. What it gave ends by itself if its estimate gets too old, or
-    /// if no permit follows.
+    /// Adds a state of the gate, caused by an estimate of an age in seconds. The state ends without a further step if
+    /// the estimate gets too old or no permit follows.
     pub(super) fn pass(&mut self, now_s: f64, state: State, age_s: f64, settings: &Settings<'_>) {
         let mut has_ended = false;
         if let Some(last) = self.last {
             has_ended = last.until_s < now_s;
             if now_s > last.at_s {
                 self.recorded_s += now_s - last.at_s;
-                let stood = (last.until_s.min(now_s) - last.at_s).max(0.0);
-                let after = now_s - last.at_s - stood;
+                let valid_s = (last.until_s.min(now_s) - last.at_s).max(0.0);
+                let after = now_s - last.at_s - valid_s;
                 if last.is_open {
-                    self.open_s += stood;
+                    self.open_s += valid_s;
                 } else {
-                    self.shut(last.reasons[0], stood);
+                    self.shut(last.reasons[0], valid_s);
                 }
                 self.shut(last.reasons[1], after);
-                let until_s = last.at_s + stood;
+                let until_s = last.at_s + valid_s;
                 let first = (!last.is_open).then_some(last.reasons[0]);
                 self.lanes.add(last.at_s, until_s, first);
                 self.lanes.add(until_s, now_s, Some(last.reasons[1]));
@@ -90,7 +90,7 @@ impl InterlockTimes {
         }
     }
 
-    /// Returns the seconds for which the interlock was shut, by reason; without those of no time.
+    /// Returns the seconds for which the interlock was shut, by reason; reasons without any time are omitted.
     #[must_use]
     pub fn shut_s_by(&self) -> Vec<(Reason, f64)> {
         let all = Reason::ALL.into_iter().map(|reason| {
@@ -100,7 +100,8 @@ impl InterlockTimes {
         all.filter(|(_, seconds)| *seconds > 0.0).collect()
     }
 
-    /// Returns why the interlock never opened, in words, and the setting that decides. `None` if it opened.
+    /// Returns the reason, as text, why the interlock never opened, and the setting that decides. `None` if it
+    /// opened.
     #[must_use]
     pub fn why_shut(&self, settings: &Settings<'_>) -> Option<WhyShut> {
         (self.openings == 0).then(|| self.nearest.why(settings))
@@ -117,7 +118,7 @@ impl Last {
         } else {
             Reason::Silent
         };
-        let (stands, reasons) = match state {
+        let (valid_s, reasons) = match state {
             State::Permitted => (hold.min(fresh), [ends; 2]),
             State::Qualifying(_) => (hold.min(fresh), [Reason::Qualifying, ends]),
             State::Inhibited(reason) | State::Latched(reason) => (0.0, [reason; 2]),
@@ -125,7 +126,7 @@ impl Last {
         };
         Self {
             at_s: now_s,
-            until_s: now_s + stands.max(0.0),
+            until_s: now_s + valid_s.max(0.0),
             is_open: state == State::Permitted,
             reasons,
         }
@@ -135,32 +136,33 @@ impl Last {
 /// The setting that keeps an interlock shut.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WhyShut {
-    /// In words.
+    /// The reason as text.
     pub words: String,
     /// The setting's name, its value, and the least value with which the interlock would have opened; `None` if no single setting
     /// decides.
     pub setting: Option<(&'static str, u32, u32)>,
 }
 
-/// What comes nearest to an opening: the best run of estimates that are permitted by themselves.
+/// The best run of estimates that are permitted by themselves: the nearest approach to an opening.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Nearest {
     estimates: u64,
     /// Estimates that are permitted by themselves.
     permits: u64,
-    /// Denied for their age alone, and the least age of them, seconds.
+    /// Estimates that are denied only because of their age, and the smallest age of these, seconds.
     stale: u64,
     youngest_s: Option<f64>,
-    /// Of the run that goes on: the start, and the gaps before its last estimates, seconds.
+    /// The current run: its start, and the gaps before its last estimates, seconds.
     from_s: f64,
     gaps: VecDeque<f64>,
     /// The most estimates of a run.
     longest_run: u64,
     run: u64,
     last_s: f64,
-    /// The least of the longest gaps of the wanted number of permits, and the same with the wanted time since the run began.
+    /// The smallest longest gap of the required number of permits, and the same with the required time since the run
+    /// began.
     hold_s: Option<f64>,
-    /// The least time for which a run of the wanted number lasted.
+    /// The shortest time in which a run of the required number of permits came.
     lasted_s: f64,
     /// Reasons of denials by themselves, with their counts.
     reasons: BTreeMap<Reason, u64>,
@@ -190,11 +192,11 @@ impl Nearest {
         self.run += 1;
         self.last_s = now_s;
         self.longest_run = self.longest_run.max(self.run);
-        let wanted = usize::from(settings.permits_in_a_row);
-        while self.gaps.len() >= wanted {
+        let required = usize::from(settings.permits_in_a_row);
+        while self.gaps.len() >= required {
             self.gaps.pop_front();
         }
-        if self.run >= wanted as u64 {
+        if self.run >= required as u64 {
             self.lasted_s = self.lasted_s.max(now_s - self.from_s);
             let longest = self.gaps.iter().copied().fold(0.0, f64::max);
             let least = self.hold_s.map_or(longest, |known| known.min(longest));
@@ -204,7 +206,7 @@ impl Nearest {
 
     fn why(&self, settings: &Settings<'_>) -> WhyShut {
         let ms = |seconds: f64| (seconds * 1e3).ceil().clamp(0.0, 4e9) as u32 + 1;
-        let wanted = settings.permits_in_a_row;
+        let required = settings.permits_in_a_row;
         if self.estimates == 0 {
             return WhyShut {
                 words: "the recording has no estimate with a time".into(),
@@ -234,17 +236,17 @@ impl Nearest {
             let run = self.longest_run;
             return WhyShut {
                 words: format!(
-                    "{wanted} permits in a row are needed, and {run} is the most there is: then an estimate is denied, most often as {}. With --permits-in-a-row {run} it would open.",
+                    "{required} permits in a row are needed, and {run} is the most there is: then an estimate is denied, most often as {}. With --permits-in-a-row {run} it would open.",
                     self.commonest()
                 ),
-                setting: Some(("permits_in_a_row", u32::from(wanted), run as u32)),
+                setting: Some(("permits_in_a_row", u32::from(required), run as u32)),
             };
         };
         let least = ms(hold_s);
         if least > settings.permit_hold_ms {
             return WhyShut {
                 words: format!(
-                    "{wanted} permits in a row come {:.0} ms apart at the quickest, and a permit is held for {} ms. With --permit-hold-ms {least} or more (and --max-age-ms above it) it would open.",
+                    "{required} permits in a row come {:.0} ms apart at the quickest, and a permit is held for {} ms. With --permit-hold-ms {least} or more (and --max-age-ms above it) it would open.",
                     hold_s * 1e3,
                     settings.permit_hold_ms
                 ),
@@ -256,7 +258,7 @@ impl Nearest {
             let least = least.saturating_add(settings.response_ms);
             return WhyShut {
                 words: format!(
-                    "{wanted} permits in a row come {:.0} ms apart at the quickest, and an estimate is used for {oldest} ms. With --max-age-ms {least} or more it would open.",
+                    "{required} permits in a row come {:.0} ms apart at the quickest, and an estimate is used for {oldest} ms. With --max-age-ms {least} or more it would open.",
                     hold_s * 1e3
                 ),
                 setting: Some(("max_age_ms", settings.maximum_age_ms, least)),

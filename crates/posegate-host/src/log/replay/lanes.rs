@@ -1,4 +1,4 @@
-//! Whether the interlock was open over time, and why it was shut otherwise, in a limited number of spans.
+//! The state of the interlock over time, open or shut for a reason, in a limited number of spans.
 
 use posegate::gate::Reason;
 
@@ -122,9 +122,9 @@ impl Lanes {
 mod tests {
     use super::*;
 
-    /// However long a recording is, no second is lost, and each is in the span of its time.
+    /// No second is lost in a recording of any length, and each second is in the span of its time.
     #[test]
-    fn seconds_are_kept_as_spans_join() {
+    fn joined_spans_keep_all_seconds() {
         let mut lanes = Lanes::default();
         let mut time = 5.0;
         for k in 0..2_000u32 {
@@ -150,7 +150,7 @@ mod tests {
             assert!(index.abs_diff(middle) < 2 || of_other == 0.0, "{index}");
             assert!(span.all_s() <= lanes.width_s() * 1.000_001);
         }
-        // What goes back, or is no time, is left out.
+        // Times that go back or are not numbers are ignored.
         let before = lanes.clone();
         lanes.add(4.0, 4.5, None);
         lanes.add(6.0, f64::INFINITY, None);

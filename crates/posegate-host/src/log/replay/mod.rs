@@ -3,8 +3,8 @@
 //!
 //! Each estimate has two results. Its *verdict* is that of [`Evaluator`], with margin and worst pose: the same that
 //! `posegate gate` prints. The *permission* is that of [`Gate`], which has a memory: freshness, consecutive permits,
-//! hold times. Memory does not grow with the recording. Only counts are stored ([`Tally`], [`Timeline`], [`Stanford`]),
-//! and at most [`MOST_WAITING`] estimates that wait for a true pose.
+//! hold times. Memory does not grow with the recording: it holds counts ([`Tally`], [`Timeline`], [`Stanford`]) and
+//! at most [`MOST_WAITING`] estimates that wait for a true pose.
 //!
 //! ```
 //! use posegate::gate::{Restart, Settings, Source};
@@ -105,7 +105,7 @@ use std::collections::VecDeque;
 
 /// The most estimates that wait for a true pose. If there are more, the first one is counted without a truth.
 pub const MOST_WAITING: usize = 1 << 16;
-/// How many increments of the odometry are kept for fixes that come late.
+/// The number of increments of the odometry that are kept for fixes with old stamps.
 const INCREMENTS: usize = 128;
 
 /// The settings of a replay.
@@ -121,8 +121,8 @@ pub struct ReplayConfig<'a> {
     pub bounded: Option<[f64; 2]>,
     /// The world frame's name.
     pub world: &'a str,
-    /// The clock. `None` selects the recorded times, unless there are none, or nearly all of the first estimates show
-    /// that they are of another clock than the stamps.
+    /// The clock. `None` selects the recorded times. It selects the stamps if there are no recorded times, or if
+    /// nearly all of the first estimates show that the two clocks differ.
     pub clock: Option<Clock>,
     /// The thresholds of other rules.
     pub thresholds: Thresholds,
@@ -355,7 +355,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Gives the gate what is carried along the odometry up to a time, increment by increment.
+    /// Passes the pose that is carried along the odometry to the gate, increment by increment, up to a time.
     fn drive_until(&mut self, now_s: f64) {
         let Some(mut carry) = self.carry.take() else {
             return;
@@ -385,7 +385,7 @@ impl<'a> Replay<'a> {
         self.carry = Some(carry);
     }
 
-    /// Gives the gate a fix: as it is, with the time since the source's last fix, or carried along the odometry.
+    /// Passes a fix to the gate: unchanged, with the time since the source's last fix, or carried along the odometry.
     fn take_fix(&mut self, now_ms: u32, report: &Report, since_fix_ms: Option<u32>) -> Step {
         let Some(carry) = &mut self.carry else {
             let evidence = Evidence {
@@ -399,7 +399,7 @@ impl<'a> Replay<'a> {
                 Ok(tracked) => self.gate.step_on(now_ms, &tracked.evidence()),
                 Err(reason) => self.gate.inhibit(now_ms, reason),
             },
-            // What is carried stays as it was.
+            // The carried pose is unchanged.
             Err(reason) => Step {
                 verdict: Err(reason),
                 ..self.gate.tick(now_ms)
@@ -436,7 +436,7 @@ impl<'a> Replay<'a> {
             Ok(()) => Verdict::Permit {
                 margin: Margin::ONE,
             },
-            // The reason may come from the gate's memory, so the estimate is judged again alone.
+            // The reason may come from the gate's memory, so the verdict is computed from the estimate alone.
             Err(reason) if remembers(reason) => self.judged(&report, sample),
             Err(reason) => Verdict::deny(reason),
         });
@@ -461,7 +461,7 @@ impl<'a> Replay<'a> {
             (None, Some(_)) => TruthLookup::NotYet,
         };
         if truth != TruthLookup::None && row.in_world {
-            // An impossible estimate has no pose-set, whatever its numbers.
+            // An impossible estimate has no pose-set, even if its numbers are finite.
             let trust = settings.sources.get(usize::from(row.source));
             row.possible = trust.is_some_and(|source| {
                 let radius = self.judge.radius_squared();
@@ -558,7 +558,7 @@ impl<'a> Replay<'a> {
         &self.timeline
     }
 
-    /// Returns how long the interlock was open and shut, and why.
+    /// Returns the times for which the interlock was open and shut, and the reasons.
     #[must_use]
     pub const fn interlock(&self) -> &InterlockTimes {
         &self.counts.interlock
@@ -606,7 +606,7 @@ impl<'a> Replay<'a> {
         [self.counts.verdicts.permits, self.next]
     }
 
-    /// Returns how often each reason was given, without reasons that were not.
+    /// Returns the count of each reason that was given.
     #[must_use]
     pub fn reasons(&self) -> Vec<(Reason, u64)> {
         self.counts.reasons()
@@ -619,8 +619,8 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Returns `true` if a reason of a gate's step may come from its memory: then it says nothing about the estimate alone.
-/// (Staleness is included: the gate's clock may not advance if a time is missing.)
+/// Returns `true` if a reason of a gate's step may come from its memory, and not from the estimate. (Staleness is
+/// included: the gate's clock may not advance if a time is missing.)
 const fn remembers(reason: Reason) -> bool {
     !matches!(
         reason,

@@ -91,7 +91,7 @@ pub fn odometry_csv(input: impl Read, file: &str) -> Result<Vec<OdometryPose>, O
     Ok(poses)
 }
 
-/// The poses of an odometry in the order of their stamps, and how far they were read.
+/// The poses of an odometry in the order of their stamps, and the reading position.
 #[derive(Clone, Debug, Default)]
 pub struct Odometry {
     poses: Vec<OdometryPose>,
@@ -99,14 +99,14 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Takes poses as they were recorded. Poses without a finite number are left out.
+    /// Sorts recorded poses by their stamps. Poses with a number that is not finite are left out.
     #[must_use]
     pub fn new(poses: impl IntoIterator<Item = OdometryPose>) -> Self {
-        let is_whole = |(t_s, pose): &OdometryPose| {
+        let is_finite = |(t_s, pose): &OdometryPose| {
             clock_ms(*t_s).is_some() && pose.iter().all(|v| v.is_finite())
         };
         Self {
-            poses: poses.into_iter().filter(is_whole).collect(),
+            poses: poses.into_iter().filter(is_finite).collect(),
             next: 0,
         }
     }
@@ -123,8 +123,8 @@ impl Odometry {
         self.poses.is_empty()
     }
 
-    /// Returns how fast the robot was at most by these poses, m/s and rad/s, and the longest time between two of them, seconds. Poses
-    /// whose stamps are equal or go back are left out.
+    /// Returns the largest speed and turn rate of the robot by these poses, m/s and rad/s, and the longest time
+    /// between two of them, seconds. Poses whose stamps are equal or go back are left out.
     #[must_use]
     pub fn extremes(&self) -> OdometryExtremes {
         let mut most = OdometryExtremes::default();
@@ -145,8 +145,8 @@ impl Odometry {
         most
     }
 
-    /// Returns the next increment up to a time, with its stamp in seconds. `None` in place of the increment if it is no movement of a
-    /// robot: metres between two poses.
+    /// Returns the next increment up to a time, with its stamp in seconds. The increment is `None` if it is not a
+    /// plausible movement, such as metres between two poses.
     pub(super) fn next_until(&mut self, now_s: f64) -> Option<(f64, Option<Increment>)> {
         let (t_s, pose) = *self.poses.get(self.next).filter(|(t_s, _)| *t_s <= now_s)?;
         let before = self.next.checked_sub(1).and_then(|at| self.poses.get(at));
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn increments_are_in_the_robots_axes() {
+    fn increments_are_in_robot_axes() {
         let quarter = core::f64::consts::FRAC_PI_2;
         let mut odometry = Odometry::new([
             (1.0, [5.0, 5.0, quarter]),

@@ -1,4 +1,4 @@
-//! Plays a recording: one thread reads, the others judge.
+//! Plays a recording: one thread reads, the others evaluate.
 
 use super::{Replay, Row};
 use crate::log::recording::{Item, Recording, RecordingError, Sample, TagLocalizer, TruePose};
@@ -31,9 +31,9 @@ pub struct Part {
 pub enum PlayError<E> {
     /// The recording cannot be read.
     Recording(RecordingError),
-    /// It has tag detections, but no camera is known.
+    /// The recording has tag detections, but no camera is known.
     NoCamera,
-    /// Its tag detections are in two frames, so they come from two cameras.
+    /// The tag detections are in two frames, so they come from two cameras.
     Cameras([Arc<str>; 2]),
     /// The callback for rows returned an error.
     Taker(E),

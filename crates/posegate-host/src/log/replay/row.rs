@@ -13,9 +13,9 @@ use serde_json::{Value, json};
 pub struct Row {
     /// From 0, in the order of the recording.
     pub index: u64,
-    /// The number of its source.
+    /// The number of the estimate's source.
     pub source: u8,
-    /// Its stamp, seconds.
+    /// The estimate's stamp, seconds.
     pub t_s: f64,
     /// Time at which it was recorded, seconds, if the gate uses that clock.
     pub logged_s: Option<f64>,
@@ -25,15 +25,15 @@ pub struct Row {
     pub spread: Option<Uncertainty>,
     /// The recorded uncertainty.
     pub recorded: Option<Uncertainty>,
-    /// Its age, seconds, if known.
+    /// The estimate's age, seconds, if known.
     pub age: Option<f64>,
     /// `true` if it is in the world frame.
     pub in_world: bool,
-    /// `true` if it has a pose-set, however old. Computed only if there may be a truth.
+    /// `true` if it has a pose-set, at any age. Computed only if there may be a truth.
     pub possible: bool,
     /// The verdict on this estimate alone.
     pub verdict: Verdict,
-    /// `true` if its margin was computed.
+    /// `true` if the margin was computed.
     pub examined: bool,
     /// `true` if the gate is open after it.
     pub permitted: bool,

@@ -1,8 +1,8 @@
 //! Rules that are in use without a gate.
 //!
-//! | rule | permits where | default |
+//! | rule | permits if | default |
 //! |---|---|---|
-//! | `distance` | the estimate is within a distance of the goal | 0.05 m: `docking_threshold` of Nav2's `SimpleChargingDock`, whose `isDocked` looks at nothing else |
+//! | `distance` | the estimate is within a distance of the goal | 0.05 m: `docking_threshold` of Nav2's `SimpleChargingDock`, whose `isDocked` checks only this |
 //! | `sigma` | the deviations of x, y and yaw are below a limit each | 0.05 m and 0.05 rad: no project ships such limits; these are Nav2's docking threshold and its `undock_angular_tolerance` |
 //! | `ellipse` | the long radius of the 3-sigma error ellipse, and its radius to the robot's side, are below a limit each | 1.5 m and 0.3 m: `error_ellipse_size` and `error_ellipse_size_lateral_direction` of Autoware's `localization_error_monitor`, `scale` 3 |
 //! | `ate` | the recording's root mean square position error is below a bound: then all is permitted, else nothing | 0.05 m |
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn each_rule_looks_at_its_own() {
+    fn each_rule_checks_only_its_own_limits() {
         let goal = PoseDeg {
             x: 1.0,
             y: 2.0,
@@ -157,7 +157,7 @@ mod tests {
             rules.of(&row([1.0, 2.0, quarter], side)),
             [true, false, true].map(Some)
         );
-        // Long: 3 * sqrt(0.25) m, along the diagonal, and the robot looks along it.
+        // Long: 3 * sqrt(0.25) m along the diagonal, in the direction of the robot's heading.
         let long = [[0.13, 0.125, 0.0], [0.125, 0.13, 0.0], [0.0, 0.0, 1e-4]];
         let eighth = core::f64::consts::FRAC_PI_4;
         assert_eq!(
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_pass_and_what_is_no_number_does_not() {
+    fn zero_covariance_passes_and_nan_does_not() {
         let goal = PoseDeg {
             x: 0.0,
             y: 0.0,

@@ -113,8 +113,8 @@ impl Stanford {
         self.regions.iter().sum()
     }
 
-    /// Returns the number of estimates with a known truth but without a pose-set or a margin: impossible, stale, or in
-    /// another frame.
+    /// Returns the number of estimates with a known truth but without a pose-set or a margin: impossible, stale, or
+    /// in another frame.
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_margin_of_one_is_among_the_permits() {
+    fn margin_of_one_is_in_a_permit_region() {
         let limit = libm::round(STEPS as f64 / END) as usize;
         assert_eq!(step_of(1.0), limit - 1);
         assert_eq!(step_of(1.0 + 1e-9), limit);

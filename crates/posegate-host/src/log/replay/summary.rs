@@ -142,10 +142,10 @@ fn truth(replay: &Replay<'_>) -> Value {
         "in_pose_set": held,
         "pose_sets": sets,
         "coverage": held as f64 / sets as f64,
-        "nees": {"count": counts.nees.count, "mean": counts.nees.told().map(|[_, mean, _]| mean), "expected": 3},
+        "nees": {"count": counts.nees.count, "mean": counts.nees.least_mean_most().map(|[_, mean, _]| mean), "expected": 3},
         "rmse_m": rmse.map(|[metres, _]| metres),
         "rmse_yaw_rad": rmse.map(|[_, radians]| radians),
-        "most_error_m": counts.errors_m.told().map(|[_, _, most]| most),
+        "most_error_m": counts.errors_m.least_mean_most().map(|[_, _, most]| most),
         "stanford": {"regions": regions, "left_out": stanford.left_out()},
     })
 }
@@ -192,7 +192,7 @@ fn reasons(counts: &[u64; 64]) -> Value {
 }
 
 fn range(range: &Range) -> Value {
-    match range.told() {
+    match range.least_mean_most() {
         None => Value::Null,
         Some([least, mean, most]) => json!({"least": least, "mean": mean, "most": most}),
     }

@@ -39,8 +39,8 @@ impl Tally {
         self.permits as f64 / self.estimates as f64
     }
 
-    /// Returns the tally of a rule that permits all estimates, or none.
-    const fn whole(self, permits: bool) -> Self {
+    /// Returns the tally of a rule that permits all estimates or no estimate.
+    const fn of_all(self, permits: bool) -> Self {
         let outside = self.with_truth - self.inside;
         Self {
             permits: if permits { self.estimates } else { 0 },
@@ -82,7 +82,7 @@ impl Range {
     }
 
     /// Returns minimum, mean and maximum.
-    pub fn told(&self) -> Option<[f64; 3]> {
+    pub fn least_mean_most(&self) -> Option<[f64; 3]> {
         (self.count > 0).then(|| [self.least, self.sum / self.count as f64, self.most])
     }
 }
@@ -194,7 +194,7 @@ impl Counts {
         let [distance, sigma, ellipse] = self.rules;
         // Without a truth the rule cannot judge.
         let ate = self.rmse().map_or(Tally::default(), |[rmse, _]| {
-            self.verdicts.whole(rmse < thresholds.ate_m)
+            self.verdicts.of_all(rmse < thresholds.ate_m)
         });
         [
             ("gate", self.verdicts),

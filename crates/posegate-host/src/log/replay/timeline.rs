@@ -1,4 +1,5 @@
-//! Verdicts over time, in a limited number of spans: a picture of an hour is not larger than that of a minute.
+//! Verdicts over time, in a limited number of spans, so that a picture of an hour is not larger than that of a
+//! minute.
 
 use super::Row;
 
@@ -20,11 +21,11 @@ pub struct Bucket {
     pub least_margin: f64,
     /// The largest age, seconds; 0 if ages are not known.
     pub most_age_s: f64,
-    /// What the rules in [`super::RULES`] permitted.
+    /// The permits of the rules in [`super::RULES`].
     pub rules: [RuleCounts; 3],
 }
 
-/// What a rule permitted in a span.
+/// The permits of a rule in a span.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RuleCounts {
     /// Estimates that the rule can judge.

@@ -16,16 +16,16 @@ class Core {
     this.exports = exports;
     this.memory = exports.memory;
     this.end = exports.__heap_base.value;
-    this.estimate = this.room(SIZE.estimate);
-    this.verdict = this.room(SIZE.verdict);
-    this.request = this.room(SIZE.request);
-    this.message = this.room(SIZE.message);
-    this.reply = this.room(SIZE.reply);
-    this.info = this.room(SIZE.info);
+    this.estimate = this.allocate(SIZE.estimate);
+    this.verdict = this.allocate(SIZE.verdict);
+    this.request = this.allocate(SIZE.request);
+    this.message = this.allocate(SIZE.message);
+    this.reply = this.allocate(SIZE.reply);
+    this.info = this.allocate(SIZE.info);
   }
 
   // Allocates memory in the core that is never freed.
-  room(length) {
+  allocate(length) {
     const at = (this.end + 15) & ~15;
     this.end = at + length;
     const lacking = this.end - this.memory.buffer.byteLength;
@@ -49,14 +49,14 @@ class Core {
   }
 
   put(bytes) {
-    const at = this.room(bytes.length);
+    const at = this.allocate(bytes.length);
     this.bytes(at, bytes.length).set(bytes);
     return { at, length: bytes.length };
   }
 
   // Creates the judges of tables, contiguous in memory.
   judges(tables, maximumAge) {
-    const first = this.room(SIZE.judge * tables.length);
+    const first = this.allocate(SIZE.judge * tables.length);
     tables.forEach((table, number) => {
       const { at, length } = this.put(table);
       const judge = first + SIZE.judge * number;
@@ -69,7 +69,7 @@ class Core {
   // Creates a table's judge. Returns it with the squared radius of its confidence.
   judge(table) {
     const { at, length } = this.put(table);
-    const judge = this.room(SIZE.judge);
+    const judge = this.allocate(SIZE.judge);
     this.exports.posegate_judge_init(judge, at, length, 1000);
     const status = this.exports.posegate_table_check(at, length, this.info);
     const radiusSquared = status === OK ? this.view.getUint32(this.info + 88, true) / 65536 : 0;
@@ -89,10 +89,10 @@ class Core {
     view.setUint32(this.estimate + 120, 1, true);
     view.setUint32(this.estimate + 124, spread.covariance ? 1 : 2, true);
     const status = this.exports.posegate_judge_examine(judge, this.estimate, this.verdict);
-    return { status, ...this.told() };
+    return { status, ...this.lastVerdict() };
   }
 
-  told() {
+  lastVerdict() {
     const view = this.view;
     const at = this.verdict;
     const reason = view.getUint32(at + 4, true);
@@ -157,7 +157,7 @@ class Core {
     view.setUint32(this.estimate + 140, 0, true);
     const judge = judges + SIZE.judge * table;
     if (this.exports.posegate_judge_permits(judge, this.estimate, this.verdict) !== OK) return 0xff;
-    const { permit, reason } = this.told();
+    const { permit, reason } = this.lastVerdict();
     return permit === (reason !== 0) ? 0xff : reason;
   }
 

@@ -105,11 +105,11 @@ function turned(c) {
 }
 
 // Returns the outline of the pose-set on the floor.
-function outline(told, radiusSquared) {
-  if (!told.covariance) {
-    return ring((angle) => [told.translation * Math.cos(angle), told.translation * Math.sin(angle)]);
+function outline(uncertainty, radiusSquared) {
+  if (!uncertainty.covariance) {
+    return ring((angle) => [uncertainty.translation * Math.cos(angle), uncertainty.translation * Math.sin(angle)]);
   }
-  const [a, b, , , d] = told.covariance;
+  const [a, b, , , d] = uncertainty.covariance;
   const along = Math.sqrt(Math.max(a, 0));
   const across = along > 0 ? b / along : 0;
   const rest = Math.sqrt(Math.max(d - across * across, 0));
@@ -161,15 +161,15 @@ function drawn() {
   state.asked = null;
   const { numbers, fault } = given();
   let verdict = null;
-  let told = null;
+  let uncertainty = null;
   let took = 0;
   if (!fault) {
     [state.x, state.y, state.yaw] = [numbers.x, numbers.y, numbers.yaw];
     if (find("follows").checked) turnTo(state.yaw);
     const started = performance.now();
-    told = spread(numbers);
+    uncertainty = spread(numbers);
     const pose = [...toWorld([state.x, state.y]), (state.task.goal.yaw_deg + state.yaw) * DEGREE];
-    const world = told.covariance ? { covariance: turned(told.covariance) } : told;
+    const world = uncertainty.covariance ? { covariance: turned(uncertainty.covariance) } : uncertainty;
     if (core && state.task.judge) {
       verdict = core.examine(state.task.judge.judge, pose, world);
       state.asked = { pose, ...world };
@@ -185,7 +185,7 @@ function drawn() {
   find("set").setAttribute("d", paths);
   find("cross").setAttribute("d", `M${px([0, 0])}m-7 0h14m-7 -7v14`);
   const radius = state.task.judge ? state.task.judge.radiusSquared : 0;
-  find("poses").setAttribute("points", told ? points(outline(told, radius)) : "");
+  find("poses").setAttribute("points", uncertainty ? points(outline(uncertainty, radius)) : "");
   const [x, y] = px([state.x, state.y]);
   find("robot").setAttribute("transform", `translate(${x} ${y}) rotate(${-state.yaw})`);
   picture.dataset.verdict = verdict === null ? "none" : verdict.permit ? "permit" : "deny";
@@ -279,8 +279,8 @@ function say(verdict, worst, took, why) {
   clearTimeout(telling);
   telling = setTimeout(() => {
     const [x, y, yaw] = ["x", "y", "yaw"].map((id) => find(id).value);
-    const told = `${cells.verdict}, ${cells.reason}; margin ${cells.margin.split(" ")[0]}; x ${x} m, y ${y} m, yaw ${yaw} degrees`;
-    if (find("told").textContent !== told) find("told").textContent = told;
+    const announced = `${cells.verdict}, ${cells.reason}; margin ${cells.margin.split(" ")[0]}; x ${x} m, y ${y} m, yaw ${yaw} degrees`;
+    if (find("told").textContent !== announced) find("told").textContent = announced;
   }, 600);
   find("verdict").className = verdict ? cells.verdict.toLowerCase() : "";
 }

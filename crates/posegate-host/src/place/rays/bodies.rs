@@ -1,10 +1,10 @@
-//! Small bodies that may lie between two rays or two headings, and the number of rays that it takes to meet them.
+//! Small bodies that may be between two rays or two headings, and the number of rays needed to meet them.
 
 use super::WhitenedPoseSet;
 use core::f64::consts::{PI, TAU};
 use posegate::shape::{ALL, BoxSet, Footprint, Line, Planar, Shape, SuccessSet};
 
-/// The parts of a set that are convex at every heading and may be small: what it keeps away from, and the boxes and
+/// The parts of a set that are convex at every heading and may be small: its excluded parts, and the boxes and
 /// regions of its unions. (The views of a union are known only by rays.)
 #[derive(Debug)]
 pub(in crate::place) struct Bodies(Vec<Body>);
@@ -20,7 +20,8 @@ enum Body {
 /// Largest number of directions in which a disc is evaluated to meet every body.
 const MOST_LOOKS: u32 = 1024;
 
-/// Extent of the sections, in radii of the ball. It is so large that a body which only passes by is seen to approach.
+/// Extent of the sections, in radii of the ball. It is large enough to detect the approach of a body that does not
+/// enter the ball.
 const FAR: f64 = 1e5;
 
 impl Bodies {
@@ -49,9 +50,9 @@ impl Bodies {
         Self(bodies)
     }
 
-    /// Returns the number of evenly spaced directions in which a heading's disc must be evaluated to meet every body in
-    /// it; 0 if `few` are enough for each body. Also returns a bound on the mass (of the disc's two coordinates) that
-    /// is still not met.
+    /// Returns the number of evenly spaced directions in which a heading's disc must be evaluated to meet every body
+    /// in it; 0 if `few` are enough for each body. Also returns a bound on the mass (of the disc's two coordinates)
+    /// that is still not met.
     pub(in crate::place) fn looks(
         &self,
         white: &WhitenedPoseSet,
@@ -60,7 +61,7 @@ impl Bodies {
         few: u32,
     ) -> (u32, f64) {
         let step = |count: u32| TAU / f64::from(count);
-        let mut wanted: Vec<([f64; 2], f64)> = Vec::new();
+        let mut extents: Vec<([f64; 2], f64)> = Vec::new();
         for body in &self.0 {
             let section = body.section(white, u1);
             let near = nearest(&section, FAR * white.radius);
@@ -68,21 +69,21 @@ impl Bodies {
                 continue;
             };
             let width = to - from;
-            // Not at its ends, where a ray may only touch it.
+            // Excludes the ends, where a ray may only touch the body.
             let inner = [from + 0.1 * width, to - 0.1 * width];
             if inner[1] - inner[0] <= step(few) {
                 let ring = libm::exp(-0.5 * near * near) - libm::exp(-0.5 * radius * radius);
-                wanted.push((inner, width / TAU * ring.max(0.0)));
+                extents.push((inner, width / TAU * ring.max(0.0)));
             }
         }
-        if wanted.is_empty() {
+        if extents.is_empty() {
             return (0, 0.0);
         }
         let missed = |count: u32| {
             let step = step(count);
             // The same directions as those of the disc.
             let meets = |[from, to]: [f64; 2]| 0.05 + step * libm::ceil((from - 0.05) / step) <= to;
-            let missed = wanted.iter().filter(|(inner, _)| !meets(*inner));
+            let missed = extents.iter().filter(|(inner, _)| !meets(*inner));
             missed.map(|(_, mass)| *mass).sum::<f64>()
         };
         let mut best = (few, missed(few));
@@ -168,8 +169,8 @@ impl Body {
         let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
         let middle = white.middle(u1);
         let step = white.radius;
-        let poses = [[0.0, 0.0], [step, 0.0], [0.0, step]].map(|way| {
-            let [x, y] = white.way(way);
+        let poses = [[0.0, 0.0], [step, 0.0], [0.0, step]].map(|offset| {
+            let [x, y] = white.to_metres(offset);
             let [x, y] = [middle[0] + x, middle[1] + y];
             Planar { x, y, cos, sin }
         });
@@ -248,7 +249,7 @@ fn nearest(corners: &[[f64; 2]], far: f64) -> f64 {
     if inside { 0.0 } else { least }
 }
 
-/// Returns the angles between which a convex polygon, at distance `near` from the origin, is seen from the origin
+/// Returns the angles between which a convex polygon, at distance `near` from the origin, is visible from the origin
 /// within a radius.
 fn extent(corners: &[[f64; 2]], near: f64, radius: f64) -> Option<[f64; 2]> {
     if !(near > 0.0 && near < radius) {
@@ -256,19 +257,19 @@ fn extent(corners: &[[f64; 2]], near: f64, radius: f64) -> Option<[f64; 2]> {
     }
     let mut points: Vec<[f64; 2]> = Vec::new();
     for (a, b) in edges(corners) {
-        let way = [b[0] - a[0], b[1] - a[1]];
+        let edge = [b[0] - a[0], b[1] - a[1]];
         if libm::hypot(a[0], a[1]) <= radius {
             points.push(a);
         }
         let [square, along, off] = [
-            way[0] * way[0] + way[1] * way[1],
-            a[0] * way[0] + a[1] * way[1],
+            edge[0] * edge[0] + edge[1] * edge[1],
+            a[0] * edge[0] + a[1] * edge[1],
             a[0] * a[0] + a[1] * a[1] - radius * radius,
         ];
         let root = libm::sqrt(along * along - square * off);
         let crossings = [(-along - root) / square, (-along + root) / square];
         let crossings = crossings.into_iter().filter(|t| *t > 0.0 && *t < 1.0);
-        points.extend(crossings.map(|t| [0, 1].map(|i| a[i] + t * way[i])));
+        points.extend(crossings.map(|t| [0, 1].map(|i| a[i] + t * edge[i])));
     }
     let angle = |[x, y]: [f64; 2]| libm::atan2(y, x);
     let first = angle(*points.first()?);

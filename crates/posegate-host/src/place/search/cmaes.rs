@@ -15,7 +15,7 @@ pub struct Cmaes {
     pub scattered: u32,
     /// First standard deviation, as a share of the cube.
     pub sigma: f64,
-    /// A run ends when the relative differences of its values are at most this.
+    /// A run ends if the relative differences of its values are at most this.
     pub settled: f64,
     /// Largest number of starts.
     pub starts: u32,
@@ -26,7 +26,7 @@ pub struct Cmaes {
     pub active: bool,
     /// `true` if the problem's initial guesses are evaluated first.
     pub hinted: bool,
-    /// `true` if every start gets the same part of the budget, however early the others settle.
+    /// `true` if every start gets the same part of the budget, even if others end early.
     pub fair: bool,
     /// The fidelity of the first evaluations.
     pub look: Fidelity,
@@ -107,7 +107,7 @@ impl Optimizer for Cmaes {
             if budget.left() == 0 {
                 break;
             }
-            // The best scattered point that is not near a point where a run began or ended.
+            // The best scattered point that is not near the start or the end of a run.
             let far = |one: &&Solution| {
                 let ended = found.iter().map(|found| &found.point);
                 let mut known = ended.chain(&begun);
@@ -128,7 +128,7 @@ impl Optimizer for Cmaes {
             }));
             begun.push(begin);
         }
-        // A run may end worse than the point where it began. Quick values are not comparable with fine ones.
+        // A run may end at a worse point than its start. Quick values are not comparable with fine ones.
         if found.is_empty() || self.look == Fidelity::Fine {
             found.extend(seen.into_iter().take(1));
         }
@@ -192,7 +192,7 @@ impl Cmaes {
         let sum: f64 = (0..parents).map(raw).sum();
         let weights: Vec<f64> = (0..parents).map(|i| raw(i) / sum).collect();
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
-        // With few evaluations the step adapts faster than by the table: chosen by what `./ci.sh placement` measures.
+        // With few evaluations the step adapts faster than by the table; `./ci.sh placement` measures this choice.
         let slower = if self.active { 3.0 } else { 5.0 };
         let c_sigma = (effective + 2.0) / (of_n + effective + slower);
         let damping =
@@ -321,7 +321,7 @@ impl Cmaes {
     }
 }
 
-/// A run continues with fine evaluations below this widest standard deviation, as a share of the cube.
+/// A run continues with fine evaluations if its widest standard deviation, as a share of the cube, is below this.
 const QUICK: f64 = 3e-3;
 
 /// Returns a point of an evenly spread sequence: Halton's, shifted at random.

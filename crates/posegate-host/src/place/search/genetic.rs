@@ -1,4 +1,5 @@
-//! A genetic algorithm, the paper's optimizer: tournaments, uniform crossover, and normally distributed mutations that get smaller.
+//! A genetic algorithm, the paper's optimizer: tournaments, uniform crossover, and normally distributed mutations of
+//! decreasing size.
 
 use super::{Budget, Fidelity, Optimizer, Problem, Solution};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
@@ -47,7 +48,7 @@ impl Optimizer for Genetic {
     fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution> {
         let size = self.population.max(2) as usize;
         let children = share(CHILDREN, size).next_multiple_of(2);
-        // One evaluation is left for the fine look at the best point.
+        // Reserves one evaluation for the fine look at the best point.
         if budget.left() <= size as u64 {
             return std::vec![Solution {
                 point: std::vec![0.5; problem.dimensions()],
@@ -150,7 +151,7 @@ impl<'a> Evolution<'a> {
             }
         }
         for child in &mut pair {
-            // A copy of a parent would be evaluated for nothing.
+            // A copy of a parent would waste an evaluation.
             if !is_crossed || self.random.gen_bool(MUTATION) {
                 self.mutate(child, step);
             }
@@ -158,7 +159,7 @@ impl<'a> Evolution<'a> {
         pair
     }
 
-    /// Moves coordinates by a normally distributed number of steps. They stay in the unit cube.
+    /// Moves coordinates by a normally distributed number of steps, within the unit cube.
     fn mutate(&mut self, point: &mut [f64], step: f64) {
         let mut numbers: Vec<usize> = (0..point.len()).collect();
         let (chosen, _) = numbers.partial_shuffle(&mut self.random, MUTATED);
@@ -208,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn children_stay_in_the_unit_cube_and_the_best_point_survives() {
+    fn children_are_in_the_unit_cube_and_the_best_point_survives() {
         let budget = Budget::new(100_000, &|_| ());
         let mut evolution = Evolution::new(&Corner, &budget, 20, 5);
         for generation in 0..200 {
@@ -228,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn small_budgets_give_one_point_and_large_ones_end_by_patience() {
+    fn small_budget_gives_one_point_and_large_one_ends_early() {
         let genetic = Genetic {
             population: 10,
             patience: 3,

@@ -44,7 +44,7 @@ pub enum Fidelity {
 pub struct Solution {
     /// The point in the unit cube.
     pub point: Vec<f64>,
-    /// Its value.
+    /// The value at the point.
     pub value: f64,
 }
 
@@ -55,7 +55,7 @@ pub trait Optimizer: Sync {
     /// The name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Returns `true` if the search uses the whole budget and its answers need no polish.
+    /// Returns `true` if the search uses the complete budget and its answers need no polish.
     fn refines_internally(&self) -> bool {
         false
     }
@@ -69,7 +69,7 @@ pub trait Optimizer: Sync {
 pub struct Budget<'a> {
     most: u64,
     spent: AtomicU64,
-    tell: &'a (dyn Fn(u64) + Sync),
+    progress: &'a (dyn Fn(u64) + Sync),
 }
 
 impl core::fmt::Debug for Budget<'_> {
@@ -82,12 +82,12 @@ impl core::fmt::Debug for Budget<'_> {
 }
 
 impl<'a> Budget<'a> {
-    /// Creates a budget of `most` evaluations. `tell` is called with the size of each evaluated batch.
-    pub const fn new(most: u64, tell: &'a (dyn Fn(u64) + Sync)) -> Self {
+    /// Creates a budget of `most` evaluations. `progress` is called with the size of each evaluated batch.
+    pub const fn new(most: u64, progress: &'a (dyn Fn(u64) + Sync)) -> Self {
         Self {
             most,
             spent: AtomicU64::new(0),
-            tell,
+            progress,
         }
     }
 
@@ -121,7 +121,7 @@ impl<'a> Budget<'a> {
 
     /// Returns the result of a search with at most `most` of these evaluations.
     pub(super) fn with_part<T>(&self, most: u64, search: impl FnOnce(&Budget<'_>) -> T) -> T {
-        let part = Budget::new(most.min(self.left()), self.tell);
+        let part = Budget::new(most.min(self.left()), self.progress);
         let found = search(&part);
         self.spent.fetch_add(part.spent(), Ordering::Relaxed);
         found
@@ -129,7 +129,7 @@ impl<'a> Budget<'a> {
 
     fn spend(&self, count: u64) {
         self.spent.fetch_add(count, Ordering::Relaxed);
-        (self.tell)(count);
+        (self.progress)(count);
     }
 }
 

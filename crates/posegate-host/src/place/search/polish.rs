@@ -1,6 +1,6 @@
-//! A local search to the minimum: steps along random orthogonal axes, longer if one of them helps and halved if none
-//! does (mesh adaptive direct search; Audet and Dennis, SIAM J. Optim. 17(1), 2006). It needs no gradient, and works at
-//! borders.
+//! A local search for the minimum (mesh adaptive direct search; Audet and Dennis, SIAM J. Optim. 17(1), 2006). It
+//! steps along random orthogonal axes. The step is longer if an axis helps, and is halved if none does. It needs no
+//! gradient, and is valid at borders.
 
 use super::{Budget, Fidelity, Optimizer, Problem, Solution, folded};
 use nalgebra::DMatrix;
@@ -30,19 +30,19 @@ impl Optimizer for Polish {
         let mut best = self.from.clone();
         let mut step = self.step;
         let mut last: Option<Vec<f64>> = None;
-        // The number of rounds in a row in which no axis helped.
+        // The number of consecutive rounds in which no axis helped.
         let mut failed = 0;
         while step > self.smallest && budget.left() > 0 {
             let drawn = DMatrix::from_fn(n, n, |_, _| random.sample::<f64, _>(StandardNormal));
             let axes = drawn.qr().q();
-            let mut ways: Vec<Vec<f64>> = Vec::with_capacity(2 * n + 1);
+            let mut directions: Vec<Vec<f64>> = Vec::with_capacity(2 * n + 1);
             for axis in axes.column_iter() {
-                ways.push(axis.iter().map(|v| v * step).collect());
-                ways.push(axis.iter().map(|v| -v * step).collect());
+                directions.push(axis.iter().map(|v| v * step).collect());
+                directions.push(axis.iter().map(|v| -v * step).collect());
             }
             // The direction that helped last is tried again, twice as far.
-            ways.extend(last.take());
-            let points: Vec<Vec<f64>> = ways
+            directions.extend(last.take());
+            let points: Vec<Vec<f64>> = directions
                 .iter()
                 .map(|way| {
                     let free: Vec<f64> =
@@ -59,7 +59,7 @@ impl Optimizer for Polish {
                     point: points[first].clone(),
                     value: values[first],
                 };
-                last = Some(ways[first].iter().map(|v| 2.0 * v).collect());
+                last = Some(directions[first].iter().map(|v| 2.0 * v).collect());
                 step = (1.5 * step).min(self.step);
                 failed = 0;
             } else {

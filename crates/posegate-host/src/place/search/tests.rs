@@ -61,7 +61,7 @@ fn optimizers() -> [&'static dyn Optimizer; 3] {
 }
 
 #[test]
-fn the_bottom_is_found() {
+fn minimum_is_found() {
     let plain = Valley {
         at: vec![0.3, 0.8, 0.55],
         round: false,
@@ -88,7 +88,7 @@ fn the_bottom_is_found() {
 }
 
 #[test]
-fn borders_are_searched() {
+fn minimum_on_a_border_is_found() {
     // The least value is on the border of the forbidden part, at a side of the cube.
     let problem = Valley {
         at: vec![1.0, 0.2],
@@ -112,7 +112,7 @@ fn borders_are_searched() {
 }
 
 #[test]
-fn answers_depend_on_the_seed_alone() {
+fn answer_depends_only_on_the_seed() {
     let problem = Valley {
         at: vec![0.3, 0.8, 0.5],
         round: true,
@@ -136,7 +136,7 @@ fn answers_depend_on_the_seed_alone() {
 }
 
 #[test]
-fn a_budget_is_kept() {
+fn budget_is_not_exceeded() {
     let problem = Valley {
         at: vec![0.3, 0.8],
         round: false,
@@ -144,11 +144,11 @@ fn a_budget_is_kept() {
     };
     for optimizer in optimizers() {
         for most in [0, 1, 49, 50, 99, 333] {
-            let told = AtomicU64::new(0);
-            let tell = |count: u64| {
-                told.fetch_add(count, Ordering::Relaxed);
+            let reported = AtomicU64::new(0);
+            let progress = |count: u64| {
+                reported.fetch_add(count, Ordering::Relaxed);
             };
-            let budget = Budget::new(most, &tell);
+            let budget = Budget::new(most, &progress);
             let found = optimizer.search(&problem, &budget, 1);
             assert!(
                 budget.spent() <= most + 1,
@@ -157,7 +157,7 @@ fn a_budget_is_kept() {
                 budget.spent()
             );
             assert!(!found.is_empty());
-            assert_eq!(told.load(Ordering::Relaxed), budget.spent());
+            assert_eq!(reported.load(Ordering::Relaxed), budget.spent());
         }
     }
 }

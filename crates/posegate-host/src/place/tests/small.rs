@@ -20,9 +20,9 @@ fn agrees(found: Approximate, exact: f64, share: f64) -> bool {
     (found.value - exact).abs() <= found.error + share * exact
 }
 
-/// A post on which the robot must not stand: the density's integral over it, for the headings in the ball.
+/// A post that the robot must avoid: the density's integral over it, for the headings in the ball.
 #[test]
-fn a_post_between_two_rays_is_met() {
+fn post_between_two_rays_is_met() {
     let plain = cost(&set(&[]), &sigmas([0.3, 0.3, 1.0]), 1e-7);
     for edge in [0.001, 0.01, 0.02, 0.1] {
         for at in [
@@ -65,7 +65,7 @@ fn a_post_between_two_rays_is_met() {
 /// An arm of one metre hits a post of 2 mm, within a tenth of a degree of headings. The position's uncertainty is
 /// smaller than the post.
 #[test]
-fn a_post_between_two_headings_is_met() {
+fn post_between_two_headings_is_met() {
     let (sigma, yaw) = (2e-4, 5f64.to_radians());
     let belief = Gaussian::of_sigmas([sigma, sigma, yaw], 0.99).unwrap();
     for heading in [0.02f64, -0.071, 0.1234, 0.21] {
@@ -103,7 +103,7 @@ fn a_post_between_two_headings_is_met() {
 
 /// The mass that no ray meets is in the reported error.
 #[test]
-fn what_no_ray_meets_is_in_the_error() {
+fn mass_that_no_ray_meets_is_in_the_error() {
     let edge = 1e-6;
     let found = cost(
         &with_post([0.0, 0.0], [-0.55, 0.4137], edge),
@@ -138,19 +138,19 @@ impl ViewCost for Within {
         1e6
     }
 
-    fn quadrature(&self, wanted: Quadrature) -> Quadrature {
+    fn quadrature(&self, requested: Quadrature) -> Quadrature {
         Quadrature {
-            accuracy: wanted.accuracy.max(1e-4),
+            accuracy: requested.accuracy.max(1e-4),
             views: 400_000,
-            ..wanted
+            ..requested
         }
     }
 }
 
-/// Views that are unknown beyond a distance are as probable as views beyond that limit. They are found within the limit
-/// of views.
+/// Views that are unknown beyond a distance are as probable as views beyond that limit. They are found within the
+/// limit of views.
 #[test]
-fn what_is_unknown_is_a_miss() {
+fn unknown_view_is_a_miss() {
     let plain = set(&[]);
     let belief = sigmas([0.1, 0.1, 1.0]);
     // Test all distances only in the deep job.
@@ -192,7 +192,7 @@ fn what_is_unknown_is_a_miss() {
         );
         assert!(asked < 1_500_000, "{distance}: {asked}");
         assert_eq!(placed.contained, share == 0.0, "{distance}: {placed:?}");
-        // Also from the goal alone.
+        // Also for an exactly known pose.
         let exactly = PlacementProblem {
             known: PosePrior::Exactly,
             ..order
@@ -238,7 +238,7 @@ fn unknown_views_are_not_contained() {
 
 /// The cost of an exactly known pose is that of its view.
 #[test]
-fn a_goal_costs_what_is_seen_from_it() {
+fn cost_of_an_exact_pose_is_that_of_its_view() {
     let found = ExpectedCost::at_goal(&set(&[]), &Cost::default()).unwrap();
     // 3.75 m straight ahead.
     assert!(

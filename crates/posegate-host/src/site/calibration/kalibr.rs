@@ -110,15 +110,15 @@ fn of_camera(
     };
     let lens = match found {
         Some(Ok(lens)) => lens,
-        Some(Err(wanted)) => {
+        Some(Err(needed)) => {
             let at = list.map_or(0..0, |list| document.span(list.referenced));
             let message = format!(
-                "distortion_coeffs has {} numbers, {} has {wanted}",
+                "distortion_coeffs has {} numbers, {} has {needed}",
                 numbers.len(),
                 model.value
             );
             let error = document.error(at, message);
-            return Err(error.expected(format!("{wanted} numbers")).help(AS_SAVED));
+            return Err(error.expected(format!("{needed} numbers")).help(AS_SAVED));
         }
         None => {
             let help = "calibrate with `--models pinhole-radtan` or `pinhole-equi`";

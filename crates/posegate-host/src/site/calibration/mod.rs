@@ -36,8 +36,8 @@ pub(super) struct Numbers {
     pub(super) turned: Option<SiteError>,
 }
 
-/// Reads the calibration file that a site's camera names. Also returns the file. Refuses a calibration
-/// for another image size than the site's.
+/// Reads the calibration file that a site's camera names. Also returns the file. Refuses a calibration for another
+/// image size than the site's.
 pub(super) fn read(
     node: &Node<'_>,
     size_px: [Option<f64>; 2],
@@ -47,8 +47,8 @@ pub(super) fn read(
         Some((file, camera)) => (file, Some(camera)),
         None => (named, None),
     };
-    let beside = Path::new(node.file()).parent().unwrap_or(Path::new(""));
-    let path = beside.join(file);
+    let folder = Path::new(node.file()).parent().unwrap_or(Path::new(""));
+    let path = folder.join(file);
     let bytes = input::read_file(&path, Limit::CALIBRATION).map_err(|cause| {
         let message = format!("the calibration {} cannot be read: {cause}", path.display());
         node.error(message)
@@ -88,7 +88,7 @@ pub(super) fn read(
     Ok((numbers.for_size(&document, size_px)?, read))
 }
 
-/// Returns `true` if a key names a camera in a Kalibr camchain.
+/// Returns `true` if a key is the name of a camera in a Kalibr camchain.
 fn is_camera(key: &str) -> bool {
     key.strip_prefix("cam")
         .is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
@@ -107,11 +107,11 @@ impl ParsedCalibration {
         size_px: [Option<f64>; 2],
     ) -> Result<Numbers, SiteError> {
         let [width, height] = self.numbers.size_px;
-        let wanted = [size_px[0].unwrap_or(width), size_px[1].unwrap_or(height)];
-        if wanted == [width, height] {
+        let site_size_px = [size_px[0].unwrap_or(width), size_px[1].unwrap_or(height)];
+        if site_size_px == [width, height] {
             return Ok(self.numbers);
         }
-        let [other_width, other_height] = wanted;
+        let [other_width, other_height] = site_size_px;
         Err(document
             .error(
                 self.size_at,

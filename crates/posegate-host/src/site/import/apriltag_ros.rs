@@ -16,7 +16,7 @@ struct File {
     tag_bundles: Option<Spanned<Vec<Spanned<Bundle>>>>,
 }
 
-// An unknown key is refused: if misspelt, its value would silently be the default.
+// An unknown key is refused: a misspelt key would silently leave the default.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Single {

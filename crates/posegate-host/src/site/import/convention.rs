@@ -40,7 +40,7 @@ impl Convention {
         })
     }
 
-    /// Returns its name.
+    /// Returns the convention's name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -52,7 +52,7 @@ impl Convention {
         }
     }
 
-    /// Returns the directions of its axes, in words.
+    /// Returns a description of the directions of its axes.
     #[must_use]
     pub const fn axes_in_words(self) -> &'static str {
         match self {

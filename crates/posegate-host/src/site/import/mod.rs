@@ -1,7 +1,7 @@
 //! Reads maps of tags and docks from other programs into the tags and goals of a site.
 //!
-//! Nothing is guessed. A format that leaves the tag frame open needs a [`Convention`]; a format without sizes
-//! or poses needs them as settings. A setting that the format itself fixes is refused.
+//! Nothing is guessed. A format that does not define the tag frame needs a [`Convention`]; a format without sizes or
+//! poses needs them as settings. A setting that the format itself defines is refused.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -56,7 +56,7 @@ impl Format {
         })
     }
 
-    /// Returns its name.
+    /// Returns the format's name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -67,7 +67,7 @@ impl Format {
         }
     }
 
-    /// Returns the tag frame that the format itself fixes; `None` if it fixes none.
+    /// Returns the tag frame that the format defines; `None` if it defines none.
     #[must_use]
     pub const fn convention(self) -> Option<Convention> {
         match self {
@@ -92,13 +92,13 @@ impl Format {
 pub struct Import {
     /// The format of the file.
     pub format: Format,
-    /// The tag frame of the file; needed if the format leaves it open.
+    /// The tag frame of the file; needed if the format does not define it.
     pub convention: Option<Convention>,
     /// The edge length of the tags' black border, metres, if the format has none.
     pub size: Option<f64>,
     /// The tags' family, if the format has none.
     pub family: Option<String>,
-    /// The pose of the file's frame in the world. For a bundle: the pose of a tag of ours mounted at the
+    /// The pose of the file's frame in the world. For a bundle: the pose of one of our tags mounted at the
     /// bundle's origin. A bundle needs it; other maps are at the world's origin without it.
     pub pose: Option<Pose3Deg>,
     /// The prefix of names: before a tag's number (default `t`) or a dock's name (default empty).

@@ -51,7 +51,7 @@ impl Frame {
         }
     }
 
-    /// Returns the frame `inner`, given in this frame, in the frame that this one is given in.
+    /// Converts the frame `inner` from this frame to the frame in which this frame is given.
     pub(super) fn then(&self, inner: &Self) -> Self {
         let [x, y, z] = times(self.turn, inner.at);
         Self {
@@ -108,7 +108,7 @@ fn product(a: Matrix, b: Matrix) -> Matrix {
     transposed(transposed(b).map(|column| times(a, column)))
 }
 
-/// Returns a planar pose that is given in a frame on the floor.
+/// Converts a planar pose from a frame on the floor to the world.
 pub(super) fn on_the_floor(frame: Pose3Deg, inner: PoseDeg) -> PoseDeg {
     let [c, s] = f64::cos_sin_deg(frame.yaw_deg);
     PoseDeg {

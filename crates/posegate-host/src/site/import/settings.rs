@@ -1,4 +1,4 @@
-//! Checks an import's settings: what the format fixes itself must not be set, everything else must.
+//! Checks an import's settings: values that the format defines must not be set, all others must.
 
 use super::place::Frame;
 use super::{Convention, Format, Import, ImportError, is_size};
@@ -6,8 +6,7 @@ use crate::site::keys;
 use posegate::shape::Pose3Deg;
 
 impl Import {
-    /// Returns the frame of the tags: that of the format, or the setting if the format leaves it
-    /// open.
+    /// Returns the frame of the tags: that of the format, or the setting if the format does not define one.
     pub(super) fn convention(&self) -> Result<Convention, ImportError> {
         let format = self.format.name();
         match (self.format.convention(), self.convention) {

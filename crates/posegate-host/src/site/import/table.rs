@@ -96,8 +96,8 @@ fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, NamedFile), SiteE
             None => None,
         },
     };
-    let beside = Path::new(file.file()).parent().unwrap_or(Path::new(""));
-    let path = beside.join(path);
+    let folder = Path::new(file.file()).parent().unwrap_or(Path::new(""));
+    let path = folder.join(path);
     let name = path.to_string_lossy();
     let bytes = input::read_file(&path, Limit::MAP).map_err(|cause| {
         file.error(format!("the file {name} cannot be read: {cause}"))

@@ -46,7 +46,7 @@ pub(super) fn tables(imported: &Imported) -> String {
     text.trim_start().to_string()
 }
 
-/// Returns a name as a part of a table's header.
+/// Returns a name as part of a table's header.
 fn key(name: &str) -> String {
     let bare = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
     if !name.is_empty() && name.bytes().all(bare) {

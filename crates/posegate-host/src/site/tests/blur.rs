@@ -70,14 +70,14 @@ fn most_blurred(keys: &str, phi_max_deg: f64, off_by: f64, focal: f64) -> f64 {
 }
 
 #[test]
-fn a_tag_blurs_no_more_than_is_allowed() {
+fn tag_blur_is_within_the_limit() {
     let most = most_blurred("", 40.0, 0.0, 1.0);
     assert!(most <= 1.5 && most > 1.4, "{most}");
 }
 
 /// A lens that magnifies off the axis blurs more than a pinhole.
 #[test]
-fn a_lens_blurs_too() {
+fn tag_blur_with_a_lens_is_within_the_limit() {
     for coefficients in [
         "[0.3, 0.05, 0.0, 0.0, 0.0]",
         "[-0.25, 0.06, 0.0, 0.02, 0.0]",
@@ -92,7 +92,7 @@ fn a_lens_blurs_too() {
 
 /// A camera farther from the robot's centre than stated moves faster.
 #[test]
-fn a_camera_off_its_mount_blurs_too() {
+fn tag_blur_with_mount_error_is_within_the_limit() {
     let keys = "mount_tolerance = { translation = 0.2, angle_deg = 0.0 }";
     let most = most_blurred(keys, 20.0, 0.2, 1.0);
     assert!(most <= 1.5, "{most}");
@@ -100,7 +100,7 @@ fn a_camera_off_its_mount_blurs_too() {
 
 /// A focal length above the calibration's also blurs more.
 #[test]
-fn a_camera_off_its_calibration_blurs_too() {
+fn tag_blur_with_focal_error_is_within_the_limit() {
     let keys = "tolerance = { focal = 0.05, centre_px = 0.0 }";
     let most = most_blurred(keys, 40.0, 0.0, 1.05);
     assert!(most <= 1.5 && most > 1.4, "{most}");

@@ -57,8 +57,8 @@ fn site(keys: &str) -> String {
     format!("[camera.front]\n{keys}\n{mount}\n")
 }
 
-/// Writes a site and a calibration file into one folder, and reads the site.
-fn beside(calibration: &str, keys: &str) -> Result<Site, SiteError> {
+/// Writes a site and a calibration file into one folder and reads the site.
+fn site_with(calibration: &str, keys: &str) -> Result<Site, SiteError> {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("front.yaml"), calibration).expect("written");
     let file = folder.path().join(FILE);
@@ -67,7 +67,7 @@ fn beside(calibration: &str, keys: &str) -> Result<Site, SiteError> {
 }
 
 fn camera(calibration: &str, keys: &str) -> Camera {
-    match beside(calibration, keys) {
+    match site_with(calibration, keys) {
         Ok(site) => site.cameras["front"].camera,
         Err(error) => panic!("{error}"),
     }
@@ -163,7 +163,7 @@ fn camchains_are_read() {
 }
 
 #[test]
-fn roi_and_binning_are_those_of_ros() {
+fn roi_and_binning_follow_the_ros_convention() {
     let keys = "calibration = 'front.yaml'\nimage = 'raw'\nborder_px = 3
 roi = { x_offset = 20, y_offset = 30, width = 601, height = 402 }\nbinning = [2, 3]";
     let camera = camera(ROS, keys);
@@ -177,9 +177,9 @@ roi = { x_offset = 0, y_offset = 0, width = 0, height = 0 }";
 }
 
 #[test]
-fn digests_cover_calibrations() {
+fn digest_depends_on_the_calibration() {
     let keys = "calibration = 'front.yaml'\nimage = 'raw'";
-    let digest = |text: &str| beside(text, keys).expect("sound").digest;
+    let digest = |text: &str| site_with(text, keys).expect("sound").digest;
     assert_eq!(digest(ROS), digest(ROS));
     let commented = format!("{ROS}# checked\n");
     assert_ne!(digest(ROS), digest(&commented));
@@ -238,7 +238,7 @@ fn check(calibration: &str, table: &str, rows: usize, keys: impl Fn(&str) -> Str
         };
         assert!(calibration.contains(from.as_str()), "{row}");
         let text = calibration.replacen(from.as_str(), to, 1);
-        let error = match beside(&text, &keys(more)) {
+        let error = match site_with(&text, &keys(more)) {
             Ok(_) => panic!("no fault: {row}"),
             Err(error) => error,
         };
@@ -251,27 +251,27 @@ fn check(calibration: &str, table: &str, rows: usize, keys: impl Fn(&str) -> Str
         );
         assert!(error.message.contains(message.as_str()), "{row}: {error}");
         assert!(error.expected.is_some(), "{row}: {error}");
-        let told = error.help.as_deref().expect("help");
-        assert!(told.contains(help.as_str()), "{row}: {error}");
+        let advice = error.help.as_deref().expect("help");
+        assert!(advice.contains(help.as_str()), "{row}: {error}");
     }
 }
 
 #[test]
-fn bad_ros_calibrations_point_at_the_place() {
+fn errors_in_ros_calibrations_point_at_the_fault() {
     check(ROS, ROS_FAULTS, 21, |more| {
         format!("calibration = 'front.yaml'\nimage = 'rect'\n{more}")
     });
 }
 
 #[test]
-fn bad_camchains_point_at_the_place() {
+fn errors_in_camchains_point_at_the_fault() {
     check(KALIBR, KALIBR_FAULTS, 10, |more| {
         format!("calibration = 'front.yaml{more}'\nimage = 'raw'")
     });
 }
 
 #[test]
-fn what_the_site_says_of_a_calibration_is_checked_there() {
+fn site_keys_for_a_calibration_are_checked() {
     let rows = [
         (
             "calibration = 'rear.yaml'\nimage = 'raw'",
@@ -292,12 +292,13 @@ fn what_the_site_says_of_a_calibration_is_checked_there() {
         ("calibration = 7\nimage = 'raw'", ROS, "is a whole number"),
     ];
     for (keys, text, message) in rows {
-        let error = beside(text, keys).expect_err("a fault");
+        let error = site_with(text, keys).expect_err("a fault");
         assert!(error.file.ends_with(FILE) && error.at.is_some(), "{error}");
         assert!(error.message.contains(message), "{keys}: {error}");
     }
     let folding = ROS.replace("-0.22, 0.06", "-0.6, 0.06");
-    let error = beside(&folding, "calibration = 'front.yaml'\nimage = 'raw'").expect_err("folds");
+    let error =
+        site_with(&folding, "calibration = 'front.yaml'\nimage = 'raw'").expect_err("folds");
     assert!(
         error.message.contains("the distortion folds at "),
         "{error}"

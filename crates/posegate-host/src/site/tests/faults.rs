@@ -1,4 +1,4 @@
-//! Faulty site files: where errors point and what they say.
+//! Faulty site files: positions and texts of the errors.
 
 use super::{fault, find, sample_with};
 
@@ -8,8 +8,8 @@ width_px = 640 => width_px = 640.5 => 640.5 => a number with a fraction
 height_px = 480 => height_px = -480 => -480 => is -480 => height_px = 480
 fx = 615.0 => fx = 0 => 0   => `camera.front.fx` is 0 => write it like `fx = 615.0`
 fy = 615.0 => fy = -615 => -615 => `camera.front.fy` is -615 => fy =
-cx = 320.0 => cx = nan => nan => no finite number => cx =
-cx = 320.0 => cx = 1e400 => 1e400 => no finite number => cx =
+cx = 320.0 => cx = nan => nan => not a finite number => cx =
+cx = 320.0 => cx = 1e400 => 1e400 => not a finite number => cx =
 cy = 240.0 => cy = "240" => "240" => `camera.front.cy` is a string => cy = 240.0
 cy = 240.0 => cy = 9007199254740993 => 9007199254740993 => is 9007
 x = 0.25 => x = inf => inf => `camera.front.mount.x` is inf => x =
@@ -103,7 +103,7 @@ success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0
 "#;
 
 #[test]
-fn a_bound_is_not_below_zero() {
+fn bound_below_zero_is_an_error() {
     let model = "[error_model.m]\ntranslation = [0.01, 0.0, 0.0, -0.02]\nyaw_deg = [1.0, 0.0, 0.0, 0.0]\n[tag.t7]";
     let site = |psi_max_deg: &str| {
         let set = format!(
@@ -112,10 +112,10 @@ fn a_bound_is_not_below_zero() {
         sample_with("[tag.t7]", model).replace("psi_max_deg = 50.0", &set)
     };
     // 0.01 - 0.02 psi^2 is 0 at 40.5 deg.
-    let told = fault(&site("41.0")).to_string();
+    let message = fault(&site("41.0")).to_string();
     assert!(
-        told.contains("has a bound below 0 at a psi of 41 deg"),
-        "{told}"
+        message.contains("has a bound below 0 at a psi of 41 deg"),
+        "{message}"
     );
     assert!(crate::site::Site::parse(&site("40.0"), "site.toml").is_ok());
 }
@@ -130,7 +130,7 @@ fx = 615.0 => distortion = { model = "plumb_bop", coefficients = [1] }\nfx = 615
 fx = 615.0 => distortion = { model = "plumb_bob", coefficients = [1, 2, 3, 4] }\nfx = 615.0
     => [1, 2, 3, 4] => has 4 coefficients, plumb_bob has 5 => write it like
 fx = 615.0 => distortion = { model = "equidistant", coefficients = [1, nan, 3, 4] }\nfx = 615.0
-    => nan => which is no finite number => write it like
+    => nan => which is not a finite number => write it like
 fx = 615.0 => distortion = { model = "equidistant", coefficients = [0, 0, 0, 0] }\nfx = 615.0
     => [camera.front] => `image` is missing from `camera.front`, whose raw image differs => image_raw
 fx = 615.0 => image = "raw"\ndistortion = { model = "plumb_bob", coefficients = [-1, 0, 0, 0, 0] }\nfx = 615.0
@@ -184,26 +184,26 @@ fn check(table: &str, rows: usize) {
 }
 
 #[test]
-fn bad_numbers_point_at_the_value() {
+fn number_errors_point_at_the_value() {
     check(NUMBERS, 20);
 }
 
 #[test]
-fn bad_keys_point_at_the_key() {
+fn key_errors_point_at_the_key() {
     check(KEYS, 15);
 }
 
 #[test]
-fn bad_meanings_point_at_the_value() {
+fn semantic_errors_point_at_the_value() {
     check(MEANINGS, 19);
 }
 
 #[test]
-fn bad_cameras_point_at_what_makes_them_so() {
+fn camera_errors_point_at_the_faulty_key() {
     check(CAMERAS, 14);
 }
 
 #[test]
-fn sets_and_what_they_refer_to() {
+fn success_set_errors_point_at_the_faulty_value() {
     check(SETS, 18);
 }

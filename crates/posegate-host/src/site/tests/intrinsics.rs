@@ -29,7 +29,7 @@ error_bound = {{ translation = 0.05, yaw_deg = 2.0 }}
     )
 }
 
-/// What the camera sees at poses of the set: corners with the nominal calibration, and d and psi.
+/// Returns the view at poses of the set: corners with the nominal calibration, and d and psi.
 fn sights(site: &str) -> Vec<([[f64; 2]; 4], f64, f64)> {
     let site = Site::parse(site, FILE).expect("a site");
     let set = &site.task("see").expect("a task").success;
@@ -51,7 +51,7 @@ fn sights(site: &str) -> Vec<([[f64; 2]; 4], f64, f64)> {
 }
 
 #[test]
-fn corners_stay_in_the_image() {
+fn corners_are_in_the_image_within_the_tolerance() {
     for lens in [
         "",
         "image = \"raw\"\ndistortion = { model = \"plumb_bob\", coefficients = [-0.2, 0.05, 0.001, -0.001, 0.0] }",
@@ -64,13 +64,14 @@ fn corners_stay_in_the_image() {
                 let kept = if [border, view] == [""; 2] { 0.0 } else { 4.0 };
                 let mut nearest = f64::INFINITY;
                 for (corners, _, _) in sights(&site(&keys, view)) {
-                    for ([u, v], way, by) in corners.iter().flat_map(|corner| {
-                        [-1.0, 1.0]
-                            .into_iter()
-                            .flat_map(move |way| [-1.0, 1.0].map(move |by| (*corner, way, by)))
+                    for ([u, v], direction, by) in corners.iter().flat_map(|corner| {
+                        [-1.0, 1.0].into_iter().flat_map(move |direction| {
+                            [-1.0, 1.0].map(move |by| (*corner, direction, by))
+                        })
                     }) {
-                        let off =
-                            |at: f64, axis: f64| at + way * focal * (at - axis) + by * centre_px;
+                        let off = |at: f64, axis: f64| {
+                            at + direction * focal * (at - axis) + by * centre_px
+                        };
                         let (u, v) = (off(u, 350.0), off(v, 230.0));
                         let within = u.min(640.0 - u).min(v).min(480.0 - v) - kept;
                         nearest = nearest.min(within);
@@ -85,7 +86,7 @@ fn corners_stay_in_the_image() {
 }
 
 #[test]
-fn bits_stay_wide_enough() {
+fn bits_are_wide_enough_within_the_tolerance() {
     let keys = "tolerance = { focal = 0.1, centre_px = 0.0 }";
     let mut narrowest = f64::INFINITY;
     for (_, d, psi) in sights(&site(keys, ", px_per_bit_min = 6.0")) {
@@ -99,10 +100,10 @@ fn bits_stay_wide_enough() {
 fn rectified_images_are_refused() {
     let keys = "image = \"rect\"\ndistortion = { model = \"plumb_bob\", coefficients = [-0.2, 0.05, 0.0, 0.0, 0.0] }\n\
                 tolerance = { focal = 0.01, centre_px = 0.0 }";
-    let told = fault(&site(keys, "")).to_string();
+    let message = fault(&site(keys, "")).to_string();
     assert!(
-        told.contains("`camera.front.tolerance` is supported only for raw images"),
-        "{told}"
+        message.contains("`camera.front.tolerance` is supported only for raw images"),
+        "{message}"
     );
     let wide = "tolerance = { focal = 0.4, centre_px = 200.0 }";
     assert!(

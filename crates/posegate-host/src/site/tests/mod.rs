@@ -167,7 +167,7 @@ start = { x = 0, y = 0, yaw_deg = 0, bounded = { translation = 0, yaw_deg = 0 } 
 }
 
 #[test]
-fn bad_toml_points_at_the_place() {
+fn toml_errors_point_at_the_fault() {
     let rows = [
         ("[camera.front\n", 1, 14, "unclosed table"),
         ("a = 1\na = 2\n", 2, 1, "duplicate key"),
@@ -214,7 +214,7 @@ fn errors_print_on_one_line() {
 
 /// A missing extent is chosen so that it holds the set, within the expected pose-set.
 #[test]
-fn extents_are_chosen() {
+fn missing_extent_is_chosen() {
     let site = |success: &str, rest: &str| {
         let text = format!(
             "[task.a]\nkind = 'work'\ngoal = {{ x = 3, y = 0, yaw_deg = 90 }}\nsuccess = {success}\n{rest}"
@@ -244,7 +244,7 @@ fn extents_are_chosen() {
 }
 
 #[test]
-fn unknown_tasks_are_named() {
+fn error_of_an_unknown_task_states_its_name() {
     let site = Site::parse(SAMPLE, FILE).expect("the sample is sound");
     let error = site.task("dokc").expect_err("no such task");
     assert_eq!(error.similar.as_deref(), Some("dock"));

@@ -10,9 +10,9 @@ fn with(row: &str) -> String {
 
 const ROW: &str = "[candidates.n]\nwall = \"north\"\nevery = 1.5\nz = [1.0, 1.4]\nid = 40\nfamily = \"tag36h11\"\nsize = 0.2\ncost = 2.0\n";
 
-/// What the installer may be off by is part of each candidate: without it a cover promises nothing for a tag that is mounted by hand.
+/// Each candidate has the tolerance of its row: without it a cover is not valid for a tag that is mounted by hand.
 #[test]
-fn a_tolerance_is_that_of_every_candidate_of_the_row() {
+fn candidates_have_the_tolerance_of_their_row() {
     let row = ROW.to_owned() + "tolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
     let site = Site::parse(&with(&row), FILE).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(site.candidates.len(), 8);
@@ -59,7 +59,7 @@ fn rows_are_on_the_side_of_the_goals() {
         assert_eq!((name, z, id), (expected.0, expected.2, expected.3));
         assert!((x - expected.1).abs() < 1e-12, "{name}: {x}");
     }
-    // A keep-out that reaches them, from the other end of the wall.
+    // A keep-out at these places, measured from the other end of the wall.
     for (from, to, kept_out) in [
         ("x", "x", 0.75),
         (
@@ -102,7 +102,7 @@ fn rows_are_on_the_faces_of_blocks_that_goals_see() {
 }
 
 #[test]
-fn bad_rows_are_told() {
+fn errors_in_rows_state_the_fault() {
     for (from, to, message, help) in [
         (
             "\"north\"",

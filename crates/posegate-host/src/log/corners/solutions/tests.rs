@@ -1,4 +1,4 @@
-//! The solutions against a projection that shares no code with the module.
+//! Tests of the solutions with a projection that shares no code with the module.
 
 use super::super::locate;
 use super::*;
@@ -147,9 +147,9 @@ fn share(fix: &Fix, pose: [f64; 3]) -> f64 {
     covariance.cholesky().unwrap().solve(&away).dot(&away) / R2
 }
 
-/// Random mounts, tags and poses, without noise: one of the solutions is the pose.
+/// Random mounts, tags and poses, without noise: one solution is the true pose.
 #[test]
-fn one_solution_is_the_true_pose() {
+fn exact_corners_have_the_true_pose_as_a_solution() {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let (mut views, mut pairs, mut refused) = (0, 0, 0);
     while views < crate::rounds(400, 5) {
@@ -162,7 +162,7 @@ fn one_solution_is_the_true_pose() {
             pitch_deg: small(),
             yaw_deg: 10.0 * small(),
         };
-        // Every second tag hangs upright at the height of the camera.
+        // Every second tag is mounted upright at the height of the camera.
         let upright = if views % 2 == 0 { 0.0 } else { 1.0 };
         let mount = match views % 2 {
             0 => Pose3Deg {
@@ -200,7 +200,7 @@ fn one_solution_is_the_true_pose() {
         views += 1;
         let all = match locate_all(&eye(mount), &[seen(&tag, pixels)], 0.5, R2) {
             Ok(all) => all,
-            // So small that the poses that fit go far around the tag.
+            // The tag is so small that poses all around it fit.
             Err(FixError::Ambiguous) => {
                 refused += 1;
                 continue;
@@ -220,9 +220,10 @@ fn one_solution_is_the_true_pose() {
     );
 }
 
-/// 10 degrees off its normal, the tag fits mirrored too. [`locate`] then has no fix, and the two solutions are on both sides of the tag.
+/// 10 degrees off its normal, the mirrored tag fits too. [`locate`] then has no fix, and the two solutions are on
+/// both sides of the tag.
 #[test]
-fn a_tag_that_is_seen_head_on_has_two_solutions() {
+fn head_on_tag_has_two_solutions() {
     let (eye, tag) = (eye(LEVEL), wall_tag());
     let bearing = 10f64.to_radians();
     let at = |side: f64| {
@@ -238,15 +239,16 @@ fn a_tag_that_is_seen_head_on_has_two_solutions() {
     assert!(share(&first, at(1.0)) < 1e-6 && first.rms_px < 1e-6);
     let other = apart(&Vector3::from(second.pose), &Vector3::from(at(-1.0)));
     assert!(other < 0.2 && second.rms_px > 1e-3, "{second:?}");
-    // Far from head-on there is one.
+    // Far from head-on there is one solution.
     let oblique = projected(&CAMERA, &LEVEL, &tag, [1.7, 0.7, -0.25], 75.0).unwrap();
     let all = locate_all(&eye, &[seen(&tag, oblique)], 0.3, R2).unwrap();
     assert_eq!(all.len(), 1, "{all:?}");
 }
 
-/// Two tags side by side have one solution, near as it is to the mirrored one of each alone; a minimum at infinity does not count.
+/// Two neighbouring tags have one solution, although it is near the mirrored one of each tag alone. A minimum at
+/// infinity does not count.
 #[test]
-fn several_tags_are_fitted_together() {
+fn two_tags_together_have_one_solution() {
     let camera = Camera::pinhole([1280.0, 960.0], [1720.0, 1720.0], [640.0, 480.0]);
     let eye = MountedCamera {
         camera,
@@ -281,10 +283,10 @@ fn several_tags_are_fitted_together() {
     }
 }
 
-/// Exactly the stated noise, from oblique to head-on and from near to far: the union of the sets holds the truth in at least 99 % of all
-/// observations that are not refused, and few are refused.
+/// Exactly the stated noise, from oblique to head-on and from near to far. The union of the sets contains the truth
+/// in at least 99 % of all observations that are not refused, and few are refused.
 #[test]
-fn the_union_of_the_sets_holds_the_truth() {
+fn union_of_sets_contains_truth_under_stated_noise() {
     let (eye, tag) = (eye(LEVEL), wall_tag());
     let poses = [
         [1.7, 0.7, -0.25],
@@ -328,9 +330,10 @@ fn the_union_of_the_sets_holds_the_truth() {
     assert!(cfg!(miri) || counted[4][2] > 100.0, "{counted:?}");
 }
 
-/// Tag and camera at the ends of their tolerances: the union holds the pose, also where the mirrored pose then fits best.
+/// Tag and camera at the ends of their tolerances: the union contains the pose, even if the mirrored pose then fits
+/// best.
 #[test]
-fn the_union_holds_the_truth_wherever_tag_and_camera_are() {
+fn union_contains_truth_for_tag_and_camera_within_tolerance() {
     let tag = wall_tag();
     let off = Tolerance {
         translation: 0.01,
@@ -359,7 +362,7 @@ fn the_union_holds_the_truth_wherever_tag_and_camera_are() {
                 size
             }
         };
-        // Each axis at an end of its own would leave the ball.
+        // If each axis were at its own end, the point would be outside of the ball.
         let each = 1.0 / libm::sqrt(3.0);
         let real = Tag {
             pose: Pose3Deg {
@@ -404,11 +407,11 @@ fn the_union_holds_the_truth_wherever_tag_and_camera_are() {
 }
 
 #[test]
-fn what_does_not_fit_has_no_solution() {
+fn corners_that_do_not_fit_have_no_solution() {
     let (eye, tag) = (eye(LEVEL), wall_tag());
     let good = projected(&CAMERA, &LEVEL, &tag, [1.7, 0.7, -0.25], 75.0).unwrap();
     let all = |pixels, sigma| locate_all(&eye, &[seen(&tag, pixels)], sigma, R2);
-    // The corners of a detector that begins with another one.
+    // The corners of a detector that starts at another corner.
     let mut rolled = good;
     rolled.rotate_left(1);
     assert_eq!(all(rolled, 0.3), Err(FixError::Misfit));

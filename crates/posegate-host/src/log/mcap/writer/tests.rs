@@ -75,13 +75,13 @@ proptest! {
 
     /// The crate `mcap` reads files of this writer in `crates/posegate-peers`.
     #[test]
-    fn messages_are_read_back(content in content()) {
+    fn written_messages_are_read_back(content in content()) {
         prop_assert_eq!(read(&written(&content)).0, content.messages);
     }
 }
 
 #[test]
-fn chunks_end_behind_a_mebibyte() {
+fn chunks_end_after_one_mebibyte() {
     let messages: Vec<_> = (0..30).map(|k| (k % 2, k as u64, 100_000)).collect();
     let content = Content {
         topics: 3,
@@ -94,7 +94,7 @@ fn chunks_end_behind_a_mebibyte() {
 }
 
 #[test]
-fn an_output_that_is_full_is_an_error() {
+fn full_output_is_an_error() {
     let mut writer = Writer::new(Cursor::new([0u8; 200]), "posegate").map_err(drop);
     let writer = writer.as_mut().unwrap();
     let channel = writer.add_channel(0, "/t", "json").unwrap();

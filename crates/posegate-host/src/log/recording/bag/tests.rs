@@ -105,18 +105,18 @@ fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
 const COMPRESSIONS: [&str; 3] = ["", "zstd", "lz4"];
 
 #[test]
-fn whole_bags_are_read_whole() {
+fn undamaged_bags_are_read_completely() {
     for compression in COMPRESSIONS {
-        let (seconds, told) = read(&bag(compression).0);
+        let (seconds, diagnostics) = read(&bag(compression).0);
         let all: Vec<f64> = (0..CHUNKS * POSES).map(|k| k as f64).collect();
         assert_eq!(seconds, all, "{compression:?}");
-        assert_eq!((told.bad_chunks, told.damage), (0, None));
+        assert_eq!((diagnostics.bad_chunks, diagnostics.damage), (0, None));
     }
 }
 
-/// Changes every byte of a chunk in turn: a bad chunk is left out completely and counted, the others are read.
+/// Changes every byte of a chunk in turn: the bad chunk is left out completely and counted, the others are read.
 #[test]
-fn a_chunk_with_a_wrong_byte_is_left_out_whole() {
+fn chunk_with_a_wrong_byte_is_left_out_completely() {
     for compression in COMPRESSIONS {
         let (bytes, places) = bag(compression);
         let mut bad = 0;
@@ -124,13 +124,13 @@ fn a_chunk_with_a_wrong_byte_is_left_out_whole() {
             for change in [1, 0x80, 0xff] {
                 let mut bytes = bytes.clone();
                 bytes[at] ^= change;
-                let (seconds, told) = read(&bytes);
-                bad += told.bad_chunks;
-                let without = |k: &usize| told.bad_chunks == 0 || k / POSES != 1;
+                let (seconds, diagnostics) = read(&bytes);
+                bad += diagnostics.bad_chunks;
+                let without = |k: &usize| diagnostics.bad_chunks == 0 || k / POSES != 1;
                 let expected = (0..CHUNKS * POSES).filter(without).map(|k| k as f64);
                 let expected: Vec<f64> = expected.collect();
                 assert_eq!(seconds, expected, "{compression:?} {at} {change:x}");
-                assert_eq!(told.damage.is_some(), told.bad_chunks > 0);
+                assert_eq!(diagnostics.damage.is_some(), diagnostics.bad_chunks > 0);
             }
         }
         // Every byte except the times in the chunk's header, which are not used.

@@ -1,4 +1,4 @@
-//! Faulty import files: where errors point and what they say.
+//! Faulty import files: positions and texts of the errors.
 
 use super::{BUNDLES, DOCKS, FIELD, TABLES, WALL, bundle, docks, fault, wpilib};
 use crate::site::import::{Format, Import};
@@ -30,13 +30,13 @@ fn check(order: &Import, file: &str, rows: &[&str]) {
         assert_eq!(place.line, line, "{row}: {error}");
         assert!(error.message.contains(message.as_str()), "{row}: {error}");
         assert!(error.expected.is_some(), "{row}: {error}");
-        let told = error.help.as_deref().expect("help");
-        assert!(told.contains(help.as_str()), "{row}: {error}");
+        let advice = error.help.as_deref().expect("help");
+        assert!(advice.contains(help.as_str()), "{row}: {error}");
     }
 }
 
 #[test]
-fn bad_field_layouts_point_at_the_place() {
+fn errors_in_field_layouts_point_at_the_fault() {
     let rows = [
         r#""Z": 1.0 => "Z": 0.9 => { "W": 0.0, "X": 0.0, "Y": 0.0, "Z": 0.9 => has length 0.9000 => W is the cosine"#,
         r#""Z": 1.0 => "Z": 0.0 => { "W": 0.0, "X": 0.0, "Y": 0.0, "Z": 0.0 => has length 0.0000 => all digits"#,
@@ -64,7 +64,7 @@ fn bad_field_layouts_point_at_the_place() {
 }
 
 #[test]
-fn bad_bundles_point_at_the_place() {
+fn errors_in_bundles_point_at_the_fault() {
     let rows = [
         "z: 0.05 => z: 0.05, qw: 0.7, qz: 0.7 => {id: 11 => the quaternion of tag 11 (qw 0.7, qx 0, qy 0, qz 0.7) has length 0.9899 => all digits",
         "z: 0.05 => z: 0.05, qW: 0.7 => qW => unknown field `qW` => qw: 1",
@@ -101,7 +101,7 @@ fn bad_bundles_point_at_the_place() {
 }
 
 #[test]
-fn bad_docks_point_at_the_place() {
+fn errors_in_docks_point_at_the_fault() {
     let rows = [
         "1.5] => 90] => 90] => the heading of dock `home` is 90 radians => 1.5708",
         "1.5] => .inf] => .inf => docks.home.pose[2] is inf => measure",
@@ -131,14 +131,14 @@ fn bad_docks_point_at_the_place() {
 }
 
 #[test]
-fn bad_tables_point_at_the_place() {
+fn errors_in_tables_point_at_the_fault() {
     let rows = [
         "size = 0.2 => size = 0 => 0\\npose => `tag.wall.size` is 0 => size = 0.30",
         "yaw_deg = 90.0 => yaw = 1.57 => yaw = => unknown key `yaw` => in degrees",
         "[goal.home] => [task.home] => task => unknown key `task` => remove it",
         "[goal.home] => [goal.\"\"] => \"\" => is empty => choose",
         "id = 5 => id = seven => seven => not valid TOML => quotes",
-        "x = 1.0 => x = nan => nan => no finite number => x = ",
+        "x = 1.0 => x = nan => nan => not a finite number => x = ",
     ];
     check(&Import::of(Format::Posegate), TABLES, &rows);
     let none = fault(&Import::of(Format::Posegate), "");

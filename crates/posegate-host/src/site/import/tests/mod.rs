@@ -140,7 +140,7 @@ fn each_format_is_read() {
 }
 
 #[test]
-fn prefixes_stand_before_names() {
+fn prefix_comes_before_the_name() {
     let named = |format, text: &str, prefix: &str| {
         let order = Import {
             prefix: Some(prefix.into()),
@@ -160,7 +160,7 @@ fn prefixes_stand_before_names() {
 
 /// Missing settings, settings that a format does not have, and invalid values.
 #[test]
-fn settings_are_said_once() {
+fn missing_and_superfluous_settings_are_errors() {
     let pose = Some(WALL);
     let own = || Import::of(Format::Posegate);
     let rows = vec![
@@ -300,9 +300,9 @@ fn settings_are_said_once() {
         convention: None,
         ..bundle("dock")
     };
-    let told = open.parse(BUNDLES, "map").expect_err("open").to_string();
+    let message = open.parse(BUNDLES, "map").expect_err("open").to_string();
     for name in Convention::NAMES {
-        assert!(told.contains(&format!("\"{name}\"")), "{told}");
+        assert!(message.contains(&format!("\"{name}\"")), "{message}");
         assert_eq!(Convention::named(name).map(Convention::name), Some(name));
     }
     for name in Format::NAMES {
@@ -327,23 +327,23 @@ fn every_frame_is_right_handed() {
 proptest! {
     /// Angles computed from a rotation give the same rotation, at every pitch.
     #[test]
-    fn turns_are_their_angles(
+    fn angles_of_a_rotation_give_the_same_rotation(
         roll_deg in -180.0..180.0_f64,
         pitch_deg in prop_oneof![-90.0..90.0_f64, Just(90.0), Just(-90.0), 89.999_999..90.0_f64, -90.0..-89.999_999_999],
         yaw_deg in -180.0..180.0_f64,
     ) {
         let pose = Pose3Deg { x: 1.0, y: -2.0, z: 3.0, roll_deg, pitch_deg, yaw_deg };
-        let told = Frame::of_pose(pose).pose();
-        prop_assert_eq!([told.x, told.y, told.z], [1.0, -2.0, 3.0]);
+        let restored = Frame::of_pose(pose).pose();
+        prop_assert_eq!([restored.x, restored.y, restored.z], [1.0, -2.0, 3.0]);
         let turn = |pose: Pose3Deg| rotation::<f64>(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
-        for (a, b) in turn(pose).as_flattened().iter().zip(turn(told).as_flattened()) {
-            prop_assert!((a - b).abs() < 1e-10, "{:?} {:?}", pose, told);
+        for (a, b) in turn(pose).as_flattened().iter().zip(turn(restored).as_flattened()) {
+            prop_assert!((a - b).abs() < 1e-10, "{:?} {:?}", pose, restored);
         }
     }
 
     /// Written tables are read back to the same bits, for any names.
     #[test]
-    fn tables_are_read_back(
+    fn written_tables_are_read_back_bit_by_bit(
         name in "[^\\p{Cc}]{1,8}",
         family in ".{1,8}",
         size in 1e-6..10.0_f64,

@@ -41,7 +41,7 @@ success = { shape = 'box', x = [0, 0], y = [-1, 1], yaw_deg = [0, 1] }
 ";
 
 #[test]
-fn sites_import() {
+fn imports_add_tags_and_goals() {
     let read = |text: &str| match site(text) {
         Ok(site) => site,
         Err(error) => panic!("{error}"),
@@ -77,7 +77,7 @@ pose = { x = 4.0, y = 0.5, z = 0.75, roll_deg = 0, pitch_deg = 0, yaw_deg = 180 
 }
 
 #[test]
-fn bad_imports_point_at_the_place() {
+fn errors_in_imports_point_at_the_fault() {
     let rows = [
         (
             "format = 'wpilib'",
@@ -125,7 +125,7 @@ fn bad_imports_point_at_the_place() {
             "size = 0.1651",
             "size = nan",
             "nan",
-            "no finite number",
+            "not a finite number",
             "size = 0.30",
         ),
         (
@@ -225,7 +225,7 @@ fn bad_imports_point_at_the_place() {
         assert_eq!(Some(place.offset), text.find(at), "{to}: {error}");
         assert!(error.message.contains(message), "{to}: {error}");
         assert!(error.expected.is_some(), "{to}: {error}");
-        let told = error.help.as_deref().expect("help");
-        assert!(told.contains(help), "{to}: {error}");
+        let advice = error.help.as_deref().expect("help");
+        assert!(advice.contains(help), "{to}: {error}");
     }
 }

@@ -7,18 +7,18 @@ use super::tags::Tags;
 use crate::site::{Site, SiteTag};
 use posegate::shape::{Exclusion, Family, Shape, Visibility};
 
-/// Returns the chosen candidates as tags, by number. A candidate without an id gets the least id that is free in its
-/// family, if there is one.
-pub(super) fn hung(
+/// Returns the chosen candidates as tags, by number. A candidate without an id gets the least free id of its family,
+/// if there is one.
+pub(super) fn mounted_tags(
     site: &Site,
     names: &[&String],
     chosen: &Tags,
 ) -> Result<BTreeMap<usize, (String, SiteTag)>, CoverError> {
     let family = |tag: &SiteTag| tag.family.clone();
-    let hanging = site.tags.values().map(|tag| (family(tag), tag.tag.id));
+    let mounted = site.tags.values().map(|tag| (family(tag), tag.tag.id));
     let given = site.candidates.values();
     let given = given.filter_map(|found| Some((family(&found.tag), found.id?)));
-    let mut taken: BTreeSet<(String, u32)> = hanging.chain(given).collect();
+    let mut taken: BTreeSet<(String, u32)> = mounted.chain(given).collect();
     chosen
         .iter()
         .map(|number| {
@@ -38,11 +38,11 @@ pub(super) fn hung(
 }
 
 /// Returns the site with the chosen tags, without candidates.
-pub(super) fn with_tags(site: &Site, hung: &BTreeMap<usize, (String, SiteTag)>) -> Site {
+pub(super) fn with_tags(site: &Site, chosen: &BTreeMap<usize, (String, SiteTag)>) -> Site {
     let mut with = site.clone();
     with.candidates.clear();
     let offers = core::mem::take(&mut with.planner.offers);
-    for (name, tag) in hung.values() {
+    for (name, tag) in chosen.values() {
         for (look, made) in offers.iter().filter(|(_, made)| made.tag == *name) {
             let mut made = made.clone();
             number(&mut made.success.shape, tag.tag.id);

@@ -1,4 +1,4 @@
-//! Checks that tags have enough space where they are mounted.
+//! Checks that tags have enough space at their places.
 
 use crate::place::Space;
 use crate::site::{Site, SiteTag};
@@ -10,7 +10,7 @@ const ON_A_WALL: f64 = 0.02;
 const BEHIND: f64 = 0.05;
 
 /// Returns the edge length of a printed tag, white border included, metres.
-pub(super) fn whole(tag: &SiteTag) -> f64 {
+pub(super) fn edge(tag: &SiteTag) -> f64 {
     tag.tag.size * Family::whole_of(&tag.family)
 }
 
@@ -27,11 +27,11 @@ pub(crate) fn overlap(a: &SiteTag, b: &SiteTag) -> bool {
     }
     let between = [q.x - p.x, q.y - p.y, q.z - p.z];
     let off = [0, 1, 2].map(|axis| dot(column(own, axis), between).abs());
-    let reach = 0.5 * (whole(a) + whole(b)) * (1.0 - 1e-9);
+    let reach = 0.5 * (edge(a) + edge(b)) * (1.0 - 1e-9);
     off[0] < BEHIND && off[1] < reach && off[2] < reach
 }
 
-/// Returns the walls on which the middle of a tag lies.
+/// Returns the walls on which the centre of a tag lies.
 fn carriers<'a>(site: &'a Site, tag: &SiteTag) -> impl Iterator<Item = &'a Wall> {
     let pose = tag.tag.pose;
     site.walls.iter().filter(move |wall| {
@@ -43,20 +43,20 @@ fn carriers<'a>(site: &'a Site, tag: &SiteTag) -> impl Iterator<Item = &'a Wall>
 fn face(wall: &Wall, tag: &SiteTag) -> Option<Space> {
     let pose = tag.tag.pose;
     let out: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
-    let beside = [pose.x + 0.1 * out[0][0], pose.y + 0.1 * out[1][0]];
-    Space::wall(wall, [tag.tag.size, whole(tag)], beside, None).ok()
+    let front = [pose.x + 0.1 * out[0][0], pose.y + 0.1 * out[1][0]];
+    Space::wall(wall, [tag.tag.size, edge(tag)], front, None).ok()
 }
 
 /// Returns the name of a wall if a tag, including its border, lies on one of the wall's keep-outs.
 pub(crate) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
     let mut walls = carriers(site, tag).filter(|wall| !wall.keep_outs.is_empty());
-    let held = walls.find(|wall| {
+    let wall = walls.find(|wall| {
         face(wall, tag).is_none_or(|space| space.pose(&space.point(&tag.tag.pose)).is_err())
     });
-    held.map(|wall| wall.name.as_str())
+    wall.map(|wall| wall.name.as_str())
 }
 
-/// The places where a tag may be moved to.
+/// The places to which a tag may be moved.
 pub(super) struct Place<'a> {
     site: &'a Site,
     /// The face on which it is mounted, and its offset from the face.
@@ -66,7 +66,7 @@ pub(super) struct Place<'a> {
 
 impl<'a> Place<'a> {
     /// Returns `None` if the tag is mounted on a wall, but not completely on one face, or on a keep-out. Such a tag
-    /// stays.
+    /// is not moved.
     pub fn of(site: &'a Site, tag: &'a SiteTag) -> Option<Self> {
         let mut walls = carriers(site, tag).peekable();
         if walls.peek().is_none() {
@@ -89,12 +89,12 @@ impl<'a> Place<'a> {
         })
     }
 
-    /// Returns `true` if the tag may be mounted at a pose next to other tags. It must stay on its face; a tag without a
-    /// face must be above the floor and clear of all walls. It may only overlap tags that it overlapped before.
+    /// Returns `true` if the tag may be mounted at a pose next to other tags. It must stay on its face; a tag without
+    /// a face must be above the floor and clear of all walls. It may only overlap tags that it overlapped before.
     pub fn holds<'t>(&self, pose: Pose3Deg, others: impl Iterator<Item = &'t SiteTag>) -> bool {
         let mut moved = self.tag.clone();
         moved.tag.pose = pose;
-        let half = 0.5 * whole(self.tag);
+        let half = 0.5 * edge(self.tag);
         let stays = match &self.face {
             Some((space, from)) => off(space, pose)
                 .is_some_and(|now| now.iter().zip(from).all(|(a, b)| (a - b).abs() < 1e-6)),

@@ -1,18 +1,18 @@
-//! Tasks that are alike in the frames of their goals: a page shows one of them for all.
+//! Tasks that are equal in the frames of their goals: a page shows one of them for all.
 
 use super::contents::Shown;
 use crate::site::{Site, Task};
 
-/// Lengths that differ by less are the same in a picture, metres; areas in square metres.
+/// Lengths that differ by less are equal in a picture, metres; areas in square metres.
 const SAME: f64 = 1e-3;
 
-/// Returns the tasks in groups of tasks that are alike, in the order of each group's first task.
-pub(super) fn alike<'c>(site: &Site, tasks: &'c [Shown]) -> Vec<Vec<&'c Shown>> {
+/// Returns the tasks in groups of equal tasks, in the order of each group's first task.
+pub(super) fn groups_of_equal<'c>(site: &Site, tasks: &'c [Shown]) -> Vec<Vec<&'c Shown>> {
     let mut groups: Vec<Vec<&Shown>> = Vec::new();
     for task in tasks {
         let known = groups.iter_mut().find(|group| {
             let first = group.first();
-            first.is_some_and(|first| are_alike(site, first, task))
+            first.is_some_and(|first| are_equal(site, first, task))
         });
         match known {
             Some(group) => group.push(task),
@@ -22,7 +22,7 @@ pub(super) fn alike<'c>(site: &Site, tasks: &'c [Shown]) -> Vec<Vec<&'c Shown>> 
     groups
 }
 
-fn are_alike(site: &Site, a: &Shown, b: &Shown) -> bool {
+fn are_equal(site: &Site, a: &Shown, b: &Shown) -> bool {
     let (Some(first), Some(second)) = (site.tasks.get(&a.name), site.tasks.get(&b.name)) else {
         return false;
     };
@@ -30,7 +30,7 @@ fn are_alike(site: &Site, a: &Shown, b: &Shown) -> bool {
     if same(first) != same(second) || a.table.is_ok() != b.table.is_ok() {
         return false;
     }
-    // Tags have places in the world, so sets of views are compared by what is drawn of them.
+    // Tags have places in the world, so sets of views are compared by their pictures.
     let views = |task: &Task| !task.success.tags().is_empty();
     if views(first) || views(second) {
         views(first) && views(second) && have_equal_sections(a, b)
@@ -55,7 +55,7 @@ fn have_equal_sections(a: &Shown, b: &Shown) -> bool {
             })
 }
 
-/// The area and the ends of a ring: what two equal rings with different corners have in common.
+/// The area and the ends of a ring: the same for two equal rings with different corners.
 fn numbers(ring: &[[f64; 2]]) -> [f64; 5] {
     let ends = |axis: usize| {
         ring.iter()
