@@ -47,7 +47,7 @@ struct Count {
     tried: usize,
     permits: usize,
     unconfirmed: usize,
-    told: usize,
+    reported: usize,
 }
 
 impl Count {
@@ -56,7 +56,7 @@ impl Count {
             tried: self.tried + other.tried,
             permits: self.permits + other.permits,
             unconfirmed: self.unconfirmed + other.unconfirmed,
-            told: self.told,
+            reported: self.reported,
         }
     }
 
@@ -72,8 +72,8 @@ impl Count {
         let second = opinion_after(table.bytes(), &case.belief, case.trust, case.movement);
         if second != INSIDE {
             self.unconfirmed += 1;
-            if self.told < 2 {
-                self.told += 1;
+            if self.reported < 2 {
+                self.reported += 1;
                 eprintln!("UNCONFIRMED on {}: {case:?}", table.task());
             }
         }
@@ -228,7 +228,7 @@ fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
     let (estimate, set) = hard_case(rng, &stage.world);
     let drawn = beliefs::Drawn::honest();
     let small = drawn.case(&table, estimate, &trial::scaled(&set, 1e-3));
-    // Nothing is permitted there: it is off the table.
+    // The estimate is off the table, so nothing is permitted there.
     if !Count::default().permits(&table, &small) {
         return;
     }
@@ -248,7 +248,7 @@ fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
 }
 
 #[test]
-fn what_is_outside_is_rarely_confirmed() {
+fn sets_outside_are_rarely_confirmed() {
     for (name, layout, turn, caps) in [
         ("facets", Layout::Facets, 0.1, [0.002, 0.005, 0.02]),
         (
@@ -316,7 +316,7 @@ fn fallen(number: u64) -> [usize; 2] {
 /// Every bit of the facets in memory is flipped once. Almost none of the resulting wrong permits of the first
 /// evaluation is confirmed from flash.
 #[test]
-fn permits_by_a_fallen_bit_are_not_confirmed() {
+fn permits_by_a_flipped_bit_are_not_confirmed() {
     let [wrong, confirmed] = (0..16)
         .into_par_iter()
         .map(fallen)

@@ -8,7 +8,7 @@ use crate::oracle::{Pose, PoseSet, Rng, below, level, scale};
 use crate::sets::hard_case;
 use crate::trial::{Known, SCALE_ERROR, Trial, scaled, size, yaw};
 
-/// Number of bases that are tried before a burst is given up.
+/// Number of bases to try before a burst is skipped.
 const TRIES: usize = 12;
 
 /// A pose-set with the scales at which it reaches the true border (scale 1) and the table's.

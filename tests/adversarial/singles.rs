@@ -22,11 +22,11 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
         random_pose_set_near(rng, world, estimate).pose_set
     };
     let margins = core_set(estimate, &random).map_or([0.0; 2], |set| {
-        let [found, told] = [
+        let [found, reported] = [
             examine(&trial.table, &set).margin,
             decide_with_margin(&trial.table, &set).1,
         ];
-        [found, told].map(|margin| f64::from(margin.q16()) / 65536.0)
+        [found, reported].map(|margin| f64::from(margin.q16()) / 65536.0)
     });
     let [margin, _] = margins;
     let exact = scale_with(world, estimate, &random, Effort::Full, SCALE_ERROR);

@@ -24,7 +24,7 @@ pub struct Trial<'a> {
     pub tally: Tally,
 }
 
-/// What is known beforehand about a case.
+/// Prior knowledge about a case.
 #[derive(Clone, Copy)]
 pub struct Known {
     /// The set lies in the success set, by a scale or a border that the oracle found.

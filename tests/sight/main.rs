@@ -124,7 +124,7 @@ fn telemetry(
 
 /// Random cameras, tags and poses, none of them searched.
 #[test]
-fn random_sightings_are_true() {
+fn random_sightings_match_definition() {
     let mut random = Random(1);
     let mut answers: BTreeMap<String, usize> = BTreeMap::new();
     let mut worst = [0.0; 4];
@@ -175,7 +175,7 @@ fn random_sightings_are_true() {
 
 /// Poses on the border, found by a search, and some micrometres around it.
 #[test]
-fn no_answer_is_wrong_at_the_border() {
+fn answers_at_the_border_match_definition() {
     let mut random = Random(2);
     let (mut tried, mut unsure) = (0, 0);
     let mut borders: BTreeMap<String, usize> = BTreeMap::new();
@@ -253,7 +253,7 @@ fn border(success: &SuccessSet, inside: [f64; 3], random: &mut Random) -> Option
 /// Digests every bit of what is seen from four thousand poses, so that any change of a rounding is detected. The
 /// emulated cores make the same digest (`examples/count_instructions.rs`).
 #[test]
-fn what_is_seen_is_pinned() {
+fn sighting_digest_is_unchanged() {
     let path = "examples/tables/see-t7.posegate";
     let bytes = std::fs::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
     let scene = Scene::of(&Table::parse(&bytes).unwrap()).unwrap();

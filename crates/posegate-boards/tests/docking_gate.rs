@@ -37,9 +37,9 @@ fn the_smallest_gate_opens_and_closes() {
     assert!(output.status.success(), "{output:?}");
 }
 
-/// Users copy these examples, so neither names functions that are for recordings and benches only.
+/// Users copy these examples, so neither calls functions that are only for recordings and benches.
 #[test]
-fn the_smallest_gates_judge_nothing_by_itself() {
+fn smallest_gates_use_only_the_gate_api() {
     for (path, needs) in [
         (
             "examples/docking_gate.rs",

@@ -10,7 +10,7 @@ pub const LOOKS: u32 = 4_000;
 /// The digest of what is seen from them in the scene of `examples/tables/see-t7.posegate`.
 pub const SEE_T7: u32 = 0xffc6_7be1;
 
-/// Poses within 5 m of the origin of the world, one after another.
+/// An iterator over poses within 5 m of the origin of the world.
 pub struct Looks(u32);
 
 impl Looks {

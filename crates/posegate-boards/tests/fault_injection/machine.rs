@@ -89,7 +89,7 @@ pub struct Machine {
     pub registers: [u32; 16],
     log: PathBuf,
     /// Bytes at the start of the log that are ignored.
-    forgotten: u64,
+    discarded: u64,
     // Contains the socket and the log; removed last.
     _directory: tempfile::TempDir,
 }
@@ -145,7 +145,7 @@ impl Machine {
             remote,
             registers: [0; 16],
             log,
-            forgotten: 0,
+            discarded: 0,
             _directory: directory,
         };
         for marker in firmware.stops() {
@@ -268,7 +268,7 @@ impl Machine {
         let before = self.events().len();
         match self.run() {
             At::LockedUp => false,
-            // At a marker after all: the firmware runs.
+            // It stopped at a marker: the firmware runs.
             At::Address(_) => true,
             At::Hung => {
                 let all = self.events();
@@ -285,20 +285,20 @@ impl Machine {
     }
 
     /// Discards all events so far.
-    pub fn forget(&mut self) {
-        self.forgotten = std::fs::metadata(&self.log).map_or(0, |data| data.len());
+    pub fn discard_events(&mut self) {
+        self.discarded = std::fs::metadata(&self.log).map_or(0, |data| data.len());
     }
 
     /// Returns the events that are not discarded.
     pub fn events(&self) -> Vec<Event> {
-        self.events_after(self.forgotten)
+        self.events_after(self.discarded)
     }
 
-    fn events_after(&self, forgotten: u64) -> Vec<Event> {
+    fn events_after(&self, discarded: u64) -> Vec<Event> {
         // "MPS2 FPGAIO write: offset 0x0 data 0x1 size 4"
         let mut text = Vec::new();
         let read = std::fs::File::open(&self.log).and_then(|mut file| {
-            file.seek(SeekFrom::Start(forgotten))?;
+            file.seek(SeekFrom::Start(discarded))?;
             file.read_to_end(&mut text)
         });
         // Before the first event there is no log.

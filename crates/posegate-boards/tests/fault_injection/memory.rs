@@ -133,7 +133,7 @@ impl<'f> Rest<'f> {
 
     /// Returns the output in the next cycles, and why there are fewer.
     fn levels(&mut self) -> Result<(Levels, End), Gone> {
-        self.machine.forget();
+        self.machine.discard_events();
         self.machine.stop_at(self.end)?;
         let at = self.machine.run();
         let samples = Sample::all(self.lamps, &self.machine.events());
@@ -195,7 +195,7 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
         .windows(2)
         .find(|pair| pair[0].high && pair[1].reason == quiet);
     let ended = ended.expect("a permit that silence ends")[1].number;
-    // One report arrives in the silence, and no more.
+    // One report arrives in the silence.
     let short = golden.samples.windows(3).find(|three| {
         three.iter().all(|sample| !sample.high)
             && three[0].reason == quiet
