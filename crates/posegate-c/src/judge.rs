@@ -14,7 +14,7 @@ pub const POSEGATE_JUDGE_WORDS: usize = 20;
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;
 
 /// For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait
-/// for permits in a row, has no second evaluation, checks no settings and keeps no state.
+/// for consecutive permits, has no second evaluation, checks no settings and keeps no state.
 ///
 /// Storage of a judge: a table and a maximum age, to evaluate estimates, each on its own.
 ///
@@ -145,8 +145,8 @@ unsafe fn judged(
             return Err(posegate_status::BadValue);
         }
         let set = pose_set(&belief, radius);
-        let told = by(judge, estimate.now_ms, estimate.stamp_ms, set);
-        write(verdict, told)
+        let result = by(judge, estimate.now_ms, estimate.stamp_ms, set);
+        write(verdict, result)
     })
 }
 

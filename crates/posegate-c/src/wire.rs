@@ -163,7 +163,7 @@ impl posegate_reply {
         const CONTENT: i32 = posegate_status::WireContent as i32;
         const TABLE: i32 = posegate_status::WireTable as i32;
         let verdict = match self.status {
-            NONE => Ok(self.verdict.told()?),
+            NONE => Ok(self.verdict.decode()?),
             FRAME => Err(WireError::Frame),
             CHECKSUM => Err(WireError::Checksum),
             CONTENT => Err(WireError::Content),
@@ -184,7 +184,7 @@ impl posegate_reply {
 
 impl posegate_verdict {
     /// Returns the verdict, or `None` if the numbers contradict each other.
-    fn told(&self) -> Option<Verdict> {
+    fn decode(&self) -> Option<Verdict> {
         let flag = |flag: u8| match flag {
             0 => Some(false),
             1 => Some(true),
@@ -310,8 +310,8 @@ pub unsafe extern "C" fn posegate_request_judge(
             table: 0,
             ..request
         };
-        let told = asked.evaluate(core::slice::from_ref(judge))?;
-        write(verdict, posegate_verdict::of(told))
+        let result = asked.evaluate(core::slice::from_ref(judge))?;
+        write(verdict, posegate_verdict::of(result))
     })
 }
 
