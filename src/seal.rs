@@ -89,7 +89,7 @@ const LARGEST_GAP: u32 = 4096;
 struct Part {
     address: u32,
     bytes: Range<usize>,
-    /// Where sections still refer to it, if it is loaded from a copy.
+    /// The original position, to which sections still refer, if the part is loaded from a copy.
     section: Option<Range<usize>>,
     /// Offset of its program header in the file.
     header: usize,

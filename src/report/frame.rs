@@ -50,13 +50,13 @@ mod tests {
 
     /// Published check values of FNV-1a (its authors' test vectors).
     #[test]
-    fn digests_are_fnv_1a() {
+    fn frame_digest_is_fnv_1a() {
         assert_eq!(FrameId::of("a").digest(), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(FrameId::of("foobar").digest(), 0x8594_4171_f739_67e8);
     }
 
     #[test]
-    fn names_are_told_apart() {
+    fn frame_names_differ_except_one_leading_slash() {
         assert_eq!(FrameId::of("/map"), FrameId::of("map"));
         assert_ne!(FrameId::of("odom"), FrameId::of("map"));
         assert_ne!(FrameId::of("//map"), FrameId::of("map"));

@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_each_fault() {
+    fn each_invalid_footprint_is_refused() {
         use PolygonError::{
             Clockwise, FootprintCorners, NotConvex, NotFinite, TooFewCorners, TooLarge,
         };

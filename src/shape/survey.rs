@@ -111,7 +111,7 @@ impl Visibility {
     }
 
     /// Reduces `d_max` until the error that the tolerances add is within [`Self::error_room`]. If no distance satisfies
-    /// this, `d_max` becomes 0, from where nothing is seen.
+    /// this, `d_max` becomes 0, at which no tag is seen.
     pub fn keep_error_room(&mut self) {
         let Some([translation, yaw_deg]) = self.error_room else {
             return;
