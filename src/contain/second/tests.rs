@@ -160,7 +160,7 @@ fn what_is_no_belief_is_not_inside() {
     }
 }
 
-/// A hundredfold covariance leaves a tenth of the room, whatever causes it.
+/// A hundredfold covariance reduces the allowed size to a tenth, for every cause.
 #[test]
 fn trust_counts() {
     for table in [SEE_T7, SEE_T7_GRID] {

@@ -23,7 +23,7 @@ pub struct Situation {
     /// Number of observed cycles, and the first cycle from which on the output must be low.
     cycles: u32,
     low_from: u32,
-    /// Whether a fault is latched before the damage.
+    /// `true` if a fault is latched before the damage.
     pub latched: bool,
 }
 
@@ -71,7 +71,7 @@ struct Rest<'f> {
 /// Levels of the output in the next cycles; fewer if the program or the schedule ended.
 type Levels = Vec<bool>;
 
-/// Whether the program ended within the cycles, and with what output.
+/// The end of the program within the cycles, and its output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     None,
