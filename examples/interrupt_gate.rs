@@ -230,7 +230,7 @@ mod firmware {
             let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
             let since_ms = now_ms.wrapping_sub(self.begun_cycle_ms);
             self.begun_cycle_ms = now_ms;
-            // The watchdog has closed the output, or should have: a broken watchdog is no reason to continue.
+            // The watchdog has closed the output, or should have: the cycle closes even if the watchdog is broken.
             if FORCED_LOW.swap(false, Ordering::Relaxed) || since_ms >= WATCHDOG_MS {
                 self.close_for_late_cycle(now_ms);
             }
@@ -303,7 +303,7 @@ mod firmware {
 
         /// Closes because this cycle came late: the permits must be earned again.
         fn close_for_late_cycle(&mut self, now_ms: u32) {
-            // The watchdog may have forced the output low, so a read-back mismatch is no fault of the contact. A failed
+            // The watchdog may have forced the output low, so a read-back mismatch does not show a fault of the contact. A failed
             // close is a fault.
             if self.interlock.close().is_err() {
                 self.gate.fault(Reason::InterlockFault);

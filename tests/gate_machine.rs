@@ -354,7 +354,7 @@ fn each_failure_closes_an_open_gate() {
             Reason::FrameMismatch,
         ),
         (
-            "an estimate beside the dock",
+            "an estimate next to the dock",
             |r, _| r.belief = belief(0.1),
             Reason::NotContained,
         ),

@@ -80,7 +80,7 @@ impl Count {
         true
     }
 
-    /// Searches for the border of what the first evaluation permits, and checks every set on the way.
+    /// Searches for the border of the first evaluation's permits, and checks every set of the search.
     fn search(&mut self, rng: &mut Rng, table: &Table<'_>, estimate: Pose, set: &PoseSet) {
         let drawn = beliefs::drawn(rng);
         let case = |by: f64| drawn.case(table, estimate, &trial::scaled(set, by));
@@ -201,21 +201,21 @@ fn every_permit_of_the_example_tables_is_confirmed() {
 const BINS: [[f64; 2]; 3] = [[0.5, 0.8], [0.8, 0.95], [0.95, 1.0]];
 
 /// For sets that are outside, by bin: their number, and the number of wrong confirmations.
-type Leak = [[usize; 2]; 3];
+type LeakCounts = [[usize; 2]; 3];
 
-fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> Leak {
+fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> LeakCounts {
     numbers
         .into_par_iter()
         .map(|number| {
             let mut rng = Rng::new(11_000_017 + number);
             let stage = stage(&mut rng, layout);
-            let mut found = Leak::default();
+            let mut found = LeakCounts::default();
             for _ in 0..60 {
                 leak_of(&mut rng, &stage, most_turn, &mut found);
             }
             found
         })
-        .reduce(Leak::default, |mut a, b| {
+        .reduce(LeakCounts::default, |mut a, b| {
             for (a, b) in a.iter_mut().flatten().zip(b.into_iter().flatten()) {
                 *a += b;
             }
@@ -223,10 +223,10 @@ fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> Leak {
         })
 }
 
-fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
+fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut LeakCounts) {
     let table = Table::parse(&stage.bytes).unwrap();
     let (estimate, set) = hard_case(rng, &stage.world);
-    let drawn = beliefs::Drawn::honest();
+    let drawn = beliefs::ReportForm::honest();
     let small = drawn.case(&table, estimate, &trial::scaled(&set, 1e-3));
     // The estimate is off the table, so nothing is permitted there.
     if !Count::default().permits(&table, &small) {
@@ -271,7 +271,7 @@ fn sets_outside_are_rarely_confirmed() {
 
 /// Returns beliefs whose sets leave the true set, with a true scale of 0.5 to 0.95.
 fn outside(rng: &mut Rng, stage: &Stage, table: &Table<'_>, tries: usize) -> Vec<Case> {
-    let drawn = beliefs::Drawn::honest();
+    let drawn = beliefs::ReportForm::honest();
     let case = |_| {
         let (estimate, set) = hard_case(rng, &stage.world);
         let small = drawn.case(table, estimate, &trial::scaled(&set, 1e-3));

@@ -1,4 +1,4 @@
-//! The vector file is what its generator makes, has the required content, and the host decides as the file
+//! The vector file equals its generator's output, has the required content, and the host decides as the file
 //! states. `./ci.sh vectors` tests the emulated cores.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` rewrites the file and its tables.
@@ -92,7 +92,7 @@ fn files_equal_generator_output() {
     let is_made = |path, kept: &[u8], made: &[u8]| {
         assert!(
             kept == made,
-            "{path} differs: POSEGATE_BLESS=1 writes it anew"
+            "{path} differs: POSEGATE_BLESS=1 rewrites it"
         );
     };
     is_made(VECTORS, &FILE, &vectors::file(GATES.as_slice()));

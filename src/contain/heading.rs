@@ -382,7 +382,8 @@ impl Sweep {
         self
     }
 
-    /// Returns a pose relative to the estimate, um, um, 2^-24 turn. The input position is relative to the goal in fine units; the heading is that at u = e.
+    /// Returns a pose relative to the estimate, um, um, 2^-24 turn. The input position is relative to the goal in fine
+    /// units; the heading is that at u = e.
     pub fn offset_of(&self, [x, y]: [i64; 2], e: i32) -> [i64; 3] {
         let um = |at: i64, from: i32| {
             let fine = at.wrapping_sub(i64::from(from) << 14);

@@ -7,8 +7,8 @@
 //! there is none, it inhibits.
 //!
 //! A sequencer does not permit anything. Before a look or a work task the task's own [`Gate`](crate::gate::Gate)
-//! decides, on its table, with all of its checks. A sequencer only says which gate to ask, and what to do if the task
-//! fails: retry, continue without the tag, or give up.
+//! decides, on its table, with all of its checks. A sequencer only selects the gate to ask, and the reaction if the task
+//! fails: retry, continue without the tag, or stop.
 //!
 //! ```
 //! use posegate::sequencer::{Instruction, Rules, RulesError, Sequencer};

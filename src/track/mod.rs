@@ -363,8 +363,8 @@ impl<const N: usize> Tracker<N> {
 }
 
 /// Returns the largest deviation from an even movement, as the time in milliseconds that a robot at its bounds needs for it, when
-/// `after` of an increment of `whole` is left: with a known end, at most `2 after (whole - after) / whole`. Rounded up, with a millisecond for the stamps of the
-/// increment.
+/// `after` of an increment of `whole` is left: with a known end, at most `2 after (whole - after) / whole`. Rounded up, with a
+/// millisecond for the stamps of the increment.
 fn unevenness([after, whole]: [u32; 2]) -> u32 {
     let before = whole.wrapping_sub(after);
     let product = u64::from(after)

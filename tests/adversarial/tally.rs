@@ -1,4 +1,4 @@
-//! What a campaign counts, and the line that it prints.
+//! The counts of a campaign, and the line that it prints.
 
 #[derive(Default)]
 pub struct Tally {

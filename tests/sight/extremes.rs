@@ -203,7 +203,7 @@ fn answers_are_correct_at_ends_of_ranges() {
     );
 }
 
-/// A camera in the tag's middle sees nothing, and there is no division by zero.
+/// A camera in the tag's middle does not see the tag, and there is no division by zero.
 #[test]
 fn zero_distance_gives_no_angle() {
     let mut random = Random(4);

@@ -266,7 +266,7 @@ fn host_load_never_changes_controller_messages() {
         let mut telemetry = Vec::new();
         for _ in 0..60 {
             let good = controller.next_report();
-            let mut bytes = mutants::garbage(&mut chance, &good);
+            let mut bytes = mutants::random_bytes(&mut chance, &good);
             bytes.push(0);
             bytes.extend(mutants::frame(&good));
             bytes.truncate(bytes.len() - chance.below(2));
@@ -294,9 +294,9 @@ fn random_bytes_never_open_interlock() {
     let mut sent = 0;
     while sent < bytes {
         let good = controller.next_report();
-        let garbage = mutants::garbage(&mut chance, &good);
-        sent += garbage.len();
-        controller.send(&garbage);
+        let bytes = mutants::random_bytes(&mut chance, &good);
+        sent += bytes.len();
+        controller.send(&bytes);
     }
     controller.until_quiet();
     let telemetry = controller.last();
@@ -429,7 +429,7 @@ fn flooded_line_never_stops_control_cycle() {
         while flood < A_CYCLE {
             let good = controller.next_report();
             let bytes = match chance.below(4) {
-                0 => mutants::garbage(&mut chance, &good),
+                0 => mutants::random_bytes(&mut chance, &good),
                 1 => mutants::lying(&mut chance, &good),
                 _ => mutants::frame(&good),
             };

@@ -216,7 +216,7 @@ impl posegate_advice {
 /// As for [`open`], for as long as `'a`; no other reference to the gate is in use; the caller's word can be written
 /// to.
 unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
-    // SAFETY: the caller's promise; what is sealed has been written. An address with a flipped bit is not
+    // SAFETY: the caller's promise; sealed storage has been written. An address with a flipped bit is not
     // dereferenced.
     unsafe {
         let held = open(storage)?;
@@ -320,8 +320,8 @@ unsafe fn fill(
     let (restart, look_at) = (given.restart()?, given.look_at());
     let permits = u16::try_from(given.permits_in_a_row);
     let permits_in_a_row = permits.map_err(|_| posegate_status::PermitsInARow)?;
-    // SAFETY: the caller's promise. What is borrowed has been written, is not written again while the gate is in
-    // use, and is not part of what `held` lends.
+    // SAFETY: the caller's promise. The borrowed settings have been written, are not written again while the gate is in
+    // use, and are not part of the reference that `held` returns.
     unsafe {
         (&raw mut (*held).task).write(task);
         (&raw mut (*held).sources).write(sources);
@@ -372,7 +372,7 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 /// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
 /// read, and the counter can be written, now and as long as the gate is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_init(
@@ -414,7 +414,7 @@ pub unsafe extern "C" fn posegate_gate_init(
 /// close even if the caller gets no answer.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_step(
     gate: *mut posegate_gate,
@@ -442,7 +442,7 @@ pub unsafe extern "C" fn posegate_gate_step(
 /// the gate.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_step_on(
     gate: *mut posegate_gate,
@@ -470,7 +470,7 @@ pub unsafe extern "C" fn posegate_gate_step_on(
 /// reports stop. The time also advances if `step` is null or misaligned.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_tick(
     gate: *mut posegate_gate,
@@ -494,13 +494,13 @@ pub unsafe extern "C" fn posegate_gate_tick(
 /// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_reset(
     gate: *mut posegate_gate,
     now_ms: u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let held = open(gate)?;
         let gate = self::held(gate)?;
@@ -521,7 +521,7 @@ pub unsafe extern "C" fn posegate_gate_reset(
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_inhibit(
     gate: *mut posegate_gate,
@@ -555,7 +555,7 @@ pub unsafe extern "C" fn posegate_gate_inhibit(
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_fault(
     gate: *mut posegate_gate,
@@ -576,7 +576,7 @@ pub unsafe extern "C" fn posegate_gate_fault(
 /// is null.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_scrub(
     gate: *mut posegate_gate,
@@ -602,7 +602,7 @@ pub unsafe extern "C" fn posegate_gate_scrub(
 /// Writes the state of the gate.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_state(
     gate: *mut posegate_gate,
@@ -621,7 +621,7 @@ pub unsafe extern "C" fn posegate_gate_state(
 /// Writes what to do if the gate is closed.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_advice(
     gate: *mut posegate_gate,
@@ -641,7 +641,7 @@ pub unsafe extern "C" fn posegate_gate_advice(
 /// telemetry: the verdict does not change the gate's state.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_examine(
     gate: *mut posegate_gate,
@@ -664,7 +664,7 @@ pub unsafe extern "C" fn posegate_gate_examine(
 /// `posegate_gate_examine` for each hypothesis. For telemetry: the verdict does not change the gate's state.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_examine_on(
     gate: *mut posegate_gate,

@@ -94,7 +94,7 @@ pub(super) fn pose_set(
 /// still answer. The table is borrowed: it must not change while the judge is used.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
 /// read, now and as long as the judge is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_judge_init(
@@ -158,7 +158,7 @@ unsafe fn judged(
 /// than the site, but not less strict.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_judge_permits(
     judge: *const posegate_judge,
@@ -185,7 +185,7 @@ pub unsafe extern "C" fn posegate_judge_permits(
 /// `posegate_judge_permits`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_judge_examine(
     judge: *const posegate_judge,

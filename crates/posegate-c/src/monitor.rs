@@ -64,7 +64,7 @@ fn model(standing: ModelStanding) -> u32 {
 /// Errors: `POSEGATE_STATUS_BAD_VALUE` if the number is below 100.
 ///
 /// # Safety
-/// The pointer is null, misaligned, or points to what its type says.
+/// The pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_init(
     monitor: *mut posegate_monitor,
@@ -81,13 +81,14 @@ pub unsafe extern "C" fn posegate_monitor_init(
 }
 
 /// Takes an accepted fix and its prediction for the same time. With a tracker call `posegate_tracker_tracked` before and after
-/// `posegate_tracker_fix`, for the same time: the first evidence is the prediction, the second report is the fix. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+/// `posegate_tracker_fix`, for the same time: the first evidence is the prediction, the second report is the fix.
+/// `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
 ///
 /// Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if fix or prediction has no valid covariance, or if `dependence` is not in its enum. The
 /// fix is then ignored, and `POSEGATE_MODEL_CONTRADICTED` is written.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_fix(
     monitor: *mut posegate_monitor,
@@ -98,7 +99,7 @@ pub unsafe extern "C" fn posegate_monitor_fix(
 ) -> posegate_status {
     const INDEPENDENT: u32 = posegate_dependence::Independent as u32;
     const UNKNOWN: u32 = posegate_dependence::Unknown as u32;
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(monitor, fix)
             .and(separate(monitor, prediction))
@@ -127,10 +128,10 @@ pub unsafe extern "C" fn posegate_monitor_fix(
 /// Discards all fixes of a monitor. A manual action: call it after the cause was removed.
 ///
 /// # Safety
-/// The pointer is null, misaligned, or points to what its type says.
+/// The pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_reset(monitor: *mut posegate_monitor) -> posegate_status {
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let monitor = &mut *open(monitor)?;
         monitor.reset();

@@ -179,7 +179,7 @@ impl posegate_settings {
 /// short (`posegate_tracker`), and the period is then the odometry's.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_settings_for_source(
     period_ms: u32,

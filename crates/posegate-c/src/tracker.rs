@@ -153,7 +153,7 @@ fn code(outcome: Result<(), Reason>) -> u32 {
 /// Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be read.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_init(
     tracker: *mut posegate_tracker,
@@ -202,7 +202,7 @@ pub unsafe extern "C" fn posegate_tracker_init(
 /// does.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_odometry(
     tracker: *mut posegate_tracker,
@@ -210,7 +210,7 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     reason: *mut u32,
 ) -> posegate_status {
     const JUMP: u32 = Reason::OdometryJump.code() as u32;
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, increment).and(separate(tracker, reason));
         let given = read(increment);
@@ -245,14 +245,14 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
 /// Errors: those of a report. Nothing is carried until the next fix.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_fix(
     tracker: *mut posegate_tracker,
     report: *const posegate_report,
     reason: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, report).and(separate(tracker, reason));
         let report = read(report).and_then(|report| report.report());
@@ -275,7 +275,7 @@ pub unsafe extern "C" fn posegate_tracker_fix(
 /// `posegate_gate_tick`; `posegate_gate_inhibit` with the reason ends it at once.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_tracked(
     tracker: *mut posegate_tracker,
@@ -294,7 +294,7 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
             reserved: 0,
         },
     };
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, tracked);
         write(tracked, of(&Err(Reason::Silent)))?;

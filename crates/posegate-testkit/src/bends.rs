@@ -92,7 +92,7 @@ impl<'a> Set<'a> {
         let one = f64::from(1 << NORMAL_BITS);
         let a = [facet.x, facet.y].map(|v| f64::from(v) / one);
         let point = [frame.x, frame.y].map(|v| f64::from(v) * self.unit);
-        // P of the estimate, what the yaw does to it, and the normal in world axes.
+        // P of the estimate, its change by the yaw, and the normal in world axes.
         let (seen, lever, normal, bend) = match frame.axes {
             Axes::World => {
                 let [x, y] = turned(self.yaw, point);

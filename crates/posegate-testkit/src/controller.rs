@@ -99,7 +99,7 @@ impl Chance {
     }
 }
 
-/// Counts of what a controller did.
+/// Counts of a controller's actions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Messages in which the interlock was high.
@@ -147,7 +147,7 @@ pub struct Controller {
     late: bool,
     past: VecDeque<Past>,
     last: Option<Telemetry>,
-    /// `false` once bytes were lost: the host then does not know what the controller has read.
+    /// `false` once bytes were lost: the host then does not know which bytes the controller has read.
     compared: bool,
     next_sequence: u32,
 }

@@ -78,7 +78,7 @@ pub(super) struct Failing {
     is_estimate_beyond: bool,
 }
 
-/// A set with what all frames of a layout share.
+/// A set with the terms that all frames of a layout share.
 struct Terms {
     /// The largest rounding of the integer code at a facet, micrometres.
     rounded: f64,

@@ -6,7 +6,8 @@
 //! headings nothing is checked: a spot check, like that of cells.
 //!
 //! Tolerances in addition to those of [`super`]: 2^-11 of the extent, for quotients and a normal that is
-//! turned and rounded; 18 of the units in which the longest extent, or L times the turn, has at least 2^13; and, of the effect of the yaw, the share of the roundings in `C_tt`.
+//! turned and rounded; 18 of the units in which the longest extent, or L times the turn, has at least 2^13; and,
+//! of the effect of the yaw, the share of the roundings in `C_tt`.
 
 use super::bits::{quotient, wide};
 use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot};

@@ -213,7 +213,7 @@ fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
     }
 }
 
-/// Returns the least slack of a facet beyond what it needs, metres, from the parsed table in floats; and
+/// Returns the least slack of a facet beyond the required slack, metres, from the parsed table in floats; and
 /// the same with the tolerance of the module head.
 fn by_floats(table: &Table<'_>, [x, y, yaw]: [f64; 3], covariance: [[f64; 3]; 3]) -> [f64; 2] {
     let layout = table.facets().unwrap();

@@ -7,7 +7,7 @@
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Sample};
 use crate::machine::{At, Lamps, Machine};
-use crate::remote::{Gone, SP};
+use crate::remote::{EmulatorEnded, SP};
 use posegate::gate::Reason;
 
 /// Cycles that are observed after a fault if reports arrive: a new permit is possible within them.
@@ -81,7 +81,7 @@ enum End {
 }
 
 impl<'f> Rest<'f> {
-    fn of(firmware: &'f Firmware, situation: &Situation) -> Result<Self, Gone> {
+    fn of(firmware: &'f Firmware, situation: &Situation) -> Result<Self, EmulatorEnded> {
         let mut machine = Machine::start(firmware, &[]);
         let before = situation.cycle - u32::from(situation.latched);
         machine.run_to(firmware, before)?;
@@ -110,7 +110,7 @@ impl<'f> Rest<'f> {
         })
     }
 
-    fn put_back(&mut self) -> Result<(), Gone> {
+    fn put_back(&mut self) -> Result<(), EmulatorEnded> {
         if self.machine.lamps()? != self.lamps {
             self.machine.set_lamps(self.lamps, self.firmware.store)?;
         }
@@ -120,7 +120,7 @@ impl<'f> Rest<'f> {
         remote.set_all_registers(&self.registers)
     }
 
-    fn damage(&mut self, damage: Damage) -> Result<(), Gone> {
+    fn damage(&mut self, damage: Damage) -> Result<(), EmulatorEnded> {
         let gate = self.gate;
         match damage {
             Damage::Bit(bit) => self
@@ -132,7 +132,7 @@ impl<'f> Rest<'f> {
     }
 
     /// Returns the output in the next cycles, and why there are fewer.
-    fn levels(&mut self) -> Result<(Levels, End), Gone> {
+    fn levels(&mut self) -> Result<(Levels, End), EmulatorEnded> {
         self.machine.discard_events();
         self.machine.stop_at(self.end)?;
         let at = self.machine.run();
@@ -248,9 +248,9 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
 /// Flips every bit of the gate, and sets every byte to four values.
 pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
     const GONE: &str = "QEMU has ended without a fault";
-    let start = || Rest::of(firmware, situation).unwrap_or_else(|Gone| panic!("{GONE}"));
+    let start = || Rest::of(firmware, situation).unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     let mut rest = start();
-    let (expected, end) = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
+    let (expected, end) = rest.levels().unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     assert_eq!(end, End::None, "{}: ends without a fault", situation.name);
     // Without a fault the levels are low from some cycle on; otherwise no permit could be wrong.
     let low_from = situation.low_from as usize;
@@ -283,7 +283,7 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             rest.damage(damage)?;
             rest.levels()
         };
-        let (levels, end) = attempt().unwrap_or_else(|Gone| {
+        let (levels, end) = attempt().unwrap_or_else(|EmulatorEnded| {
             // A processor that has locked up keeps its output, without a heartbeat.
             let high = rest.machine.last_lamps().interlock();
             let end = if high {
@@ -308,8 +308,8 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             rest = start();
         }
     }
-    rest.put_back().unwrap_or_else(|Gone| panic!("{GONE}"));
-    let again = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
+    rest.put_back().unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
+    let again = rest.levels().unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     assert_eq!(again, (expected, End::None), "not all is put back");
     counts
 }

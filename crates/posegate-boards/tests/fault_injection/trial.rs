@@ -4,7 +4,7 @@ use crate::fault::Fault;
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Sample};
 use crate::machine::{At, Lamps, Machine};
-use crate::remote::Gone;
+use crate::remote::EmulatorEnded;
 
 /// How a run with a fault ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ fn observe(
     firmware: &Firmware,
     fault: &Fault,
     fault_place: &mut String,
-) -> Result<End, Gone> {
+) -> Result<End, EmulatorEnded> {
     machine.run_to(firmware, fault.cycle())?;
     *fault_place = fault.inject(machine, firmware)?;
     match machine.run() {
@@ -99,7 +99,7 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, fault_place: Strin
         End::LockedUp => machine.last_lamps().interlock(),
         End::Halted | End::Hung => machine
             .lamps()
-            .unwrap_or_else(|Gone| machine.last_lamps())
+            .unwrap_or_else(|EmulatorEnded| machine.last_lamps())
             .interlock(),
     };
     let beats = end == End::Hung && machine.beats();
