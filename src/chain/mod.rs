@@ -40,7 +40,7 @@
 //! such estimate.
 //!
 //! # The meaning of a success
-//! With a probability of at least `1 - risk` the true pose is in every task's success set when the task begins, and a
+//! With a probability of at least `1 - risk` the true pose is in every task's success set when the task begins. A
 //! gate permits the task there. The risk is the sum of the probabilities outside of the sets of the tasks. It is
 //! never a product, because the events may depend on each other.
 

@@ -627,8 +627,9 @@ impl Sweep {
 /// Headings on either side of the estimate's at which [`farthest`] evaluates facets.
 const SIDE: i32 = 8;
 
-/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one, of the sections at
-/// seventeen headings and of some around the farthest: relative to the estimate, in world axes: um, um, 2^-24 turn. For reports.
+/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one. Searches
+/// the sections at seventeen headings, and some around the farthest. Relative to the estimate, in world axes: um, um,
+/// 2^-24 turn. For reports.
 pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
     let Some(sweep) = Sweep::of(facets, set, goal) else {
         return [0; 3];

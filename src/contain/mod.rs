@@ -230,8 +230,8 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
             worst_pose: None,
         };
     }
-    // A set that is too large for the table by its own size can be covered only by a table of the whole circle, and only
-    // by a rounding. There is no such pose, so the estimate is returned instead.
+    // Only a table of the whole circle, and only a rounding, can cover a set that is too large for the table. No pose can
+    // be named then, so the estimate is returned.
     if decision == Decision::Outside(Cause::OffTable)
         || !placed.is_covered(table, Margin(0))
         || placed.is_covered(table, Margin::ONE)

@@ -68,8 +68,8 @@ pub struct Step {
 /// A report counts only if its stamp is newer than every earlier stamp, of any source. Delayed reports
 /// never open the gate.
 ///
-/// Each word of the gate's state is stored with its complement, and the second evaluation reads the table from flash,
-/// so that a bit flip in memory cannot turn a denial into a permit. Every step and tick revokes the permit first, and
+/// Each word of the gate's state is stored with its complement. The second evaluation reads the table from flash. So
+/// a bit flip in memory cannot turn a denial into a permit. Every step and tick revokes the permit first, and
 /// checks that the settings are unchanged. Only a complete pass through the checks gives the permit again, so a
 /// program that skips a part of its path leaves the gate closed.
 ///
@@ -134,7 +134,7 @@ type Weighed = Result<Result<(), Reason>, CorruptWord>;
 impl<'a> Gate<'a> {
     /// Makes a closed gate on the bytes of a table, at the controller's time `now_ms`. Runs [`self_test`] and checks
     /// the whole table. A table that is damaged, of another task or of another site gives a gate that denies with
-    /// that reason, because a controller with damaged flash must still answer.
+    /// that reason: a controller with damaged flash must still answer.
     ///
     /// # Errors
     /// [`InvalidParameter`] if a parameter would switch a check off.
@@ -718,8 +718,8 @@ impl<'a> Gate<'a> {
         Ok(())
     }
 
-    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and
-    /// not from the future, which is an age of half the clock's range or more.
+    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and not from
+    /// the future. A stamp from the future has an age of half the clock's range or more.
     fn is_fresh(&self, stamp_ms: u32) -> Result<bool, CorruptWord> {
         Ok(self.is_fresh_at(self.now_ms.get()?, stamp_ms))
     }

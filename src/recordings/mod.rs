@@ -75,8 +75,8 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Evaluates a pose-set with the stamp `stamp_ms` at the time of use `now_ms`, both of one wrapping millisecond
-    /// clock. (A clock of 32 bits cannot distinguish an age from the same age plus 49.7 days, so the source must not
-    /// keep estimates that long.) Returns the verdict with its margin and worst pose, at the cost of
+    /// clock. A clock of 32 bits cannot distinguish an age from the same age plus 49.7 days, so the source must not
+    /// keep estimates that long. Returns the verdict with its margin and worst pose, at the cost of
     /// [`contain::examine`]. A control loop that needs only the answer calls [`Evaluator::permits`].
     pub fn evaluate(
         &self,

@@ -2,8 +2,8 @@
 
 /// A frame, as the digest of its name (64-bit FNV-1a; a leading `/` is dropped, as ROS 1 wrote it).
 ///
-/// Numbers of another frame look as valid as those of the right one, so a gate denies a report whose
-/// frame differs from the declared frame of its source. Two names have the same digest with a probability
+/// Numbers of another frame look as valid as those of the right one. So a gate denies a report whose frame differs
+/// from the declared frame of its source. Two names have the same digest with a probability
 /// of 2^-64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

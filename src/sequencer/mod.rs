@@ -2,8 +2,8 @@
 //!
 //! The host makes the rules of a plan (`posegate plan --rules`). Each rule states where the estimate may be when its
 //! step begins and how large the pose-set may be: the conditions for which the plan was proven. A [`Sequencer`] keeps
-//! the state and takes the step whose condition holds. If the state's own condition does not hold (the set is larger
-//! than expected, or the robot was moved by hand), it looks for another entry of the plan whose condition holds. If
+//! the state and takes the step whose condition holds. The state's own condition fails if the set is larger than
+//! expected, or the robot was moved by hand. Then it searches another entry of the plan whose condition holds. If
 //! there is none, it inhibits.
 //!
 //! A sequencer does not permit anything. Before a look or a work task the task's own [`Gate`](crate::gate::Gate)

@@ -37,8 +37,8 @@ impl Aging {
     }
 
     /// Returns factors by age, from the youngest: up to `age_ms` milliseconds, ends included, the factor. Ages are rounded down to 64 ms,
-    /// factors up to 2^-6. `None` if there are more than [`MOST_AGES`] steps, an age is below 64 ms or above 4194 s, ages do not
-    /// rise by 64 ms, factors fall, or a factor is above 1023.
+    /// factors up to 2^-6. `None` if there are more than [`MOST_AGES`] steps, an age is below 64 ms or above 4194 s,
+    /// or ages do not rise by 64 ms. Also `None` if factors decrease or a factor is above 1023.
     #[must_use]
     pub fn new(steps: &[(u32, Inflation)]) -> Option<Self> {
         let mut words = [0; MOST_AGES];

@@ -14,7 +14,7 @@
 //! floor. The bounds add up, and some positions of tag and camera within the tolerances reach the sum.
 //!
 //! Errors are measured along the floor. A detector's pose of the robot may lean by beta and be off in height by up to
-//! `sin(beta) l`, where l is the distance in space from the tag to the robot's reference point. A camera that is turned
+//! `sin(beta) l`. Here l is the distance in space from the tag to the robot's reference point. A camera that is turned
 //! by alpha relative to the camera with which the errors were measured projects `sin(alpha) sin(beta) l` of that height
 //! onto the floor, and turns the yaw by up to `asin(sin(alpha) / cos(beta))`. Both are included for a beta of
 //! [`LARGEST_LEAN_DEG`]. The yaw is off by at most the detector's own error, delta, and this angle.

@@ -1,7 +1,7 @@
 //! Success sets as bytes in flash: format version 1.
 //!
 //! [`Table::parse`] is the only entry point. It checks the magic, the version, every field, every run and the CRC over
-//! all bytes. After it has returned `Ok`, no accessor can fail, and every cell that an accessor reports as covered was
+//! all bytes. After it has returned `Ok`, no accessor can fail. Every cell that an accessor reports as covered was
 //! inside the success set when the table was proven (`posegate table verify`). A table borrows its bytes; nothing is
 //! copied.
 //!

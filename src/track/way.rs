@@ -1,7 +1,8 @@
 //! The path of a robot since a fix: its sum, its noise, and its length.
 //!
-//! Everything is in the robot's axes at the fix. An increment `w` (turned to these axes) moves the error of the position by `J w` times the
-//! error of the heading, so the covariance N of both grows by `G N G'` and the increment's own noise.
+//! Everything is in the robot's axes at the fix. An increment `w` (turned to these axes) moves the error of the
+//! position by `J w` times the error of the heading. So the covariance N of both grows by `G N G'` and the
+//! increment's own noise.
 
 use super::increment::Step;
 use super::model::Noise;

@@ -2,8 +2,8 @@
 //! silence, floods, damaged frames and intact frames with wrong content. The interlock is high after three consecutive
 //! good reports, and at no other time. (Faults of the controller itself: `interrupt_faults.rs`.)
 //!
-//! The controller's report on each cycle is compared with the same gate on the host, which gets the reports in the
-//! sent bytes (`crates/posegate-testkit/src/controller.rs`), and with an oracle in plain floats. The fast suite uses
+//! The controller's report on each cycle is compared with the same gate on the host and with an oracle in plain
+//! floats. The host gate gets the reports in the sent bytes (`crates/posegate-testkit/src/controller.rs`). The fast suite uses
 //! smaller counts; `./ci.sh faults` sets them: `POSEGATE_GARBAGE_BYTES`, `POSEGATE_MUTANTS`,
 //! `POSEGATE_FLOOD_SECONDS`.
 

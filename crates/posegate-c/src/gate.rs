@@ -409,7 +409,7 @@ pub unsafe extern "C" fn posegate_gate_init(
 
 /// Evaluates a report at the controller's time `now_ms`.
 ///
-/// An invalid report (a null pointer, a number that is not in its enum) is an error, and closes the gate as a report
+/// An invalid report (a null pointer, a number that is not in its enum) is an error. It closes the gate as a report
 /// of an unknown source does. If `step` is null or misaligned, the report is still evaluated: the gate must
 /// close even if the caller gets no answer.
 ///

@@ -13,8 +13,8 @@ pub const POSEGATE_TRACKER_WORDS: usize = 192;
 /// Number of increments that a tracker keeps for late fixes.
 pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
 
-/// Storage of a tracker, which carries the newest fix of a slow source along the odometry, so that a gate can evaluate a report for
-/// the present in every control cycle.
+/// Storage of a tracker, which carries the newest fix of a slow source along the odometry. So a gate can evaluate a
+/// report for now in every control cycle.
 ///
 /// `posegate_tracker_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
 #[repr(C)]

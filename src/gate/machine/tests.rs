@@ -428,8 +428,8 @@ fn with_byte(at: usize, changed: u8) -> Vec<u8> {
     bytes
 }
 
-/// Another valid table that replaces the one from the start (a bank swap, an update over the air) is refused in
-/// the next step, tick and scrub, for any content, and the fault is latched.
+/// Another valid table that replaces the one from the start (a bank swap, an update over the air) is refused in the
+/// next step, tick and scrub, for any content. The fault is latched.
 #[test]
 fn a_table_that_is_replaced_is_refused() {
     let table = Table::parse(SEE_T7).unwrap();

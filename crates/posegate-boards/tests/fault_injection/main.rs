@@ -2,8 +2,8 @@
 //!
 //! Without arguments it runs a small share, for the fast suite. `./ci.sh faults` runs the whole:
 //! `cargo test --release -p posegate-boards --test fault_injection -- N SEED`, N faults of each kind. Each fault
-//! has its own run: one bit of code, of a register or of memory is flipped at a random moment after the start,
-//! and the output at the end of each cycle is compared with that of the run without a fault. Prints one JSON line per
+//! has its own run: one bit of code, of a register or of memory is flipped at a random moment after the start. The
+//! output at the end of each cycle is compared with that of the run without a fault. Prints one JSON line per
 //! figure on stdout, and each wrong permit with its place on stderr.
 
 mod boot;
