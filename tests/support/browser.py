@@ -121,7 +121,7 @@ def asked(page, rows):
 
 
 def same(verdict, reason, answer):
-    """Returns whether the command line agrees: verdict, reason, margin and worst pose to the last bit of the integers."""
+    """Returns True if the command line agrees: verdict, reason, margin and worst pose to the last bit of the integers."""
     there = answer["margin"]
     margin = None if there is None else round(there * 65536)
     worst, other = verdict["worst"], answer["worst_pose"]
