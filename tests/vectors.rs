@@ -90,10 +90,7 @@ fn records() -> Vec<Record<'static>> {
 #[test]
 fn files_equal_generator_output() {
     let is_made = |path, kept: &[u8], made: &[u8]| {
-        assert!(
-            kept == made,
-            "{path} differs: POSEGATE_BLESS=1 rewrites it"
-        );
+        assert!(kept == made, "{path} differs: POSEGATE_BLESS=1 rewrites it");
     };
     is_made(VECTORS, &FILE, &vectors::file(GATES.as_slice()));
     for (path, made) in MADE {

@@ -33,7 +33,11 @@ fn the_smallest_gate_opens_and_closes() {
         .arg(firmware::in_either("docking_gate"))
         .output()
         .expect("qemu-system-arm is missing: apt-get install -y qemu-system-arm");
-    assert_eq!(String::from_utf8_lossy(&output.stdout), EXPECTED, "{output:?}");
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        EXPECTED,
+        "{output:?}"
+    );
     assert!(output.status.success(), "{output:?}");
 }
 

@@ -250,7 +250,9 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
     const GONE: &str = "QEMU has ended without a fault";
     let start = || Rest::of(firmware, situation).unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     let mut rest = start();
-    let (expected, end) = rest.levels().unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
+    let (expected, end) = rest
+        .levels()
+        .unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     assert_eq!(end, End::None, "{}: ends without a fault", situation.name);
     // Without a fault the levels are low from some cycle on; otherwise no permit could be wrong.
     let low_from = situation.low_from as usize;
@@ -308,8 +310,11 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             rest = start();
         }
     }
-    rest.put_back().unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
-    let again = rest.levels().unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
+    rest.put_back()
+        .unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
+    let again = rest
+        .levels()
+        .unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     assert_eq!(again, (expected, End::None), "not all is put back");
     counts
 }

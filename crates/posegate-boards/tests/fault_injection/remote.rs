@@ -56,7 +56,9 @@ impl Remote {
     fn send(&mut self, command: &str) -> Result<(), EmulatorEnded> {
         let sum = command.bytes().fold(0u8, u8::wrapping_add);
         let packet = format!("${command}#{sum:02x}");
-        self.stream.write_all(packet.as_bytes()).map_err(|_| EmulatorEnded)
+        self.stream
+            .write_all(packet.as_bytes())
+            .map_err(|_| EmulatorEnded)
     }
 
     /// Returns the next packet, if it arrives within a slice of time.
@@ -198,7 +200,9 @@ impl Remote {
     pub fn wait(&mut self) -> Stop {
         match self.packet() {
             Ok(Some(packet)) if packet.starts_with('T') || packet.starts_with('S') => Stop::Stopped,
-            Ok(Some(packet)) if packet.starts_with('W') || packet.starts_with('X') => Stop::EmulatorEnded,
+            Ok(Some(packet)) if packet.starts_with('W') || packet.starts_with('X') => {
+                Stop::EmulatorEnded
+            }
             Ok(_) => Stop::Running,
             Err(EmulatorEnded) => Stop::EmulatorEnded,
         }
