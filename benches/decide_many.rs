@@ -1,6 +1,6 @@
-//! Measures `contain::many`: nanoseconds for one set, on one core and on all, with the integer code on the same sets in the same
-//! run, and the share of sets that the filter decides. Prints one JSON line for each figure; fails if the goal for reference set A
-//! is missed or if any decision differs.
+//! Measures `contain::many`: nanoseconds for one set on one core and on all, and the share of sets that the filter
+//! decides. Also measures the integer code on the same sets. Prints one JSON line for each figure; fails if
+//! the goal for reference set A is missed or if any decision differs.
 //!
 //! `cargo bench --features std --bench decide_many`. A number is the best of 21 rounds over 100,000 sets, because other
 //! processes may delay a round.

@@ -1,4 +1,4 @@
-//! Executes a plan on a Cortex-M4F: rules and tables in flash, with a tag that is not seen and a surprise on the way.
+//! Executes a plan on a Cortex-M4F: rules and tables in flash, with a tag that is not seen and a slip during a drive.
 //! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares its output with the output of the same run on
 //! the host.
 //!

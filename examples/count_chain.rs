@@ -73,7 +73,7 @@ mod firmware {
             MotionUpdate::bounded(from, &[Leg::Straight(to)], &drift, within)
                 .map_err(|_| "no growth")
         };
-        // Every drive may begin where an observation put the estimate.
+        // Every drive may begin at any estimate that an observation allows.
         let first = drive(&begin, near, cylinder(0.45, 0.07)?)?;
         let again = drive(&near, near, cylinder(0.3, 0.12)?)?;
         let last = drive(&near, end, cylinder(0.25, 0.2)?)?;
@@ -170,8 +170,8 @@ mod firmware {
             .map_err(|_| "no rules")?;
         let mut plan = Sequencer::new(rules);
         let set = PoseSet::bounded(begin, 0.39, 0.034).map_err(|_| "no set")?;
-        let told = counter.print("next step of a plan", || plan.next(black_box(&set)))?;
-        if !matches!(told, Instruction::Drive { .. }) {
+        let instruction = counter.print("next step of a plan", || plan.next(black_box(&set)))?;
+        if !matches!(instruction, Instruction::Drive { .. }) {
             return Err("the plan does not begin with a drive");
         }
         if counter.short {

@@ -76,7 +76,7 @@ mod firmware {
         let table = Table::parse(TABLE).map_err(|_| "the table does not parse")?;
         // The first reports of the schedule are good; when the last of them arrives, the gate is open.
         let good = SCHEDULE.iter().take(4);
-        let (mut dearest, mut open) = ((0, 0), false);
+        let (mut highest, mut open) = ((0, 0), false);
         for cycle in good {
             let report = cycle.report.as_ref().ok_or("a cycle without a report")?;
             let (set_cost, set) = counter.count(|| convert(black_box(&table), &report.belief))?;
@@ -85,19 +85,19 @@ mod firmware {
             let second = counter
                 .count(|| second::opinion(black_box(TABLE), &report.belief, Trust::FULL))?
                 .0;
-            let (whole, told) = counter.count(|| step(&mut gate, cycle.now_ms, report))?;
-            open = told.permission.is_permit();
+            let (whole, output) = counter.count(|| step(&mut gate, cycle.now_ms, report))?;
+            open = output.permission.is_permit();
             let own = whole.saturating_sub(set_cost + decision + second);
-            dearest = dearest.max((own, whole));
+            highest = highest.max((own, whole));
         }
         if !open {
             return Err("the gate is not open");
         }
-        let (own, whole) = dearest;
+        let (own, whole) = highest;
         counter.line("", "step of a gate, whole", whole, "instructions", None);
         let name = "step of a gate on top of what it calls";
-        // The goal is not met yet; the cost of the redundant checks may not grow. Two looks at the bounds of movement, at the
-        // hypotheses and at what they leave out are a tenth of it.
+        // The goal is not met yet; the cost of the redundant checks may not grow. A tenth of it are the two checks of the
+        // bounds of movement, of the hypotheses and of the probability that they omit.
         counter.short_of(
             name,
             own,
@@ -125,8 +125,8 @@ mod firmware {
         let _ = fix.1.map_err(|_| "a fix was refused")?;
         counter.line("", "fix of a monitor", fix.0, "instructions", None);
         let now_ms = SCHEDULE.get(3).map_or(0, |cycle| cycle.now_ms) + 1;
-        let told = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
-        if !told.permission.is_permit() {
+        let output = counter.print("tick of a gate", || tick(&mut gate, now_ms))?;
+        if !output.permission.is_permit() {
             return Err("the gate has closed");
         }
         // Repeated to measure the stack.

@@ -93,7 +93,7 @@ mod firmware {
     const CORRELATIONS: [f64; 3] = [0.3, 0.2, 0.4];
     static LARGE: Gaussian = Gaussian::new(0.0, [0.2, 0.2, 0.5], CORRELATIONS);
     static SMALL: Gaussian = Gaussian::new(0.0, [0.01, 0.01, 0.2], CORRELATIONS);
-    /// So far back that the tag is not seen from a part of the set.
+    /// So far back that a part of the set does not see the tag.
     static EDGE: Gaussian = Gaussian::new(-1.2, [0.2, 0.2, 0.5], CORRELATIONS);
     const WIDE_TRANSLATION_M: f64 = 0.1;
     const WIDE_YAW_RAD: f64 = 2.0 * PI / 180.0;
@@ -301,12 +301,12 @@ mod firmware {
             "B",
             goal(512, 512),
         );
-        let (mut dearest, mut digest) = (0, 0);
+        let (mut highest, mut digest) = (0, 0);
         let mut poses = Looks::new();
         for _ in 0..LOOKS {
             let pose = poses.pose();
             let (cost, sighting) = counter.count(|| look(black_box(&scene), black_box(&pose)))?;
-            dearest = cost.max(dearest);
+            highest = cost.max(highest);
             digest = added(digest, &sighting);
         }
         if digest != looks::SEE_T7 {
@@ -315,7 +315,7 @@ mod firmware {
         counter.line(
             "worst found of",
             "sight see-t7",
-            dearest,
+            highest,
             "instructions",
             goal(1_500, 0),
         );
@@ -494,7 +494,7 @@ mod firmware {
             y_m: f64::from(home.y_um) * 1e-6,
             yaw_rad: 0.0,
         };
-        // Little but slabs.
+        // Mostly slabs.
         let narrow = PoseSet::bounded(at_home, 0.001, PI).map_err(impossible)?;
         let _ = counter.print("decide whole circle, every heading", || {
             decide(black_box(&circle), black_box(&narrow))

@@ -111,17 +111,17 @@ mod firmware {
         let mut k = KEPT as u32 + 2;
         fix(&mut tracker, &fix_at(1, (k - 4) * PERIOD_MS)).map_err(refused)?;
         // With a full ring and a fix that is carried.
-        let mut dearest = 0;
+        let mut highest = 0;
         for _ in 0..8 {
             k += 1;
             let next = black_box(increment(k)?);
             let (cost, taken) = counter.count(|| odometry(&mut tracker, next))?;
             taken.map_err(refused)?;
-            dearest = dearest.max(cost);
+            highest = highest.max(cost);
         }
         let most = if M4F { 1_500 } else { 5_000 };
         let name = "increment of a tracker";
-        counter.line("", name, dearest, "instructions", Some(most));
+        counter.line("", name, highest, "instructions", Some(most));
 
         // A fix from before the second increment of the ring, half a period after the first: 63 and a half increments.
         let oldest = (k - KEPT as u32) * PERIOD_MS + PERIOD_MS / 2;

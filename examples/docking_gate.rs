@@ -67,7 +67,7 @@ mod firmware {
             halt()
         };
         // The control cycle: every 10 ms, with the report that has arrived since the last cycle, or without.
-        while robot.waits_for_its_next_cycle() {
+        while robot.next_cycle() {
             let now_ms = robot.now_ms();
             let _ = gate.scrub(SCRUBBED_A_CYCLE);
             let step = match robot.report() {
@@ -77,7 +77,7 @@ mod firmware {
             if interlock.apply(now_ms, &step.permission).is_err() {
                 gate.fault(Reason::InterlockFault);
             }
-            robot.tell(&step, Led::is_high());
+            robot.print_change(&step, Led::is_high());
         }
         let _ = interlock.close();
         robot.stop()

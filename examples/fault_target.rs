@@ -29,7 +29,7 @@ mod firmware {
     #[used]
     static SEAL: Seal = Seal::UNSEALED;
 
-    type Door = Interlock<Led, ReadBack, Heartbeat>;
+    type Output = Interlock<Led, ReadBack, Heartbeat>;
 
     /// Bytes checked in a cycle's idle time.
     const A_FEW: usize = 64;
@@ -37,7 +37,8 @@ mod firmware {
     #[entry]
     fn main() -> ! {
         // The program halts if the set-up fails.
-        let (Ok(mut gate), Some(mut door)) = (Gate::new(TABLE, &SETTINGS, START_MS), door()) else {
+        let (Ok(mut gate), Some(mut output)) = (Gate::new(TABLE, &SETTINGS, START_MS), output())
+        else {
             halt()
         };
         let image = image();
@@ -47,7 +48,7 @@ mod firmware {
         let mut progress = Scrub::new();
         for cycle in &SCHEDULE {
             cycle_begins(cycle.number, (&raw const gate).cast(), size_of_val(&gate));
-            let verdict = run(&mut gate, &mut door, cycle);
+            let verdict = run(&mut gate, &mut output, cycle);
             cycle_done(cycle.number, code(verdict));
             let _ = gate.scrub(A_FEW);
             if SEAL.scrub(&mut progress, image, A_FEW) == ScrubProgress::Damaged {
@@ -58,7 +59,7 @@ mod firmware {
         halt()
     }
 
-    fn door() -> Option<Door> {
+    fn output() -> Option<Output> {
         Interlock::new(Led::new())
             .ok()?
             .with_read_back(ReadBack, 10)
@@ -69,12 +70,12 @@ mod firmware {
 
     /// A control cycle, as the README shows it.
     #[inline(never)]
-    fn run(gate: &mut Gate<'_>, door: &mut Door, cycle: &Cycle) -> Result<(), Reason> {
+    fn run(gate: &mut Gate<'_>, output: &mut Output, cycle: &Cycle) -> Result<(), Reason> {
         let step = match &cycle.report {
             Some(report) => gate.step(cycle.now_ms, report),
             None => gate.tick(cycle.now_ms),
         };
-        if door.apply(cycle.now_ms, &step.permission).is_err() {
+        if output.apply(cycle.now_ms, &step.permission).is_err() {
             gate.fault(Reason::InterlockFault);
         }
         step.verdict

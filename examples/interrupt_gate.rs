@@ -15,7 +15,7 @@
 //! arrival of the report's own first byte is in the future, and denied. A controller cannot detect a sender that makes
 //! an estimate younger than it is by less than that delay.
 //!
-//! Reports of source 0 are evaluated as they come. Reports of source 1 are fixes of a slow source, which a tracker carries along the
+//! Reports of source 0 are evaluated at their arrival. Reports of source 1 are fixes of a slow source, which a tracker carries along the
 //! odometry that comes over the same line: with odometry in every cycle the gate evaluates the pose of this cycle.
 //!
 //! The work of a cycle is bounded: process the bytes that the queue held at its start, evaluate [`REPORTS_A_CYCLE`]
@@ -111,8 +111,8 @@ mod firmware {
     const CONTACT_MS: u32 = 30;
     const HEARTBEAT_MS: u32 = 50;
     const WATCHDOG_MS: u32 = 50;
-    /// A report takes 12 ms on the line. The dearest decision on a set that moves takes 2 ms here, and a cycle must end in time in a
-    /// flood too.
+    /// A report takes 12 ms on the line. The most expensive decision on a moving set takes 2 ms here, and a cycle must end in time even if
+    /// the line is flooded.
     const REPORTS_A_CYCLE: usize = 2;
     /// Covers the table once in a tenth of a second.
     const SCRUBBED_A_CYCLE: usize = 32;
@@ -150,10 +150,10 @@ mod firmware {
         static mut RECEIVED: Received = Queue::new();
         static mut TO_SEND: ToSend = Queue::new();
         let (received, taken_up) = RECEIVED.split();
-        let (told, to_send) = TO_SEND.split();
+        let (queued, to_send) = TO_SEND.split();
         Clock::start(CLOCK_STARTS_AT);
         // The program halts if the set-up fails.
-        let Ok(controller) = Controller::new(taken_up, told) else {
+        let Ok(controller) = Controller::new(taken_up, queued) else {
             halt()
         };
         free(|section| {
@@ -230,7 +230,7 @@ mod firmware {
             let _ = self.gate.scrub(SCRUBBED_A_CYCLE);
             let since_ms = now_ms.wrapping_sub(self.begun_cycle_ms);
             self.begun_cycle_ms = now_ms;
-            // The watchdog has closed the output, or should have: a broken watchdog is no reason to continue.
+            // The watchdog has closed the output, or should have: the cycle closes even if the watchdog is broken.
             if FORCED_LOW.swap(false, Ordering::Relaxed) || since_ms >= WATCHDOG_MS {
                 self.close_for_late_cycle(now_ms);
             }
@@ -257,7 +257,7 @@ mod firmware {
                 let is_future = begun_ms.wrapping_sub(report.stamp_ms) >= 1 << 31;
                 if report.source == CARRIED {
                     if is_future || !evidence.others.is_empty() {
-                        // A tracker carries one estimate of a time that has passed. What it carried is no longer the newest
+                        // A tracker carries one estimate, of a past time. The carried estimate is no longer the newest
                         // that was reported.
                         self.tracker.drop_fix();
                         self.line.refused = self.line.refused.wrapping_add(1);
@@ -293,7 +293,7 @@ mod firmware {
             }
         }
 
-        /// Takes an increment of the odometry. One that breaks the way closes the gate.
+        /// Takes an increment of the odometry. An increment that breaks the path closes the gate.
         fn follow(&mut self, now_ms: u32, increment: Increment) {
             if let Err(reason) = self.tracker.odometry(increment) {
                 let step = self.gate.inhibit(now_ms, reason);
@@ -303,7 +303,7 @@ mod firmware {
 
         /// Closes because this cycle came late: the permits must be earned again.
         fn close_for_late_cycle(&mut self, now_ms: u32) {
-            // The watchdog may have forced the output low, so a read-back mismatch is no fault of the contact. A failed
+            // The watchdog may have forced the output low, so a read-back mismatch does not show a fault of the contact. A failed
             // close is a fault.
             if self.interlock.close().is_err() {
                 self.gate.fault(Reason::InterlockFault);
@@ -379,8 +379,8 @@ mod firmware {
 
         /// Puts a whole message in the queue, or nothing.
         fn send(&mut self, frame: &Frame) {
-            let room = self.to_send.capacity() - self.to_send.len();
-            if frame.len() <= room {
+            let free = self.to_send.capacity() - self.to_send.len();
+            if frame.len() <= free {
                 for byte in frame {
                     let _ = self.to_send.enqueue(*byte);
                 }

@@ -24,7 +24,7 @@
 #define POSEGATE_MOST_HYPOTHESES MOST_HYPOTHESES
 
 /**
- * Largest number of hypotheses beside the report's own.
+ * Largest number of hypotheses in addition to the report's own.
  */
 #define POSEGATE_OTHERS 7U
 
@@ -94,7 +94,7 @@
 #define POSEGATE_TRACKER_WORDS 192U
 
 /**
- * Increments that a tracker keeps for fixes that come late.
+ * Number of increments that a tracker keeps for late fixes.
  */
 #define POSEGATE_TRACKER_INCREMENTS 64U
 
@@ -149,7 +149,7 @@ enum posegate_status
      */
     POSEGATE_STATUS_SELF_TEST_FAILED = -7,
     /**
-     * The gate's copy of its settings has changed: the gate is latched, and only `init` helps.
+     * The gate's copy of its settings has changed: the gate is latched until `posegate_gate_init`.
      */
     POSEGATE_STATUS_MEMORY_DAMAGED = -8,
     /**
@@ -206,7 +206,7 @@ enum posegate_status
      */
     POSEGATE_STATUS_RESPONSE_TIME = -21,
     /**
-     * `motion` is not a `posegate_motion`; or a source moves and all its speeds are zero, or one is below zero, not a number, or beyond
+     * `motion` is not a `posegate_motion`; or a source moves and all its speeds are zero, or a speed is below zero, not a number, or above
      * 1,000 m/s or 24 rad/s.
      */
     POSEGATE_STATUS_MOTION = -22,
@@ -229,7 +229,7 @@ enum posegate_status
     POSEGATE_STATUS_ODOMETRY = -26,
     /**
      * The `ages` of a source do not rise by 64 ms, are below 64 ms or above 4194 s; or their factors fall, are not from 1 to 1023, or are,
-     * rounded up to 2^-6, larger than the source's own inflation; or one follows an unused one.
+     * rounded up to 2^-6, larger than the source's own inflation; or a used entry follows an unused one.
      */
     POSEGATE_STATUS_AGING = -27,
     /**
@@ -467,7 +467,7 @@ enum posegate_advice_kind
      */
     POSEGATE_ADVICE_KIND_LOOK_AT_TAG = 3,
     /**
-     * Bring the robot to where the task begins.
+     * Bring the robot to the start of the task.
      */
     POSEGATE_ADVICE_KIND_RESTAGE = 4,
     /**
@@ -538,7 +538,7 @@ typedef uint32_t posegate_cross_terms;
 #endif // __cplusplus
 
 /**
- * Whether the robot moves while an estimate is used, from its stamp until a permission on it ends. 0 is not a value.
+ * The movement of the robot while an estimate is used, from its stamp until its permission ends. 0 is not a value.
  */
 enum posegate_motion
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -546,7 +546,7 @@ enum posegate_motion
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * It does not move: something else makes sure of it, for example brakes that the same output releases. Its speeds are ignored.
+     * It does not move, because other means ensure it, such as brakes that the same output releases. Its speeds are ignored.
      */
     POSEGATE_MOTION_STANDS_STILL = 1,
     /**
@@ -592,7 +592,7 @@ typedef uint32_t posegate_heading;
 #endif // __cplusplus
 
 /**
- * Whether a gate whose permit has ended needs a reset. 0 is not a value.
+ * The condition for a restart after a permit has ended. 0 is not a value.
  */
 enum posegate_restart
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -838,8 +838,8 @@ typedef struct posegate_compact {
  * Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.
  *
  * `posegate_gate_init` initialises it. Do not move it: a copy at another place is refused, and so is zeroed
- * storage. A copy that is restored to the same place would not know of a fault that was latched since then. The
- * counter that the caller provides detects this, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. No gate can
+ * storage. A copy that is restored to the same place does not contain a fault that was latched since then. The
+ * counter that the caller provides detects the copy, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. No gate can
  * detect that the whole memory, including the counter, was restored: call `posegate_gate_init` after that. Only one
  * context at a time may call its functions.
  */
@@ -859,12 +859,12 @@ typedef struct posegate_gate {
  */
 typedef struct posegate_age {
     /**
-     * The largest time since the last fix, milliseconds, rounded down to 64 ms: at least 64, and more than that of the age before. 0 if
-     * this age and those after it are not used.
+     * The largest time since the last fix, milliseconds, rounded down to 64 ms: at least 64, and more than in the entry before. 0 if
+     * this entry and those after it are not used.
      */
     uint32_t until_ms;
     /**
-     * The factor by which covariances are multiplied, unit 2^-16: at least 1, not less than that of the age before, not more than the
+     * The factor by which covariances are multiplied, unit 2^-16: at least 1, not less than in the entry before, not more than the
      * source's own. It is rounded up to 2^-6.
      */
     uint32_t inflation_q16;
@@ -899,8 +899,8 @@ typedef struct posegate_source {
      */
     uint32_t reserved;
     /**
-     * The largest speed along the robot's axis, m/s, in either direction. Every movement counts that the robot can make, also beyond
-     * what it is told.
+     * The largest speed along the robot's axis, m/s, in either direction. Every possible movement counts, also without a
+     * command.
      */
     double along_m_s;
     /**
@@ -980,7 +980,7 @@ typedef struct posegate_settings {
      */
     uint32_t look_at_tag;
     /**
-     * The most runs of cells that a decision looks at (a row without a run counts as one), of a table that has cells; 0 stands for 1,000.
+     * The largest number of runs of cells that a decision reads (a row without a run counts as one), for a table with cells; 0 means 1,000.
      * A pose-set that needs more is denied: `POSEGATE_REASON_TOO_COSTLY`. A run takes at most 2,500 instructions on a Cortex-M4F.
      * Facets are not affected.
      */
@@ -1073,15 +1073,15 @@ typedef struct posegate_step {
      */
     struct posegate_state state;
     /**
-     * With a report: the `posegate_reason` why it does not permit by itself, or 0 if it does. Without a report: the
+     * With a report: the `posegate_reason` why this report does not permit, or 0 if it does. Without a report: the
      * reason why the gate is closed, or 0.
      */
     uint32_t reason;
 } posegate_step;
 
 /**
- * A report with what belongs to it. The robot is at one of the hypotheses, so a gate permits only if each is inside: the clusters of a
- * particle filter, or the two poses from which a tag that is seen squarely looks the same.
+ * A report with its other hypotheses. The robot is at one of the hypotheses, so a gate permits only if each is inside. Examples: the
+ * clusters of a particle filter, or the two poses from which a tag that is seen head-on looks the same.
  */
 typedef struct posegate_evidence {
     /**
@@ -1093,19 +1093,19 @@ typedef struct posegate_evidence {
      */
     struct posegate_belief others[POSEGATE_OTHERS];
     /**
-     * The number of the others: 0 if the report is alone.
+     * The number of valid entries of `others`: from 0 to `POSEGATE_OTHERS`.
      */
     uint32_t other_count;
     /**
-     * What the robot can have moved beside the estimates until the stamp, in any direction, micrometres: the slip of its odometry.
+     * Bound of the slip of the odometry until the stamp, in any direction, micrometres: added to every hypothesis.
      */
     uint32_t beside_um;
     /**
-     * The same for the heading, either way, unit 2^-24 turn.
+     * The same bound for the heading, to either side, unit 2^-24 turn.
      */
     uint32_t beside_q24;
     /**
-     * The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of those that are left out.
+     * The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of the omitted hypotheses.
      */
     uint32_t elsewhere_q32;
     /**
@@ -1196,7 +1196,7 @@ typedef struct posegate_examined {
      */
     struct posegate_verdict verdict;
     /**
-     * The number of the hypothesis that it is about: the first that is denied, else the one of least margin.
+     * The number of the hypothesis of this verdict: the first denied hypothesis, else the one with the least margin.
      */
     uint32_t hypothesis;
     /**
@@ -1207,7 +1207,7 @@ typedef struct posegate_examined {
 
 /**
  * For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait
- * for permits in a row, has no second evaluation, checks no settings and keeps no state.
+ * for consecutive permits, has no second evaluation, checks no settings and keeps no state.
  *
  * Storage of a judge: a table and a maximum age, to evaluate estimates, each on its own.
  *
@@ -1290,8 +1290,8 @@ typedef struct posegate_table_info {
 } posegate_table_info;
 
 /**
- * Storage of a tracker, which carries the newest fix of a slow source along the odometry, so that a gate can evaluate a report for
- * the present in every control cycle.
+ * Storage of a tracker, which carries the newest fix of a slow source along the odometry. So a gate can evaluate a
+ * report for now in every control cycle.
  *
  * `posegate_tracker_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
  */
@@ -1303,46 +1303,46 @@ typedef struct posegate_tracker {
 } posegate_tracker;
 
 /**
- * How far an odometry errs. Deviations grow with the root of the way, as the sum of many small independent errors does. Slip is a
- * bound: a share of every movement that may be wrong in the worst direction. No value may be below zero.
+ * The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
+ * a bound: the share of every movement that may be wrong in the worst direction. No value may be below zero.
  */
 typedef struct posegate_odometry_errors {
     /**
-     * Deviation of the place on each axis, metres per root of a metre driven.
+     * Standard deviation of the position on each axis, metres per root of a metre driven.
      */
     double m_per_sqrt_m;
     /**
-     * Deviation of the heading, radians per root of a radian turned.
+     * Standard deviation of the heading, radians per root of a radian turned.
      */
     double rad_per_sqrt_rad;
     /**
-     * Deviation of the heading, radians per root of a metre driven.
+     * Standard deviation of the heading, radians per root of a metre driven.
      */
     double rad_per_sqrt_m;
     /**
-     * Deviation of the place on each axis, metres per root of a second.
+     * Standard deviation of the position on each axis, metres per root of a second.
      */
     double m_per_sqrt_s;
     /**
-     * Deviation of the heading, radians per root of a second.
+     * Standard deviation of the heading, radians per root of a second.
      */
     double rad_per_sqrt_s;
     /**
-     * The share of a way that may be wrong, in any direction.
+     * The share of a driven length that may be wrong, in any direction.
      */
     double slip;
     /**
-     * The share of a turn that may be wrong, either way.
+     * The share of a turn that may be wrong, in either direction.
      */
     double turn_slip;
     /**
-     * The turn that may be wrong beside that, radians per metre driven.
+     * The additional turn that may be wrong, radians per metre driven.
      */
     double turn_slip_per_m;
 } posegate_odometry_errors;
 
 /**
- * What a tracker needs to know.
+ * The settings of a tracker.
  */
 typedef struct posegate_tracker_settings {
     /**
@@ -1350,7 +1350,7 @@ typedef struct posegate_tracker_settings {
      */
     struct posegate_odometry_errors errors;
     /**
-     * The source of the fixes: how far its covariances are trusted, and how fast the robot moves at most (a larger increment is a
+     * The source of the fixes: the trust in its covariances, and the largest speeds of the robot (a larger increment is a
      * jump). The tracker applies the trust, so the gate's source of the carried reports has inflation 1 and all terms filled. Its
      * frame is not used.
      */
@@ -1360,17 +1360,17 @@ typedef struct posegate_tracker_settings {
      */
     uint32_t maximum_gap_ms;
     /**
-     * The oldest fix that is carried, milliseconds: from 1 to 2^31 - 1. Its growth limits its use long before that.
+     * The oldest fix that is carried, milliseconds: from 1 to 2^31 - 1. The growth of its set usually ends its use much earlier.
      */
     uint32_t maximum_fix_age_ms;
 } posegate_tracker_settings;
 
 /**
- * A movement of the odometry since the increment before, in the robot's axes at its start.
+ * A movement of the odometry since the previous increment, in the robot's axes at its start.
  */
 typedef struct posegate_increment {
     /**
-     * Ahead, metres: at most 4 either way.
+     * Ahead, metres: from -4 to 4.
      */
     double ahead_m;
     /**
@@ -1382,25 +1382,25 @@ typedef struct posegate_increment {
      */
     double turn_rad;
     /**
-     * The time at its beginning, milliseconds of the controller's clock: the end of the one before. Otherwise one was lost.
+     * The time at its beginning, milliseconds of the controller's clock. If it is not the end of the previous increment, one was lost.
      */
     uint32_t begins_ms;
     /**
-     * The time at its end.
+     * The time at its end, by the same clock.
      */
     uint32_t stamp_ms;
 } posegate_increment;
 
 /**
- * The report for now, or why there is none.
+ * The report for now, or the reason why there is none.
  */
 typedef struct posegate_tracked {
     /**
-     * For `posegate_gate_step_on`. Without a report it is of no form and closes a gate.
+     * For `posegate_gate_step_on`. Without a report it is invalid and closes a gate.
      */
     struct posegate_evidence evidence;
     /**
-     * 0, or the `posegate_reason` for which there is no report.
+     * 0, or the `posegate_reason` why there is no report.
      */
     uint32_t reason;
     /**
@@ -1507,7 +1507,7 @@ extern "C" {
  * Converts a ROS message to an estimate: its marginal over x, y and yaw.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_belief_from_ros(const struct posegate_ros_pose *message,
                                          struct posegate_belief *belief);
@@ -1516,7 +1516,7 @@ posegate_status posegate_belief_from_ros(const struct posegate_ros_pose *message
  * Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_belief_from_mavlink_odometry(const struct posegate_mavlink_odometry *message,
                                                       uint32_t axes,
@@ -1527,7 +1527,7 @@ posegate_status posegate_belief_from_mavlink_odometry(const struct posegate_mavl
  * `posegate_axes`.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_belief_from_mavlink_vision(const struct posegate_mavlink_vision *message,
                                                     uint32_t axes,
@@ -1537,7 +1537,7 @@ posegate_status posegate_belief_from_mavlink_vision(const struct posegate_mavlin
  * Converts nine numbers to an estimate.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_belief_from_compact(const struct posegate_compact *message,
                                              struct posegate_belief *belief);
@@ -1555,14 +1555,14 @@ posegate_status posegate_self_test(void);
  * A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
  * that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
  * borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
- * word of the caller in which the gate counts its calls. Its first value may be any number. It must not be part of
- * what the caller saves and restores, and nobody else may ever write to it, not even before another
+ * word of the caller in which the gate counts its calls. Its first value may be any number. The caller must not save
+ * and restore it, and no other code may ever write to it, not even before another
  * `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
  *
  * Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
  * read, and the counter can be written, now and as long as the gate is used.
  */
 posegate_status posegate_gate_init(struct posegate_gate *gate,
@@ -1575,12 +1575,12 @@ posegate_status posegate_gate_init(struct posegate_gate *gate,
 /**
  * Evaluates a report at the controller's time `now_ms`.
  *
- * An invalid report (a null pointer, a number that is not in its enum) is an error, and closes the gate as a report
- * of an unknown source does. If `step` is null or misaligned, the report is evaluated all the same: the gate must
+ * An invalid report (a null pointer, a number that is not in its enum) is an error. It closes the gate as a report
+ * of an unknown source does. If `step` is null or misaligned, the report is still evaluated: the gate must
  * close even if the caller gets no answer.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_step(struct posegate_gate *gate,
                                    uint32_t now_ms,
@@ -1588,13 +1588,13 @@ posegate_status posegate_gate_step(struct posegate_gate *gate,
                                    struct posegate_step *step);
 
 /**
- * As `posegate_gate_step`, for a report with several hypotheses, or one that a tracker has carried along odometry.
+ * As `posegate_gate_step`, for a report with several hypotheses, or a report that a tracker has carried along odometry.
  *
- * Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each closes
+ * Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each error closes
  * the gate.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_step_on(struct posegate_gate *gate,
                                       uint32_t now_ms,
@@ -1606,7 +1606,7 @@ posegate_status posegate_gate_step_on(struct posegate_gate *gate,
  * reports stop. The time also advances if `step` is null or misaligned.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_tick(struct posegate_gate *gate,
                                    uint32_t now_ms,
@@ -1619,7 +1619,7 @@ posegate_status posegate_gate_tick(struct posegate_gate *gate,
  * Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_reset(struct posegate_gate *gate,
                                     uint32_t now_ms);
@@ -1634,7 +1634,7 @@ posegate_status posegate_gate_reset(struct posegate_gate *gate,
  * `POSEGATE_REASON_MEMORY_DAMAGED`.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_inhibit(struct posegate_gate *gate,
                                       uint32_t now_ms,
@@ -1649,7 +1649,7 @@ posegate_status posegate_gate_inhibit(struct posegate_gate *gate,
  * `POSEGATE_REASON_MEMORY_DAMAGED`.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_fault(struct posegate_gate *gate,
                                     uint32_t reason);
@@ -1661,7 +1661,7 @@ posegate_status posegate_gate_fault(struct posegate_gate *gate,
  * is null.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_scrub(struct posegate_gate *gate,
                                     size_t count,
@@ -1671,7 +1671,7 @@ posegate_status posegate_gate_scrub(struct posegate_gate *gate,
  * Writes the state of the gate.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_state(struct posegate_gate *gate, struct posegate_state *state);
 
@@ -1679,7 +1679,7 @@ posegate_status posegate_gate_state(struct posegate_gate *gate, struct posegate_
  * Writes what to do if the gate is closed.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_advice(struct posegate_gate *gate, struct posegate_advice *advice);
 
@@ -1688,18 +1688,18 @@ posegate_status posegate_gate_advice(struct posegate_gate *gate, struct posegate
  * telemetry: the verdict does not change the gate's state.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_examine(struct posegate_gate *gate,
                                       const struct posegate_report *report,
                                       struct posegate_verdict *verdict);
 
 /**
- * Writes the verdict on a report with several hypotheses, or one that a tracker has carried. The cost is that of
- * `posegate_gate_examine` for each. For telemetry: the verdict does not change the gate's state.
+ * Writes the verdict on a report with several hypotheses, or a report that a tracker has carried. The cost is that of
+ * `posegate_gate_examine` for each hypothesis. For telemetry: the verdict does not change the gate's state.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_gate_examine_on(struct posegate_gate *gate,
                                          const struct posegate_evidence *evidence,
@@ -1713,7 +1713,7 @@ posegate_status posegate_gate_examine_on(struct posegate_gate *gate,
  * still answer. The table is borrowed: it must not change while the judge is used.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
  * read, now and as long as the judge is used.
  */
 posegate_status posegate_judge_init(struct posegate_judge *judge,
@@ -1730,7 +1730,7 @@ posegate_status posegate_judge_init(struct posegate_judge *judge,
  * than the site, but not less strict.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_judge_permits(const struct posegate_judge *judge,
                                        const struct posegate_estimate *estimate,
@@ -1743,33 +1743,34 @@ posegate_status posegate_judge_permits(const struct posegate_judge *judge,
  * `posegate_judge_permits`.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_judge_examine(const struct posegate_judge *judge,
                                        const struct posegate_estimate *estimate,
                                        struct posegate_verdict *verdict);
 
 /**
- * Initialises a monitor. Where the model holds, it contradicts it wrongly once in `fixes_between_false_alarms` fixes on average, or less
- * often: at least 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+ * Initialises a monitor. While the model is valid, a false alarm comes on average once in `fixes_between_false_alarms` fixes (at least
+ * 100), or less often. At 10 fixes per second, a million means once in 28 hours, 100 million once in four months.
  *
- * Errors: `POSEGATE_STATUS_BAD_VALUE` for fewer.
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if the number is below 100.
  *
  * # Safety
- * The pointer is null, misaligned, or points to what its type says.
+ * The pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_monitor_init(struct posegate_monitor *monitor,
                                       uint32_t fixes_between_false_alarms);
 
 /**
  * Takes an accepted fix and its prediction for the same time. With a tracker call `posegate_tracker_tracked` before and after
- * `posegate_tracker_fix`, for the same time: the evidence from before is the prediction, the report from after is the fix. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+ * `posegate_tracker_fix`, for the same time: the first evidence is the prediction, the second report is the fix.
+ * `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
  *
- * Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if one of both has no valid covariance or the dependence is no such number. The
- * fix then counts for nothing, and `POSEGATE_MODEL_CONTRADICTED` is written.
+ * Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if fix or prediction has no valid covariance, or if `dependence` is not in its enum. The
+ * fix is then ignored, and `POSEGATE_MODEL_CONTRADICTED` is written.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_monitor_fix(struct posegate_monitor *monitor,
                                      const struct posegate_report *fix,
@@ -1778,10 +1779,10 @@ posegate_status posegate_monitor_fix(struct posegate_monitor *monitor,
                                      uint32_t *model);
 
 /**
- * Lets a monitor forget all fixes. Call it after a person has removed the cause.
+ * Discards all fixes of a monitor. A manual action: call it after the cause was removed.
  *
  * # Safety
- * The pointer is null, misaligned, or points to what its type says.
+ * The pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_monitor_reset(struct posegate_monitor *monitor);
 
@@ -1808,7 +1809,7 @@ const char *posegate_reason_name(uint32_t reason);
 const char *posegate_reason_meaning(uint32_t reason);
 
 /**
- * Returns a sentence that says what a person must do. Empty for a number that is not a reason.
+ * Returns a sentence with the required manual action. Empty for a number that is not a reason.
  */
 const char *posegate_reason_action(uint32_t reason);
 
@@ -1819,7 +1820,7 @@ const char *posegate_reason_action(uint32_t reason);
  * Errors: `POSEGATE_STATUS_BAD_VALUE` if the name is not UTF-8.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the name can be
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the name can be
  * read.
  */
 posegate_status posegate_frame_id(const char *name,
@@ -1833,12 +1834,12 @@ posegate_status posegate_frame_id(const char *name,
  *
  * Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
  * response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, set `response_ms`, and add the
- * difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to bear one, give twice
- * the period. A robot that moves is granted what it can move in these times, so short ones give more room: odometry makes them short
- * (`posegate_tracker`), and the period is then the odometry's.
+ * difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to tolerate one, give twice
+ * the period. The movement that is possible in these times is added to every set, so short times leave more slack. Odometry makes them
+ * short (`posegate_tracker`), and the period is then the odometry's.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_settings_for_source(uint32_t period_ms,
                                              uint32_t jitter_ms,
@@ -1856,7 +1857,7 @@ uint32_t posegate_abi_version(void);
  * Errors: `POSEGATE_STATUS_TABLE_INVALID` if the bytes are not a table.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
  * read.
  */
 posegate_status posegate_table_check(const uint8_t *table,
@@ -1869,7 +1870,7 @@ posegate_status posegate_table_check(const uint8_t *table,
  * it.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes can be read.
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes can be read.
  */
 posegate_status posegate_checksum(uint32_t so_far,
                                   const uint8_t *bytes,
@@ -1877,12 +1878,12 @@ posegate_status posegate_checksum(uint32_t so_far,
                                   uint32_t *checksum);
 
 /**
- * Initialises storage for a tracker without odometry and without a fix, whose reports are for a gate on this table.
+ * Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
  *
  * Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be read.
  */
 posegate_status posegate_tracker_init(struct posegate_tracker *tracker,
                                       const uint8_t *table,
@@ -1890,40 +1891,40 @@ posegate_status posegate_tracker_init(struct posegate_tracker *tracker,
                                       const struct posegate_tracker_settings *settings);
 
 /**
- * Takes an increment of the odometry. Writes 0, or the `posegate_reason` for which the way is broken:
- * `POSEGATE_REASON_ODOMETRY_GAP`, `_JUMP` or `_BACKWARDS`. The tracker then begins again and waits for a newer fix; close the gate
+ * Takes an increment of the odometry. Writes 0, or the `posegate_reason` that breaks the path:
+ * `POSEGATE_REASON_ODOMETRY_GAP`, `_JUMP` or `_BACKWARDS`. The tracker then restarts and waits for a newer fix; close the gate
  * with the reason (`posegate_gate_inhibit`).
  *
- * Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the increment is not finite or too large. The way is then broken too, as by a
- * jump.
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the increment is not finite or too large. This also breaks the path, as a jump
+ * does.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_tracker_odometry(struct posegate_tracker *tracker,
                                           const struct posegate_increment *increment,
                                           uint32_t *reason);
 
 /**
- * Takes a fix, also one that comes late: it is carried along the increments since its stamp. All fixes come from one source, each with
- * another sequence number. Writes 0, or the `posegate_reason` for which it is not used. After `POSEGATE_REASON_SEQUENCE_STUCK`,
- * `_SOURCE_CHANGED` and `_FRAME_MISMATCH` nothing is carried until the next fix; otherwise what was carried before.
+ * Takes a fix, also a late one: it is carried along the increments since its stamp. All fixes come from one source, each with
+ * another sequence number. Writes 0, or the `posegate_reason` why the fix is not used. After `POSEGATE_REASON_SEQUENCE_STUCK`,
+ * `_SOURCE_CHANGED` and `_FRAME_MISMATCH` nothing is carried until the next fix; otherwise the previous fix remains in use.
  *
  * Errors: those of a report. Nothing is carried until the next fix.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_tracker_fix(struct posegate_tracker *tracker,
                                      const struct posegate_report *report,
                                      uint32_t *reason);
 
 /**
- * Writes the report for now: the newest fix at the place of the newest odometry. Without one, a permit ends by itself in
+ * Writes the report for now: the newest fix, carried to the newest odometry. Without a report, a permit ends by itself in
  * `posegate_gate_tick`; `posegate_gate_inhibit` with the reason ends it at once.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_tracker_tracked(struct posegate_tracker *tracker,
                                          uint32_t now_ms,
@@ -1933,7 +1934,7 @@ posegate_status posegate_tracker_tracked(struct posegate_tracker *tracker,
  * Initialises storage for an empty receiver.
  *
  * # Safety
- * The pointer is null, misaligned, or points to what its type says.
+ * The pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_receiver_init(struct posegate_receiver *receiver);
 
@@ -1942,7 +1943,7 @@ posegate_status posegate_receiver_init(struct posegate_receiver *receiver);
  * or a `POSEGATE_STATUS_WIRE_` error is returned.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_receiver_push(struct posegate_receiver *receiver,
                                        uint8_t byte,
@@ -1954,7 +1955,7 @@ posegate_status posegate_receiver_push(struct posegate_receiver *receiver,
  * Errors: `POSEGATE_STATUS_WIRE_CONTENT` if the body is not a request.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; `length` bytes of the body can be
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the body can be
  * read.
  */
 posegate_status posegate_request_decode(const uint8_t *body,
@@ -1970,7 +1971,7 @@ posegate_status posegate_request_decode(const uint8_t *body,
  * request has a smaller radius than the table was made for.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says; there are `count` judges.
+ * Each pointer is null, misaligned, or valid for its type; there are `count` judges.
  */
 posegate_status posegate_request_judge(const struct posegate_request *request,
                                        const struct posegate_judge *judges,
@@ -1981,7 +1982,7 @@ posegate_status posegate_request_judge(const struct posegate_request *request,
  * Encodes the body of a reply.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_reply_encode(const struct posegate_reply *reply,
                                       struct posegate_message *body);
@@ -1992,7 +1993,7 @@ posegate_status posegate_reply_encode(const struct posegate_reply *reply,
  * Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message.
  *
  * # Safety
- * Each pointer is null, misaligned, or points to what its type says.
+ * Each pointer is null, misaligned, or valid for its type.
  */
 posegate_status posegate_frame_encode(const struct posegate_message *body,
                                       struct posegate_message *frame);

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_of_the_literature() {
+    fn quantiles_equal_published_values() {
         // Published tables of the chi-square distribution, 3 degrees of freedom.
         for (epsilon, r2) in [
             (0.90, 6.251_388_631_170_325),

@@ -1,6 +1,6 @@
 //! On these pages: **firmware** starts with [`gate::Gate`], **programs on a PC** start with [`Site`] of `posegate-host`.
 //!
-// The README's links, as far as they lead elsewhere on these pages: of two definitions of a link the first counts.
+// Overrides links of the README on these pages: of two definitions of a link the first counts.
 //! [`Site`]: ../posegate_host/site/struct.Site.html
 //! [assumptions]: crate::gate::assumptions
 //! [estimates]: #pages-and-examples
@@ -23,11 +23,11 @@
 //!
 //! # Features
 //!
-//! | feature | what it adds |
+//! | feature | adds |
 //! |---|---|
 //! | `cells` | on by default: decisions on the cells of a table |
 //! | `headings` | on by default: facets that turn with the robot are decided heading by heading: wide turns, and tight decisions |
-//! | `sight` | on by default: what the camera sees from a pose, of the table of a tag |
+//! | `sight` | on by default: the predicted view of a tag from a pose, by the tag's table |
 //! | `unions` | on by default: pose-sets that only several pieces contain together, such as a lane and a bay |
 //! | `std` | lookup tables on a PC: success sets (`shape`), tables (`bake`) and their proofs (`verify`) |
 //! | `defmt` | `defmt::Format` on every public type of the core |

@@ -1,4 +1,4 @@
-//! Messages of the core's errors. Firmware that formats no error links none of them.
+//! Messages of the core's errors. Firmware that formats no error does not link them.
 
 /// Implements `Display` for an enum whose every variant has a constant message, and `Error` unless `no error` is given.
 macro_rules! messages {

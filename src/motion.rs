@@ -1,8 +1,8 @@
-//! Bounds on a robot's movement, and what they add to a pose-set.
+//! Bounds on a robot's movement, and the resulting growth of a pose-set.
 //!
 //! An estimate says where the robot was at its stamp. A permission says where it may be until the permission ends. In
-//! between the robot may drive. [`MotionBounds`] state how fast at most; [`MotionBounds::within`] gives what that adds to a
-//! pose-set ([`Growth`]), rounded up.
+//! between the robot may drive. [`MotionBounds`] state its largest speeds. [`MotionBounds::within`] returns the movement that
+//! they allow in a time ([`Growth`]), rounded up.
 //!
 //! ```
 //! use posegate::motion::MotionBounds;
@@ -25,7 +25,7 @@ use crate::set::Growth;
 
 /// The largest speeds of a robot, in its own frame.
 ///
-/// They bound every movement that the robot can make, not only what it is told to do: a controller that limits the speed to
+/// They bound every possible movement of the robot, not only the commanded one: a controller that limits the speed to
 /// 0.3 m/s and overshoots by a tenth has a bound of 0.33 m/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -44,7 +44,7 @@ const TURN_Q36: u128 = 12_025_407_501_443_077_024;
 const LARGEST: u32 = 1 << 30;
 
 impl MotionBounds {
-    /// The robot does not move while a permission is in force. Whoever states this must make sure of it, for example with
+    /// The robot does not move while a permission is in force. Other means must ensure this, for example
     /// brakes that the same output releases.
     pub const STANDS_STILL: Self = Self {
         speed_q10: 0,
@@ -54,7 +54,7 @@ impl MotionBounds {
     /// Returns bounds from the largest speeds along and across the robot's axis (m/s) and the largest turn rate (rad/s), in
     /// either direction. Rounded up.
     ///
-    /// `None` if one is below zero, not a number, or beyond 1,000 m/s or 24 rad/s.
+    /// `None` if a speed is below zero, not finite, or above 1,000 m/s or 24 rad/s.
     #[must_use]
     pub fn new(along_m_s: f64, across_m_s: f64, turn_rad_s: f64) -> Option<Self> {
         let up = |value: f64, factor: u128, shift: i32| {
@@ -78,8 +78,8 @@ impl MotionBounds {
         })
     }
 
-    /// Returns bounds from whole numbers, for constants: mm/s along and across the robot's axis, mrad/s of turn. Rounded up. Speeds
-    /// beyond 1,000 m/s and 24 rad/s count as that.
+    /// Returns bounds from whole numbers, for constants: mm/s along and across the robot's axis, mrad/s of turn. Rounded up. Larger
+    /// speeds are limited to 1,000 m/s and 24 rad/s.
     #[must_use]
     pub const fn of_mm_mrad(along_mm_s: u32, across_mm_s: u32, turn_mrad_s: u32) -> Self {
         let squares = wide(along_mm_s, along_mm_s).saturating_add(wide(across_mm_s, across_mm_s));
@@ -96,7 +96,7 @@ impl MotionBounds {
         }
     }
 
-    /// Returns what a robot can have moved within a time, milliseconds: the radius of its places, and its turn either way.
+    /// Returns the largest movement within a time in milliseconds: the radius of its positions, and the turn to either side.
     #[must_use]
     pub const fn within(&self, ms: u32) -> Growth {
         if self.speed_q10 | self.turn_q16 == 0 {
@@ -141,7 +141,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn only_speeds_that_a_robot_can_have_are_bounds() {
+    fn negative_infinite_and_too_large_speeds_are_refused() {
         assert_eq!(
             MotionBounds::new(0.0, 0.0, 0.0),
             Some(MotionBounds::STANDS_STILL)
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_time_is_every_place() {
+    fn longest_time_gives_largest_movement() {
         let bounds = MotionBounds::new(1.0, 0.0, 1.0).unwrap();
         assert_eq!(bounds.within(u32::MAX), Growth::new(u32::MAX, u32::MAX));
         assert_eq!(bounds.within(0), Growth::NONE);
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_give_the_same_bounds() {
+    fn integer_and_float_speeds_give_equal_bounds() {
         let of = |along, across, turn| MotionBounds::of_mm_mrad(along, across, turn);
         for [along, across, turn] in [[300, 0, 524], [1_500, 400, 2_000], [0, 0, 0], [1, 1, 1]] {
             let [x, y, t] = [along, across, turn].map(|v| f64::from(v) * 1e-3);

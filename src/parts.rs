@@ -1,10 +1,10 @@
 //! The parts that this build contains.
 //!
-//! A part that is left out takes no flash, and only makes the gate deny more: without it there is one way less to show that a
-//! pose-set is inside. Each part is a constant, so every build compiles and checks all code, and the compiler drops what
-//! cannot be reached.
+//! An omitted part takes no flash, and only makes the gate deny more: one method less can prove that a
+//! pose-set is inside. Each part is a constant, so every build compiles and checks all code, and the compiler drops
+//! unreachable code.
 
-/// Cells decide, where a table has them (feature `cells`). Without it, a table with cells alone is refused.
+/// Cells decide if a table has cells (feature `cells`). Without it, a table with cells alone is refused.
 pub(crate) const CELLS: bool = cfg!(feature = "cells");
 
 /// Facets on points that turn with the robot are evaluated heading by heading (feature `headings`). Without it, such facets are

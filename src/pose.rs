@@ -1,4 +1,4 @@
-//! Poses in SE(2) as integers, and the move between the world frame and a task's goal frame.
+//! Poses in SE(2) as integers, and the transform between the world frame and a task's goal frame.
 //!
 //! ```
 //! use posegate::num::BinaryAngle;
@@ -32,8 +32,8 @@ pub struct Pose {
     pub yaw: BinaryAngle,
 }
 
-/// Limit of the distance of a pose from the goal, on each axis, within which the move into the goal
-/// frame keeps its stated error: 2^28 um (268 m).
+/// Limit of the distance of a pose from the goal, on each axis, within which the transform into the goal
+/// frame has its stated error: 2^28 um (268 m).
 pub const REACH_UM: i32 = 1 << 28;
 
 /// Upper bound of the distance, on each axis, of a [`Pose`] that was moved into the goal frame from the
@@ -127,7 +127,7 @@ mod tests {
     proptest! {
         /// The error table of `pose_to_goal`, compared with f64 (whose own error is 1e-7 um here).
         #[test]
-        fn the_move_keeps_its_error(
+        fn goal_transform_stays_within_stated_error(
             goal in (-1e3f64..1e3, -1e3f64..1e3, -7.0f64..7.0),
             offset in (-180.0f64..180.0, -180.0f64..180.0, -7.0f64..7.0),
         ) {

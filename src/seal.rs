@@ -1,6 +1,6 @@
 //! Seals firmware files: the work of `posegate seal` after linking.
 //!
-//! The *image* is what the file loads into flash: every loadable segment that has bytes, by its load
+//! The *image* is the content that the file loads into flash: every loadable segment that has bytes, by its load
 //! address, from the lowest to the highest. A linker may leave some bytes between two segments to align the
 //! second. The first is then extended by zeros, so that every flash tool writes them; it is loaded from a
 //! copy at the end of the file. The firmware has one record ([`Seal`]) in its constants. Sealing writes the
@@ -89,7 +89,7 @@ const LARGEST_GAP: u32 = 4096;
 struct Part {
     address: u32,
     bytes: Range<usize>,
-    /// Where sections still refer to it, if it is loaded from a copy.
+    /// The original position, to which sections still refer, if the part is loaded from a copy.
     section: Option<Range<usize>>,
     /// Offset of its program header in the file.
     header: usize,

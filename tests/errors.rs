@@ -1,4 +1,4 @@
-//! Every error of the core has a message for people, and is a `core::error::Error`.
+//! Every error of the core has a readable message, and is a `core::error::Error`.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -131,7 +131,7 @@ fn is_message(text: &str) -> bool {
 }
 
 #[test]
-fn every_error_has_a_message_of_its_own() {
+fn every_error_has_a_distinct_message() {
     for (name, errors) in errors() {
         let texts: BTreeSet<String> = errors.iter().map(ToString::to_string).collect();
         assert_eq!(texts.len(), errors.len(), "{name}: {texts:?}");
@@ -165,7 +165,7 @@ fn nested_errors_contain_the_message_of_their_cause() {
 }
 
 #[test]
-fn answers_that_are_no_errors_have_a_message() {
+fn non_error_answers_have_a_message() {
     let texts = [
         StopReason::Done.to_string(),
         StopReason::GaveUp.to_string(),

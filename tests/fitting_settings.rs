@@ -1,5 +1,5 @@
-//! Settings that fit a source open the gate and keep it open as long as its reports come as stated; settings that can never open are
-//! refused, with the number that would do.
+//! Settings that fit a source open the gate and keep it open while reports arrive as stated. Settings that can never open are refused,
+//! with the smallest number that can.
 
 use posegate::gate::{Gate, InvalidParameter, Settings, Source};
 use posegate::motion::MotionBounds;
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 const SEE_T7: &[u8] = include_bytes!("../examples/tables/see-t7.posegate");
 const CYCLE_MS: u32 = 20;
 
-/// How long a gate is open while good reports come every `period_ms`, each up to `jitter_ms` after its stamp.
+/// Returns how long a gate is open, ms, while good reports come every `period_ms`, each up to `jitter_ms` after its stamp.
 fn open_ms(
     settings: &Settings<'_>,
     period_ms: u32,
@@ -90,7 +90,7 @@ proptest! {
         prop_assert!(open >= least, "{open} of {least} ms with {period_ms} and {jitter_ms}");
     }
 
-    /// What is refused never opens; with the number of the refusal it opens.
+    /// Refused settings never open; with the number that the refusal names they open.
     #[test]
     fn refused_settings_never_open(
         cycles in 2u32..75,
@@ -106,7 +106,7 @@ proptest! {
         let delays = [0; 12];
         let mut refused = 0;
         while let Err(error) = settings.check() {
-            // The gate itself is made, since the stated period is not used in a step.
+            // With a period of 1 the gate can be made; a step does not use the period.
             let unstated = Settings { report_period_ms: 1, ..settings };
             prop_assert_eq!(open_ms(&unstated, period_ms, &delays), Ok(0), "{}", error);
             prop_assert_eq!(open_ms(&settings, period_ms, &delays), Err(error));
@@ -130,9 +130,9 @@ proptest! {
     }
 }
 
-/// One permit opens the gate for a while, however rare the reports are.
+/// With one required permit the gate opens for a while, however rare the reports are.
 #[test]
-fn a_single_permit_needs_no_next_report() {
+fn single_permit_needs_no_next_report() {
     let (table, sources) = (Table::parse(SEE_T7).unwrap(), sources());
     let mut settings = with_source(Settings::for_source(1000, 0), &table, &sources);
     settings.permits_in_a_row = 1;
@@ -146,10 +146,10 @@ fn a_single_permit_needs_no_next_report() {
     );
 }
 
-/// A permit that ends by itself restarts the inhibit hold time: if that is not over with the next report, the gate
+/// A permit that ends by itself restarts the inhibit hold time. If that time is not over at the next report, the gate
 /// does not open again.
 #[test]
-fn a_single_permit_needs_the_hold_time_to_be_over() {
+fn single_permit_needs_hold_time_to_be_over() {
     let (table, sources) = (Table::parse(SEE_T7).unwrap(), sources());
     let mut settings = with_source(Settings::for_source(500, 0), &table, &sources);
     settings.permits_in_a_row = 1;
@@ -163,14 +163,14 @@ fn a_single_permit_needs_the_hold_time_to_be_over() {
         report_period_ms: 1,
         ..settings
     };
-    // Once after the start, and never again.
+    // It opens once after the start, and never again.
     assert_eq!(open_ms(&unstated, 500, &[0; 12]), Ok(120));
     settings.inhibit_hold_ms = 380;
     assert!(open_ms(&settings, 500, &[0; 12]).unwrap() > 1000);
 }
 
 #[test]
-fn the_numbers_of_refusals_are_exact() {
+fn numbers_in_refusals_are_exact() {
     let (table, sources) = (Table::parse(SEE_T7).unwrap(), sources());
     let fitting = with_source(Settings::for_source(500, 0), &table, &sources);
     let hold = |permit_hold_ms| Settings {

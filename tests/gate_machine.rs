@@ -27,12 +27,13 @@ fn next(state: &mut u64) -> u64 {
 
 /// A report for the reference, whose clock does not wrap.
 #[derive(Clone, Copy)]
-struct Said {
+struct SentReport {
     source: u8,
     sequence: u32,
     stamp: i64,
-    /// Whether its frame is that of the source, and whether its estimate would be permitted if it is fresh.
+    /// Its frame is that of the source.
     framed: bool,
+    /// Its estimate would be permitted if fresh.
     inside: bool,
 }
 
@@ -70,7 +71,7 @@ impl<'a> Reference<'a> {
         self.closed_until = self.now + i64::from(self.set.inhibit_hold_ms);
     }
 
-    fn happens(&mut self, now: i64, said: Option<Said>) {
+    fn happens(&mut self, now: i64, sent: Option<SentReport>) {
         let maximum_age = i64::from(self.set.maximum_age_ms);
         let backwards = now < self.now;
         let late = self.open && now - self.now > i64::from(self.set.response_ms);
@@ -81,25 +82,25 @@ impl<'a> Reference<'a> {
         if backwards || late || self.row > 0 && now > self.open_until {
             self.close();
         }
-        let Some(said) = said else { return };
-        if !said.framed || usize::from(said.source) >= self.set.sources.len() {
+        let Some(sent) = sent else { return };
+        if !sent.framed || usize::from(sent.source) >= self.set.sources.len() {
             return self.close();
         }
-        let last = self.last.replace((said.source, said.sequence));
-        let again = last == self.last && said.stamp == self.newest;
-        let before = (said.source, said.sequence.wrapping_sub(1));
-        let next = last.is_none_or(|last| last == before && said.stamp > self.newest);
-        if said.stamp <= now {
-            self.newest = self.newest.max(said.stamp);
+        let last = self.last.replace((sent.source, sent.sequence));
+        let again = last == self.last && sent.stamp == self.newest;
+        let before = (sent.source, sent.sequence.wrapping_sub(1));
+        let next = last.is_none_or(|last| last == before && sent.stamp > self.newest);
+        if sent.stamp <= now {
+            self.newest = self.newest.max(sent.stamp);
         }
         let oldest = maximum_age - i64::from(self.set.response_ms);
-        let permits = said.inside && (0..=oldest).contains(&(now - said.stamp));
+        let permits = sent.inside && (0..=oldest).contains(&(now - sent.stamp));
         if backwards || !permits || !(next || again) {
             return self.close();
         }
         if next {
             self.row += 1;
-            self.open_until = (now + i64::from(self.set.permit_hold_ms)).min(said.stamp + oldest);
+            self.open_until = (now + i64::from(self.set.permit_hold_ms)).min(sent.stamp + oldest);
             self.open |=
                 self.row >= u32::from(self.set.permits_in_a_row) && now >= self.closed_until;
         }
@@ -127,10 +128,10 @@ fn drawn_settings(seed: &mut u64) -> Settings<'static> {
 }
 
 #[test]
-fn a_million_random_events_are_as_the_reference_says() {
+fn million_random_events_match_the_reference() {
     let mut seed = 0x0bad_5eed;
     let (mut opened, mut permitted, mut closed, mut events) = (0u32, 0u32, 0u32, 0u32);
-    // Counts of rare events: replays, repetitions, strangers, resets, faults, until a reset, by something else.
+    // Counts of rare events: replays, repetitions, unknown sources, resets, faults, ends until a reset, external inhibits.
     let mut seen = [0u32; 7];
     while events < 1_000_000 {
         let settings = drawn_settings(&mut seed);
@@ -147,7 +148,7 @@ fn a_million_random_events_are_as_the_reference_says() {
         let mut gate = Gate::new(DOCK, &settings, now as u32).unwrap();
         let mut reference = Reference::new(&settings, now);
         let (mut stamp, mut source) = (now, 0);
-        let (mut past, mut replayed): (Vec<Said>, _) = (Vec::new(), None);
+        let (mut past, mut replayed): (Vec<SentReport>, _) = (Vec::new(), None);
         // Some runs have few disturbances, others many.
         let calm = 1 + next(&mut seed) % 64;
         for _ in 0..200 {
@@ -187,18 +188,18 @@ fn a_million_random_events_are_as_the_reference_says() {
                 // An earlier report is repeated.
                 replayed = Some(past.len().saturating_sub((pick >> 32) as usize % 8));
             }
-            let said = if let Some(said) = replayed.and_then(|at: usize| past.get(at)) {
+            let sent = if let Some(sent) = replayed.and_then(|at: usize| past.get(at)) {
                 replayed = replayed
                     .map(|at| at + 1)
                     .filter(|_| !pick.is_multiple_of(8));
                 seen[0] += 1;
-                Some(*said)
+                Some(*sent)
             } else if pick & 0x70 == 0 {
                 replayed = None;
                 None
             } else {
                 replayed = None;
-                // From now on, or for one report.
+                // The source changes for good, or for one report.
                 source = if strange[4] {
                     (pick >> 40) as u8 % 3
                 } else {
@@ -226,30 +227,30 @@ fn a_million_random_events_are_as_the_reference_says() {
                     (true, _) => (pick >> 8) as i64 % 0x1fff_ffff,
                 };
                 stamp = if strange[3] { stamp } else { now - age };
-                let said = Said {
+                let sent = SentReport {
                     source,
                     sequence: *sequence,
                     stamp,
                     framed: !(strange[8] && pick & 1 == 0),
                     inside: !strange[5],
                 };
-                seen[2] += u32::from(!said.framed || said.source >= 2);
-                past.push(said);
-                Some(said)
+                seen[2] += u32::from(!sent.framed || sent.source >= 2);
+                past.push(sent);
+                Some(sent)
             };
             let was_latched = reference.latched;
-            reference.happens(now, said);
+            reference.happens(now, sent);
             seen[5] += u32::from(reference.latched && !was_latched);
-            let step = match said {
+            let step = match sent {
                 None => gate.tick(now as u32),
-                Some(said) => {
+                Some(sent) => {
                     let step = gate.step(
                         now as u32,
                         &Report {
-                            source: said.source,
-                            frame: FrameId::of(if said.framed { "map" } else { "odom" }),
-                            belief: belief(if said.inside { 0.0 } else { 1.0 }),
-                            ..report(said.sequence, said.stamp as u32)
+                            source: sent.source,
+                            frame: FrameId::of(if sent.framed { "map" } else { "odom" }),
+                            belief: belief(if sent.inside { 0.0 } else { 1.0 }),
+                            ..report(sent.sequence, sent.stamp as u32)
                         },
                     );
                     seen[1] += u32::from(step.verdict == Err(Reason::Repeated));
@@ -281,7 +282,7 @@ fn a_million_random_events_are_as_the_reference_says() {
 
 /// A gate is closed at first, and opens only after consecutive permits and the hold time.
 #[test]
-fn it_opens_only_after_permits_in_a_row() {
+fn gate_opens_only_after_consecutive_permits() {
     let settings = settings();
     let gate = Gate::new(DOCK, &settings, 5).unwrap();
     assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
@@ -353,7 +354,7 @@ fn each_failure_closes_an_open_gate() {
             Reason::FrameMismatch,
         ),
         (
-            "an estimate beside the dock",
+            "an estimate next to the dock",
             |r, _| r.belief = belief(0.1),
             Reason::NotContained,
         ),
@@ -444,7 +445,7 @@ const ZERO: Estimate = Estimate {
 
 /// A gate cannot know that a filter's covariance is implausibly small.
 #[test]
-fn a_tiny_covariance_is_taken_as_it_is() {
+fn tiny_covariance_is_not_detected() {
     let settings = settings();
     let verdict = |variance: f64| {
         let mut gate = Gate::new(DOCK, &settings, 0).unwrap();
@@ -496,7 +497,7 @@ fn a_permit_ends_by_itself() {
 }
 
 #[test]
-fn no_parameter_switches_a_check_off() {
+fn no_parameter_disables_a_check() {
     type Change = fn(&mut Settings<'_>);
     let cases: [(Change, InvalidParameter); 13] = [
         (|s| s.response_ms = 0, InvalidParameter::ResponseTime),
@@ -589,7 +590,7 @@ fn an_inflation_makes_the_gate_stricter() {
 
 /// Invalid tables, and tables of another task or site, whose other fields are all correct.
 #[test]
-fn a_wrong_table_is_latched_from_the_start() {
+fn wrong_table_is_latched_at_start() {
     let settings = settings();
     let mut flipped = DOCK.to_vec();
     flipped[200] ^= 4;
@@ -665,7 +666,7 @@ fn a_fault_waits_for_a_reset() {
 
 /// If something else has closed the interlock, the gate must qualify again completely, or needs a reset.
 #[test]
-fn what_something_else_ends_is_earned_again() {
+fn gate_requalifies_after_external_inhibit() {
     let reason = Reason::InterlockFault;
     for restart in [Restart::Automatic, Restart::OnReset] {
         let settings = Settings {
@@ -685,7 +686,7 @@ fn what_something_else_ends_is_earned_again() {
             let step = gate.step(now, &report(sequence + later, now));
             assert_eq!(step.permission.is_permit(), later >= 3, "{later}");
         }
-        // The reported fault stays the one that was latched.
+        // The latched fault remains the reported one.
         gate.fault(Reason::CodeDamaged);
         let step = gate.inhibit(now + 200, reason);
         assert_eq!(step.state, State::Latched(Reason::CodeDamaged));
@@ -693,13 +694,13 @@ fn what_something_else_ends_is_earned_again() {
 }
 
 #[test]
-fn a_restart_by_hand_latches_whatever_ends_a_permit() {
+fn manual_restart_latches_every_end_of_a_permit() {
     let settings = Settings {
         restart: Restart::OnReset,
         ..settings()
     };
     let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
-    // A denial before the first permit loses no permit; this one does.
+    // This denial ends a permit, so it latches; one before the first permit does not.
     let mut gap = report(sequence + 2, now + 20);
     assert_eq!(
         gate.step(now + 20, &gap).state,

@@ -25,7 +25,7 @@ const STARTS: [u32; 4] = [0, 1000, (1 << 31) - 100, u32::MAX - 100];
 /// the dock are repeated while still fresh, and never open the gate. This holds for any number of required
 /// permits and any hold time of a denial.
 #[test]
-fn what_is_older_than_a_denial_opens_nothing() {
+fn reports_older_than_a_denial_never_open() {
     for start in STARTS {
         for (permits_in_a_row, inhibit_hold_ms) in [(1, 1), (1, 50), (3, 1), (3, 50)] {
             let settings = Settings {
@@ -63,7 +63,7 @@ fn what_is_older_than_a_denial_opens_nothing() {
 
 /// The same for reports that were delayed while those of another source were newer.
 #[test]
-fn a_source_that_lags_behind_another_waits() {
+fn source_that_lags_behind_another_is_denied() {
     let settings = Settings {
         permits_in_a_row: 1,
         inhibit_hold_ms: 1,
@@ -133,7 +133,7 @@ fn two_sources_in_turn_never_open() {
 /// A report with the number and the stamp of the last one and another content: its content may end a permit
 /// at once, and never counts for one.
 #[test]
-fn a_repetition_that_is_denied_closes() {
+fn denied_repetition_closes_the_gate() {
     let settings = settings();
     let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);
     let step = gate.step(now + 1, &outside(sequence, now));
@@ -156,7 +156,7 @@ fn a_repetition_that_is_denied_closes() {
 
 /// A repetition that permits is not counted: neither the count of permits nor the end of a permit changes.
 #[test]
-fn a_repetition_counts_for_nothing() {
+fn permitted_repetition_has_no_effect() {
     let settings = settings();
     let mut gate = Gate::new(DOCK, &settings, 0).unwrap();
     let _ = gate.step(60, &report(1, 60));
@@ -175,7 +175,7 @@ fn a_repetition_counts_for_nothing() {
 
 /// A source that restarts with another number is denied once, for the gap.
 #[test]
-fn a_source_that_begins_anew_recovers_after_one_gap() {
+fn restarted_source_recovers_after_one_gap() {
     let settings = settings();
     for begins in [0, 5, 1 << 31, u32::MAX - 1] {
         let (mut gate, _, mut now) = permitted(DOCK, &settings, 1000);
@@ -207,7 +207,7 @@ fn waits(gate: &mut Gate<'_>, mut sequence: u32, mut now: u32) -> u32 {
 /// The clock wraps after 49.7 days. After any time without reports, with cycles in between or a controller that
 /// slept, a fresh report counts after the maximum age at the latest.
 #[test]
-fn after_weeks_of_silence_a_fresh_report_counts() {
+fn fresh_report_counts_after_weeks_of_silence() {
     const DAY_MS: u64 = 86_400_000;
     let settings = settings();
     let mut silences: Vec<u64> = (0..120).map(|day| day * DAY_MS).collect();
@@ -238,7 +238,7 @@ fn after_weeks_of_silence_a_fresh_report_counts() {
 /// If a controller's clock is set back, earlier reports do not become fresh, and new reports wait for
 /// the maximum age at most.
 #[test]
-fn a_clock_that_is_set_back_makes_nothing_young() {
+fn clock_set_back_never_makes_reports_fresh() {
     let usual = settings();
     let settings = Settings {
         permits_in_a_row: 1,
@@ -303,7 +303,7 @@ fn a_clock_that_is_set_back_makes_nothing_young() {
 
 /// A stamp from the future is denied, and later stamps are not compared with it.
 #[test]
-fn a_stamp_from_the_future_keeps_nobody_waiting() {
+fn future_stamp_does_not_delay_later_reports() {
     let settings = settings();
     for ahead in [1, 100, MAXIMUM_AGE_MS, 100_000, (1 << 31) - 1] {
         let (mut gate, sequence, now) = permitted(DOCK, &settings, 1000);

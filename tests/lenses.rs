@@ -146,7 +146,7 @@ fn cases() -> Vec<(&'static str, Calibration, f64)> {
 }
 
 #[test]
-fn models_are_the_formulas() {
+fn lens_models_match_opencv_formulas() {
     let mut random = Random(1);
     for lens in [BARREL, PINCUSHION, RATIONAL, FISHEYE, Lens::Pinhole] {
         for _ in 0..2000 {
@@ -216,7 +216,7 @@ fn corners(camera: &Camera) -> Vec<[f64; 2]> {
 
 /// Draws points of a window, a third of them on its border and a third near it, where a fault would be, and
 /// compares each with the calibration. Returns how many were in the window.
-fn hold_to(
+fn compare_points(
     name: &str,
     calibration: &Calibration,
     view: &CertifiedCamera,
@@ -258,7 +258,7 @@ fn every_point_of_a_window_is_seen() {
     for (name, calibration, _) in cases() {
         let view =
             CertifiedCamera::of(&calibration).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let tried = hold_to(name, &calibration, &view, 150_000, &mut random);
+        let tried = compare_points(name, &calibration, &view, 150_000, &mut random);
         assert!(tried >= 100_000, "{name}: {tried}");
     }
 }
@@ -266,7 +266,7 @@ fn every_point_of_a_window_is_seen() {
 /// Random lenses, axes, borders and parts of the sensor: refused calibrations have a reason, and the windows of the
 /// others are correct. No window is left unproven.
 #[test]
-fn random_cameras_see_what_their_windows_say() {
+fn windows_of_random_cameras_are_seen() {
     let mut random = Random(3);
     let (mut proven, mut folds, mut tried) = (0, 0, 0);
     for _ in 0..600 {
@@ -320,7 +320,7 @@ fn random_cameras_see_what_their_windows_say() {
         match CertifiedCamera::of(&calibration) {
             Ok(view) => {
                 proven += 1;
-                tried += hold_to("random", &calibration, &view, 600, &mut random);
+                tried += compare_points("random", &calibration, &view, 600, &mut random);
             }
             Err(LensError::Folds { .. }) => folds += 1,
             Err(LensError::Nothing { .. }) => {}
@@ -362,7 +362,7 @@ fn counted(calibration: &Calibration, view: &CertifiedCamera) -> f64 {
 
 /// A window reports the share of the visible solid angle that it keeps, which is at least that of its case.
 #[test]
-fn windows_keep_most() {
+fn windows_keep_their_required_share() {
     for (name, calibration, least) in cases() {
         let view = CertifiedCamera::of(&calibration).unwrap();
         let planes = view.camera.view().planes().len();

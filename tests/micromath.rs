@@ -127,7 +127,7 @@ fn micromath_is_named_in_one_file() {
 }
 
 #[test]
-fn faults_are_seen() {
+fn seeded_faults_are_detected() {
     for (name, code) in [
         ("contain/mod.rs", "use micromath::F32;"),
         ("gate/mod.rs", "use crate::sight::Scene;"),
@@ -137,7 +137,7 @@ fn faults_are_seen() {
             "if sighting.phi_rad_for_telemetry() < 0.4 {",
         ),
         ("set/mod.rs", "sight::telemetry"),
-        ("sight/telemetry.rs", "pub fn mend(seen: &mut Sighting) {"),
+        ("sight/telemetry.rs", "pub fn fix(seen: &mut Sighting) {"),
         ("sight/telemetry.rs", "fn seen() -> Answer {"),
     ] {
         assert!(!faults(name, code).is_empty(), "{name}: {code}");
@@ -153,7 +153,7 @@ fn with_cosines(phi: i32, psi: i32) -> Sighting {
 
 /// The stated error: the angle of a cosine is correct to 3e-3 rad, for every value of an `i32`.
 #[test]
-fn angles_are_near() {
+fn angles_stay_within_stated_error() {
     let one = f64::from(1 << 30);
     let mut random = Random(8);
     let mut worst = 0.0f64;
@@ -167,13 +167,13 @@ fn angles_are_near() {
         });
         let mut sighting = base;
         (sighting.cos_phi_q30, sighting.cos_psi_q30) = (phi, psi);
-        let told = [
+        let computed = [
             sighting.phi_rad_for_telemetry(),
             sighting.psi_rad_for_telemetry(),
         ];
-        for (told, cos) in told.into_iter().zip([phi, psi]) {
+        for (computed, cos) in computed.into_iter().zip([phi, psi]) {
             let angle = (f64::from(cos) / one).acos();
-            worst = worst.max((f64::from(told) - angle).abs());
+            worst = worst.max((f64::from(computed) - angle).abs());
         }
     }
     println!("angles for telemetry are off by up to {worst} rad");
@@ -190,7 +190,7 @@ fn angles_are_near() {
 /// If telemetry disagrees with the definition, the answer agrees with the definition.
 /// Telemetry does not change a sighting.
 #[test]
-fn wrong_angles_make_no_wrong_answers() {
+fn wrong_angles_never_change_answers() {
     let mut random = Random(9);
     let (mut poses, mut misleading, mut permitting) = (0, 0, 0);
     while poses < 300_000 {
@@ -207,7 +207,7 @@ fn wrong_angles_make_no_wrong_answers() {
             pose[2] = nominal[2] + side * turn + random.within(-0.003, 0.003);
             let sighting = scene.look(&rounded(pose));
             let before = sighting;
-            let told = [
+            let computed = [
                 sighting.phi_rad_for_telemetry(),
                 sighting.psi_rad_for_telemetry(),
             ];
@@ -215,12 +215,12 @@ fn wrong_angles_make_no_wrong_answers() {
             let truth = success.membership(pose);
             let slack = |name| truth.slack.iter().find(|(of, _)| *of == name).unwrap().1;
             let limits = [set.phi_max_deg.min(90.0), set.psi_max_deg].map(f64::to_radians);
-            for ((told, limit), slack) in told
+            for ((computed, limit), slack) in computed
                 .into_iter()
                 .zip(limits)
                 .zip([slack("phi"), slack("psi")])
             {
-                let says_inside = f64::from(told) <= limit;
+                let says_inside = f64::from(computed) <= limit;
                 if says_inside != (slack >= 0.0) {
                     misleading += 1;
                     permitting += usize::from(says_inside);

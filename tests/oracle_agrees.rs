@@ -105,7 +105,7 @@ fn moved(world: &World, by: f64) -> World {
 
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
-fn membership() {
+fn membership_matches_reference() {
     for case in load("membership.json") {
         let (name, world) = (text(&case["name"]), world(&case));
         let differs = membership_differs(&case, &world);
@@ -115,7 +115,7 @@ fn membership() {
 
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
-fn membership_of_a_moved_set_is_noticed() {
+fn membership_detects_a_moved_set() {
     for case in load("membership.json") {
         let (name, world) = (text(&case["name"]), world(&case));
         let differs = membership_differs(&case, &moved(&world, 0.01));
@@ -125,7 +125,7 @@ fn membership_of_a_moved_set_is_noticed() {
 
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
-fn containment() {
+fn containment_matches_reference() {
     let mut worst: f64 = 0.0;
     for case in load("containment.json") {
         let (name, world) = (text(&case["name"]), world(&case));
@@ -142,7 +142,7 @@ fn containment() {
 
 #[test]
 #[ignore = "run by ci.sh cases DIR"]
-fn containment_of_a_moved_set_is_noticed() {
+fn containment_detects_a_moved_set() {
     for case in load("containment.json") {
         let (name, world) = (text(&case["name"]), world(&case));
         if number(&case["expected"]["s_star"]) == 0.0 {
@@ -223,16 +223,20 @@ fn no_sampled_pose_is_below_the_least_slack() {
         assert!(level(&set, about, pose) <= s * (1.0 + 1e-6), "{}", what());
         let (fast, pose) = min_slack_over(&world, about, &set, s, Effort::Fast);
         assert!(level(&set, about, pose) <= s * (1.0 + 1e-6), "{}", what());
-        let room = 2e-5 + 1e-3 * fast.abs();
+        let tolerance = 2e-5 + 1e-3 * fast.abs();
         assert!(fast >= least - 1e-9 * (1.0 + least.abs()), "{}", what());
-        assert!(fast <= least + room, "{fast} {least} {}", what());
+        assert!(fast <= least + tolerance, "{fast} {least} {}", what());
         for _ in 0..1000 {
             let pose = random_pose_in(&mut rng, &set, about, s);
             if level(&set, about, pose) > s {
                 continue;
             }
-            let room = 1e-9 + 2e-8 * least.abs();
-            assert!(world.slack(pose) >= least - room, "{pose:?} {}", what());
+            let tolerance = 1e-9 + 2e-8 * least.abs();
+            assert!(
+                world.slack(pose) >= least - tolerance,
+                "{pose:?} {}",
+                what()
+            );
         }
         let star = scale(&world, about, &set);
         if least.abs() > 1e-8 {
@@ -276,7 +280,7 @@ fn sight_and_slack_agree() {
 }
 
 #[test]
-fn extremes_of_the_scale() {
+fn scale_is_exact_at_its_extremes() {
     let free = World {
         goal: [1.0, 2.0, 3.0],
         set: Set::Box {

@@ -1,7 +1,7 @@
 //! A build without some parts of the gate (features `cells`, `headings`, `unions`, `sight`) denies more and never less.
 //!
 //! In every build: the decisions of the vector file, which were made with all parts, are those of this build, except that
-//! denials may take the place of permits. `./ci.sh parts` builds the sets of features.
+//! denials may replace permits. `./ci.sh parts` builds the sets of features.
 
 #[path = "../crates/posegate-testkit/src/replay.rs"]
 mod replay;
@@ -87,7 +87,7 @@ fn fewer_parts_never_permit_more() {
 }
 
 #[test]
-fn a_table_of_cells_alone_is_refused_without_cells() {
+fn cells_only_table_is_refused_without_cells() {
     let bytes = read(TABLES[CELLS_ALONE]);
     let refused = Table::parse(&bytes).err();
     let expected = cfg!(not(feature = "cells")).then_some(TableError::NoCells);
@@ -95,7 +95,7 @@ fn a_table_of_cells_alone_is_refused_without_cells() {
 }
 
 #[test]
-fn a_sight_record_is_read_with_the_feature_alone() {
+fn sight_record_is_read_only_with_feature_sight() {
     let bytes = read("examples/tables/see-t7.posegate");
     let table = Table::parse(&bytes).expect("a table with facets");
     assert_eq!(table.sight_record().is_some(), cfg!(feature = "sight"));

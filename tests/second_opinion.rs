@@ -47,7 +47,7 @@ struct Count {
     tried: usize,
     permits: usize,
     unconfirmed: usize,
-    told: usize,
+    reported: usize,
 }
 
 impl Count {
@@ -56,7 +56,7 @@ impl Count {
             tried: self.tried + other.tried,
             permits: self.permits + other.permits,
             unconfirmed: self.unconfirmed + other.unconfirmed,
-            told: self.told,
+            reported: self.reported,
         }
     }
 
@@ -72,15 +72,15 @@ impl Count {
         let second = opinion_after(table.bytes(), &case.belief, case.trust, case.movement);
         if second != INSIDE {
             self.unconfirmed += 1;
-            if self.told < 2 {
-                self.told += 1;
+            if self.reported < 2 {
+                self.reported += 1;
                 eprintln!("UNCONFIRMED on {}: {case:?}", table.task());
             }
         }
         true
     }
 
-    /// Searches for the border of what the first evaluation permits, and checks every set on the way.
+    /// Searches for the border of the first evaluation's permits, and checks every set of the search.
     fn search(&mut self, rng: &mut Rng, table: &Table<'_>, estimate: Pose, set: &PoseSet) {
         let drawn = beliefs::drawn(rng);
         let case = |by: f64| drawn.case(table, estimate, &trial::scaled(set, by));
@@ -201,21 +201,21 @@ fn every_permit_of_the_example_tables_is_confirmed() {
 const BINS: [[f64; 2]; 3] = [[0.5, 0.8], [0.8, 0.95], [0.95, 1.0]];
 
 /// For sets that are outside, by bin: their number, and the number of wrong confirmations.
-type Leak = [[usize; 2]; 3];
+type LeakCounts = [[usize; 2]; 3];
 
-fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> Leak {
+fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> LeakCounts {
     numbers
         .into_par_iter()
         .map(|number| {
             let mut rng = Rng::new(11_000_017 + number);
             let stage = stage(&mut rng, layout);
-            let mut found = Leak::default();
+            let mut found = LeakCounts::default();
             for _ in 0..60 {
                 leak_of(&mut rng, &stage, most_turn, &mut found);
             }
             found
         })
-        .reduce(Leak::default, |mut a, b| {
+        .reduce(LeakCounts::default, |mut a, b| {
             for (a, b) in a.iter_mut().flatten().zip(b.into_iter().flatten()) {
                 *a += b;
             }
@@ -223,12 +223,12 @@ fn leak(numbers: std::ops::Range<u64>, layout: Layout, most_turn: f64) -> Leak {
         })
 }
 
-fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
+fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut LeakCounts) {
     let table = Table::parse(&stage.bytes).unwrap();
     let (estimate, set) = hard_case(rng, &stage.world);
-    let drawn = beliefs::Drawn::honest();
+    let drawn = beliefs::ReportForm::honest();
     let small = drawn.case(&table, estimate, &trial::scaled(&set, 1e-3));
-    // Nothing is permitted there: it is off the table.
+    // The estimate is off the table, so nothing is permitted there.
     if !Count::default().permits(&table, &small) {
         return;
     }
@@ -248,7 +248,7 @@ fn leak_of(rng: &mut Rng, stage: &Stage, most_turn: f64, found: &mut Leak) {
 }
 
 #[test]
-fn what_is_outside_is_rarely_confirmed() {
+fn sets_outside_are_rarely_confirmed() {
     for (name, layout, turn, caps) in [
         ("facets", Layout::Facets, 0.1, [0.002, 0.005, 0.02]),
         (
@@ -271,7 +271,7 @@ fn what_is_outside_is_rarely_confirmed() {
 
 /// Returns beliefs whose sets leave the true set, with a true scale of 0.5 to 0.95.
 fn outside(rng: &mut Rng, stage: &Stage, table: &Table<'_>, tries: usize) -> Vec<Case> {
-    let drawn = beliefs::Drawn::honest();
+    let drawn = beliefs::ReportForm::honest();
     let case = |_| {
         let (estimate, set) = hard_case(rng, &stage.world);
         let small = drawn.case(table, estimate, &trial::scaled(&set, 1e-3));
@@ -316,7 +316,7 @@ fn fallen(number: u64) -> [usize; 2] {
 /// Every bit of the facets in memory is flipped once. Almost none of the resulting wrong permits of the first
 /// evaluation is confirmed from flash.
 #[test]
-fn permits_by_a_fallen_bit_are_not_confirmed() {
+fn permits_by_a_flipped_bit_are_not_confirmed() {
     let [wrong, confirmed] = (0..16)
         .into_par_iter()
         .map(fallen)

@@ -1,4 +1,4 @@
-//! The vector file is what its generator makes, has the required content, and the host decides as the file
+//! The vector file equals its generator's output, has the required content, and the host decides as the file
 //! states. `./ci.sh vectors` tests the emulated cores.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` rewrites the file and its tables.
@@ -88,12 +88,9 @@ fn records() -> Vec<Record<'static>> {
 }
 
 #[test]
-fn the_files_are_the_generators() {
+fn files_equal_generator_output() {
     let is_made = |path, kept: &[u8], made: &[u8]| {
-        assert!(
-            kept == made,
-            "{path} differs: POSEGATE_BLESS=1 writes it anew"
-        );
+        assert!(kept == made, "{path} differs: POSEGATE_BLESS=1 rewrites it");
     };
     is_made(VECTORS, &FILE, &vectors::file(GATES.as_slice()));
     for (path, made) in MADE {
@@ -102,7 +99,7 @@ fn the_files_are_the_generators() {
 }
 
 #[test]
-fn this_machine_decides_as_the_file_says() {
+fn host_decides_as_the_file_states() {
     assert!(FILE.len() < 1_000_000, "{} bytes", FILE.len());
     let expected = Outcome {
         count: vectors::COUNT,
@@ -138,7 +135,7 @@ fn count_of(layout_of: usize, kind: impl Fn(&Record<'_>) -> bool) -> usize {
 
 /// Every reason that a request can cause occurs on every table. Permits are neither rare nor most of the answers.
 #[test]
-fn the_file_holds_every_answer() {
+fn file_contains_every_answer() {
     let mut answers: [BTreeMap<u8, usize>; 7] = Default::default();
     for record in records() {
         let table = usize::from(record.request.table);
@@ -167,7 +164,7 @@ fn the_file_holds_every_answer() {
 
 /// There are replies of every kind, and margins slightly above and below 1, on every layout.
 #[test]
-fn the_file_holds_replies() {
+fn file_contains_every_kind_of_reply() {
     // Permits, denials, and those of each kind close to the border.
     let mut all = [0; 4];
     for (index, name) in LAYOUTS.iter().enumerate() {
@@ -210,7 +207,7 @@ fn the_file_holds_replies() {
 /// There are permitted sets that would be denied if they were 1 % larger, and the reverse: ellipsoids and
 /// bounded sets, on every layout.
 #[test]
-fn the_file_holds_close_calls() {
+fn file_contains_sets_near_the_border() {
     for (index, name) in LAYOUTS.iter().enumerate() {
         for gaussian in [true, false] {
             let [permits, denials] = [1.01, 0.99].map(|size| {
@@ -259,7 +256,7 @@ fn times(request: &Request, size: f64) -> Request {
 
 /// There are ellipsoids that the last and sharpest step of the facet test decides, permits and denials.
 #[test]
-fn the_file_holds_bends() {
+fn file_contains_sets_decided_by_the_last_facet_step() {
     let [permits, denials] = [true, false].map(|permit| {
         count_of(0, |record| {
             let code = if permit {
@@ -276,7 +273,7 @@ fn the_file_holds_bends() {
 
 /// If a table has both layouts, each permits sets that the other does not.
 #[test]
-fn both_layouts_of_a_table_permit() {
+fn each_layout_permits_sets_that_the_other_denies() {
     let at = TABLES.iter().position(|path| *path == OVER_180);
     let at = at.expect("a table of both layouts");
     // The offsets of the layouts in the header; zero if there is no such layout.
@@ -301,7 +298,7 @@ fn both_layouts_of_a_table_permit() {
 
 /// There are headings on both sides of +-180 degrees and of many turns, places far out, and sets below every unit.
 #[test]
-fn the_file_goes_to_the_ends() {
+fn file_contains_extreme_numbers() {
     // The largest yaw offset, and whether the place or a variance is extreme.
     let turn = |request: &Request| match request.spread {
         Uncertainty::Gaussian([.., [.., tt]]) => {
@@ -337,7 +334,7 @@ fn the_file_goes_to_the_ends() {
 
 /// A wrong answer, a wrong bit of a margin and a missing record are all detected.
 #[test]
-fn a_wrong_file_is_found() {
+fn corrupted_file_is_detected() {
     let repaired = |change: &dyn Fn(&mut Vec<u8>)| {
         let mut file = FILE.clone();
         file.truncate(file.len() - 4);

@@ -1,5 +1,5 @@
 //! A program in the emulated board's memory that stops the board for a test: at the start, before each control cycle and
-//! at each interrupt of the watchdog. `board.rs` compiles it, loads it beside the firmware and talks to it.
+//! at each interrupt of the watchdog. `board.rs` compiles it, loads it next to the firmware and communicates with it.
 //!
 //! The firmware's bytes are not changed. This program starts first, replaces the firmware's vector table by its own,
 //! and calls the firmware's handlers from its own. While the board is stopped, the processor is within one
@@ -103,14 +103,14 @@ fn call(number: usize) {
 extern "C" fn cycle() {
     // No byte is accepted before the clocks are stopped.
     hold_interrupts(true);
-    let told = stop(STOP_AT_CYCLE);
-    if let Some((received, _)) = told
+    let command = stop(STOP_AT_CYCLE);
+    if let Some((received, _)) = command
         && RECEIVED.load(Ordering::Relaxed) != received
     {
         take_bytes(received);
     }
     hold_interrupts(false);
-    if let Some((_, late_ms)) = told {
+    if let Some((_, late_ms)) = command {
         let start = get(CLOCK);
         while get(CLOCK).wrapping_sub(start) < late_ms {}
         call(TIMER);
@@ -178,8 +178,8 @@ fn feed(register: usize, value: u32) {
 
 /// Stops until the test lets the board run. Returns what to wait for, or `None` if the handler must be skipped.
 fn stop(which: u32) -> Option<(u32, u32)> {
-    let told = [which, get(CLOCK), get(LAMPS)];
-    write((&raw const told).addr(), size_of_val(&told));
+    let status = [which, get(CLOCK), get(LAMPS)];
+    write((&raw const status).addr(), size_of_val(&status));
     loop {
         let mut command = [0u32; 3];
         read((&raw mut command).addr(), size_of_val(&command));

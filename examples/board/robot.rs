@@ -40,7 +40,7 @@ impl Robot {
     }
 
     /// Waits for the next control cycle; returns `false` at the end of the script.
-    pub const fn waits_for_its_next_cycle(&mut self) -> bool {
+    pub const fn next_cycle(&mut self) -> bool {
         self.now_ms += CYCLE_MS;
         self.now_ms <= END_MS
     }
@@ -72,7 +72,7 @@ impl Robot {
     }
 
     /// Prints when the interlock changes, and why it closes.
-    pub fn tell(&mut self, step: &Step, is_high: bool) {
+    pub fn print_change(&mut self, step: &Step, is_high: bool) {
         if is_high != self.was_high {
             self.was_high = is_high;
             match step.verdict {

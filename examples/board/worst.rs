@@ -120,11 +120,11 @@ impl Search {
 
     /// Reports the cost of the last set; returns `true` if it is the most expensive.
     pub fn found(&mut self, cost: u64) -> bool {
-        let dearer = cost > self.cost;
-        if dearer {
+        let is_highest = cost > self.cost;
+        if is_highest {
             (self.cost, self.best) = (cost, self.genes);
         }
-        dearer
+        is_highest
     }
 
     /// Returns the cost of the most expensive set.

@@ -2,8 +2,8 @@
  * A motion controller with an interlock, as a product would use the gate: set-up once, a step with every
  * report, a tick in every cycle without one, and a pin that is high only while the permission permits.
  *
- * Reports of source 0 are evaluated as they come. Those of source 1 are fixes of a slow source, which a tracker carries
- * along the odometry, so that the gate evaluates the pose of every cycle while the robot drives.
+ * Reports of source 0 are evaluated at their arrival. Reports of source 1 are fixes of a slow source, which a tracker
+ * carries along the odometry, so that the gate evaluates the pose of every cycle while the robot drives.
  *
  * The robot is simulated: a script of reports and of silence, with a synthetic clock and the expected
  * results. `./ci.sh c` runs it under QEMU.
@@ -19,7 +19,7 @@ static const posegate_settings SETTINGS = {
     .site_digest = SITE_DIGEST,
     .sources =
         {
-            /* One robot has one speed, whatever the source: 0.1 m/s ahead, 0.1 rad/s. */
+            /* The robot's speed is the same for every source: 0.1 m/s ahead, 0.1 rad/s. */
             {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
              .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
             /* Carried: the tracker applies the trust. */
@@ -191,7 +191,7 @@ static uint32_t drive(uint32_t cycles, bool with_fixes, posegate_step *step)
         posegate_increment increment = {.ahead_m = ((count / 4U) % 2U == 0U) ? 0.0005 : -0.0005,
                                         .begins_ms = now_ms - 20U,
                                         .stamp_ms = now_ms};
-        /* A fix every half second; it is 80 ms old, when the robot was where it is now. */
+        /* A fix every half second, 80 ms old; the robot has not moved since then. */
         if (with_fixes && (count % 24U == 8U)) {
             uint32_t refused;
             posegate_report fix = report_at(0.0F);

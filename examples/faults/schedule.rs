@@ -46,7 +46,7 @@ pub struct Cycle {
 
 /// The event of a cycle.
 #[derive(Clone, Copy)]
-enum Brings {
+enum CycleEvent {
     Good,
     /// A good report that is older than it should be by this many milliseconds.
     Late(u32),
@@ -63,14 +63,14 @@ enum Brings {
     FromTheFuture,
 }
 
-use Brings::{
+use CycleEvent::{
     At, Covariance, Frame, FromTheFuture, Gap, Good, Late, NotPositiveDefinite, Nothing,
     OtherSource, StampBackwards, Stuck, UnknownSource,
 };
 
 /// The dock allows 8 cm, 6 cm and 4 degrees; a small set extends to 1.7 cm and 1 degree. Many of the sets
 /// that are not inside are only slightly outside, so a small error lets them through.
-const PLAN: [Brings; 104] = [
+const PLAN: [CycleEvent; 104] = [
     Good,
     Good,
     Good,

@@ -3,9 +3,9 @@
 set -eu
 site=$(realpath "$1") output=$(realpath -m "$2") last=$(($3 - 1))
 here=$(dirname "$(realpath "$0")")
-# Where there are several clusters the cluster's name follows the number.
+# With several clusters, the cluster's name follows the number.
 array=$(sbatch --parsable --array="0-$last" "$here/build.sbatch" "$site" "$output")
 array=${array%%;*}
-# A merge whose array fails for good would wait for ever.
+# A merge whose array finally fails would wait forever.
 merge=$(sbatch --parsable --dependency="afterok:$array" --kill-on-invalid-dep=yes "$here/merge.sbatch" "$output" "$site")
 echo "$array ${merge%%;*}"

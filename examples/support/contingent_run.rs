@@ -1,5 +1,5 @@
 //! A robot that executes the plan of `examples/sites/contingent.toml` through a script of events: the first tag is not
-//! seen, twice; the wheels slip before the dock; at last nothing is known any more. Prints one line per step. Run by
+//! seen, twice; the wheels slip before the dock; at the end the pose is unknown. Prints one line per step. Run by
 //! the firmware example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on
 //! the host, which compares the lines.
 
@@ -17,8 +17,8 @@ pub static TABLES: [&[u8]; 3] = [
     include_bytes!("../tables/contingent-dock.posegate"),
 ];
 
-/// The event of a step: the distance of the estimate from where the rule's step begins, the size of the set, and
-/// whether the step succeeds.
+/// The event of a step: the distance of the estimate from the start of the rule's step, the size of the set, and whether
+/// the step succeeds.
 struct Event {
     off_m: f64,
     translation_m: f64,
@@ -36,12 +36,12 @@ const fn event(off_m: f64, translation_m: f64, yaw_rad: f64, succeeds: bool) -> 
 }
 
 const EVENTS: [Event; 11] = [
-    // From the start to where the left tag can be seen.
+    // From the start to the view of the left tag.
     event(0.05, 0.39, 0.034, true),
     // The left tag is not seen, twice.
     event(0.004, 0.45, 0.04, false),
     event(0.004, 0.45, 0.04, false),
-    // To where the right tag can be seen.
+    // To the view of the right tag.
     event(0.004, 0.45, 0.04, true),
     event(0.004, 0.46, 0.042, true),
     // The drive to the dock. The wheels slip, and the robot reports it.
@@ -51,7 +51,7 @@ const EVENTS: [Event; 11] = [
     event(0.1, 0.05, 0.034, true),
     event(0.003, 0.07, 0.05, true),
     event(0.003, 0.07, 0.05, true),
-    // The robot was lifted and put down: nothing is known.
+    // The robot was lifted and put down: its pose is unknown.
     event(0.0, 3.0, 3.0, true),
 ];
 
@@ -66,7 +66,7 @@ fn set(place: Pose, event: &Event) -> Option<PoseSet> {
     PoseSet::bounded(estimate, event.translation_m, event.yaw_rad).ok()
 }
 
-/// Returns whether the table of a task contains a set; `None` if there is no such table.
+/// Returns `Some(true)` if the table of a task contains a set; `None` if there is no such table.
 fn permits(task: &str, set: &PoseSet) -> Option<bool> {
     let mut tables = TABLES.iter().filter_map(|bytes| Table::parse(bytes).ok());
     let table = tables.find(|table| table.task() == task)?;
@@ -77,7 +77,7 @@ pub fn run(out: &mut impl Write) -> Result<(), Error> {
     let rules = Rules::parse(RULES).map_err(|_| Error)?;
     let mut plan = Sequencer::new(rules);
     let mut at = Pose::default();
-    // After a surprise the robot stays where it has gone.
+    // After an unexpected event the robot stays at its place.
     for (number, event) in EVENTS.iter().enumerate() {
         if event.off_m >= 0.0
             && let Some(rule) = plan.rule().and_then(|rule| plan.rules().get(rule))
@@ -89,9 +89,9 @@ pub fn run(out: &mut impl Write) -> Result<(), Error> {
             ..*event
         };
         let set = set(at, &kept).ok_or(Error)?;
-        let told = plan.next(&set);
+        let instruction = plan.next(&set);
         write!(out, "{number}: ")?;
-        let permitted = match told {
+        let permitted = match instruction {
             Instruction::Look { task, tag } => {
                 write!(out, "look at tag {tag} ({task})")?;
                 permits(task, &set)

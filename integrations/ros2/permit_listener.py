@@ -19,7 +19,7 @@ import argparse
 import sys
 import time
 
-# The longest time for which a heartbeat is believed, whatever it says.
+# The longest time for which a heartbeat is valid, whatever it states.
 MOST_VALID_MS = 1000
 # A heartbeat from farther in the future shows that the clocks of the machines differ.
 MOST_AHEAD_MS = 20
@@ -51,7 +51,7 @@ class PermitWatch:
             self.reason = refused
 
     def permitted(self, monotonic_ns):
-        """Says whether the task may run at this moment of the monotonic clock."""
+        """Returns True if the task may run at this moment of the monotonic clock."""
         if self.ends_ns is not None and monotonic_ns >= self.ends_ns:
             self.ends_ns = None
             self.reason = "no heartbeat: the node has stopped, or messages do not arrive"
@@ -125,11 +125,11 @@ class PermitListener:
         self.watch.heartbeat(message, time.time_ns(), time.monotonic_ns())
 
     def permitted(self):
-        """Says whether the task may run now."""
+        """Returns True if the task may run now."""
         return self.watch.permitted(time.monotonic_ns())
 
     def reason(self):
-        """Says why not, or returns None."""
+        """Returns why the task may not run, or None."""
         return None if self.permitted() else self.watch.reason
 
 

@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn an_export_has_the_bytes_and_the_settings_of_its_table() {
+    fn export_contains_table_bytes_and_settings() {
         let table = Table::parse(DOCK).expect("a table");
         let c = source(&table, Language::C);
         assert_eq!(numbers(&c, "_SITE_DIGEST {"), table.site_digest(), "{c}");
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_escaped_as_c_reads_them() {
+    fn names_are_escaped_for_c() {
         assert_eq!(c_characters("dock-3"), "dock-3");
         // No trigraph, no digit that an escape would include, no quote that ends the string.
         assert_eq!(

@@ -11,7 +11,7 @@ use crate::shape::{ConvexPart, Parts, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
 
-/// How much of the set is given up so that its facets can be proven.
+/// The loss of the set that is accepted so that its facets can be proven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {
     /// Keeps facets that seem unnecessary.
@@ -22,7 +22,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// The efforts that are tried, in this order.
+    /// The efforts to try, in this order.
     pub const EACH: [Self; 4] = [
         Self::new(false, 0),
         Self::new(false, 2),

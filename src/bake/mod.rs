@@ -173,7 +173,7 @@ fn empty(order: &BakeInput<'_>, cells: &Cells) -> BakeError {
 
 /// Bakes the grid table of an order. Calls `progress` after every slab.
 ///
-/// Deterministic: the same bytes for any number of threads.
+/// Deterministic: the bytes do not depend on the number of threads.
 ///
 /// # Errors
 /// [`BakeError`] if the order cannot be baked, with the numbers.

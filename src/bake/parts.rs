@@ -97,7 +97,7 @@ pub(super) fn covering(
 
 /// Up to this number of parts, parts that add little are skipped.
 const FEW: usize = 32;
-/// What is little: a share of one in this many of the poses.
+/// A part adds little if it adds less than the poses divided by this number.
 const LITTLE: usize = 1_000;
 
 /// Returns a small number of parts that contain the poses, chosen greedily.
@@ -133,7 +133,7 @@ fn chosen(found: &[([f64; 3], ConvexPart)], most: usize) -> Vec<ConvexPart> {
         let Some((gain, best)) = best.filter(|(gain, _)| *gain > 0) else {
             break;
         };
-        // A part that adds little needs as much flash as one that adds much; but at a corner that sticks into the set, pose-sets are
+        // A part that adds little needs as much flash as a part that adds much. But at a corner that extends into the set, pose-sets are
         // covered only by all the parts that meet there.
         if parts.len() >= 2 && gain * LITTLE < found.len() && most <= FEW {
             break;

@@ -61,7 +61,7 @@ impl Row {
 /// Distance that runs keep from the computed border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
 
-/// How far an edge on a border may seem to be outside of it, metres: half of what the proof allows.
+/// Largest distance by which an edge on a border may seem to be outside of it, metres: half of the proof's allowance.
 const ROUNDING: f64 = 5e-12;
 
 /// Number of sampled poses along x, y and yaw that choose the parts of a non-convex set.

@@ -2,8 +2,8 @@
 //!
 //! For fixed yaw, footprint and visibility sets (pinhole) are convex in (x, y): their slacks are concave functions
 //! of the position. A rectangle is then inside exactly if its four corners are, for every yaw of the block; the
-//! remaining problem is one-dimensional. Over the yaw, a slack is bounded from below by its values, by its middle
-//! value and its derivative (mean value form), or, if it is monotonic, by its smaller end. If none of these
+//! remaining problem is one-dimensional. Over the yaw, a slack is bounded from below by its values, or by its middle
+//! value and its derivative (mean value form). A monotonic slack is bounded by its smaller end. If none of these
 //! suffices, the yaw interval is halved.
 
 use super::{Interval, Slope, sharp};

@@ -34,7 +34,7 @@ enum Kind {
     },
 }
 
-/// Limits of a proof; beyond them it is given up.
+/// Limits of a proof; a proof that exceeds one ends as not proven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProofBudget {
     /// Largest number of blocks, or of corners of slices.

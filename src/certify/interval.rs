@@ -234,7 +234,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn operations_enclose(
+        fn interval_operations_enclose_exact_results(
             a in -100.0f64..100.0, b in -100.0f64..100.0, wa in 0.0f64..2.0, wb in 0.0f64..2.0,
             ta in 0.0f64..1.0, tb in 0.0f64..1.0,
         ) {
@@ -249,7 +249,7 @@ mod tests {
         }
 
         #[test]
-        fn trigonometry_encloses(a in -7.0f64..7.0, w in 0.0f64..1.5, t in 0.0f64..1.0) {
+        fn interval_sine_and_cosine_enclose_exact_values(a in -7.0f64..7.0, w in 0.0f64..1.5, t in 0.0f64..1.0) {
             let x = Interval { lo: a, hi: a + w };
             let p = (a + t * w).clamp(x.lo, x.hi);
             let [cos, sin] = x.cos_sin();
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_enclose() {
+    fn interval_angles_enclose_exact_values() {
         let right = Interval::radians(1 << 30);
         assert!(right.lo < core::f64::consts::FRAC_PI_2 && right.hi > core::f64::consts::FRAC_PI_2);
         let [cos, sin] = Interval::cos_sin_deg(60.0);

@@ -98,7 +98,7 @@ pub(super) mod tests {
 
     proptest! {
         #[test]
-        fn ratios_enclose(s in 0.0f64..300.0, w in 0.0f64..2.0, t in 0.0f64..1.0, small in 1e-9f64..1.0) {
+        fn interval_ratios_enclose_exact_values(s in 0.0f64..300.0, w in 0.0f64..2.0, t in 0.0f64..1.0, small in 1e-9f64..1.0) {
             for (s, w) in [(s, w), (s * small, w * small)] {
                 let over = Interval { lo: s, hi: s + w };
                 let p = (s + t * w).clamp(over.lo, over.hi);
@@ -117,7 +117,7 @@ pub(super) mod tests {
 
         /// Points and differences of each model lie in the enclosures along a line.
         #[test]
-        fn distortion_encloses(
+        fn interval_distortion_encloses_exact_values(
             x in -0.6f64..0.6, y in -0.6f64..0.6, dx in -0.1f64..0.1, dy in -0.1f64..0.1, t in 0.0f64..1.0,
         ) {
             let along = |at: f64, by: f64, value: Interval| Slope {
@@ -140,7 +140,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn everything_stays_everything() {
+    fn unbounded_interval_gives_unbounded_result() {
         let ratio = Interval::ENTIRE.arctangent_ratio();
         assert!(ratio.lo <= 0.0 && ratio.hi >= 1.0);
         let slope = Slope::constant(Interval { lo: -1.0, hi: 1.0 });

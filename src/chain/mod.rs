@@ -39,9 +39,9 @@
 //! this: it also tracks where the estimate may be. A task's margin is then the slack of its success set for *every*
 //! such estimate.
 //!
-//! # What a success means
-//! With a probability of at least `1 - risk` the true pose is in every task's success set when the task begins, and a
-//! gate permits the task there. The risk is the sum of the probabilities that the sets of the tasks leave out. It is
+//! # The meaning of a success
+//! With a probability of at least `1 - risk` the true pose is in every task's success set when the task begins. A
+//! gate permits the task there. The risk is the sum of the probabilities outside of the sets of the tasks. It is
 //! never a product, because the events may depend on each other.
 
 use heapless::Vec;
@@ -52,13 +52,13 @@ use crate::set::PoseSet;
 use crate::table::Table;
 use crate::task::{Cylinder, MotionUpdate, PoseErrorSet, Risk};
 
-/// Where the estimate is assumed to be when a task begins.
+/// The assumed position of the estimate when a task begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StartAssumption {
     /// At the task's goal: the paper's assumption. The gate does not assume it.
     AtGoal,
-    /// Anywhere that the previous steps may have left it.
+    /// At any pose that the previous steps allow.
     General,
 }
 
@@ -72,7 +72,7 @@ pub enum Step<'a> {
     Localization {
         /// Its success set.
         table: &'a Table<'a>,
-        /// r_l.
+        /// The bound r_l of the observation's error.
         bound: Cylinder,
         /// Probability that an observation is farther off than r_l.
         risk: Risk,
@@ -85,9 +85,9 @@ pub enum Step<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BeliefState {
-    /// Where the estimate is meant to be, world frame.
+    /// The planned pose of the estimate, world frame.
     pub pose: Pose,
-    /// How far the estimate may be from `pose`.
+    /// Largest distance of the estimate from `pose`.
     pub spread: Cylinder,
     /// The error of the estimate.
     pub knowledge: PoseErrorSet,
@@ -151,7 +151,7 @@ impl Failure {
 pub struct StepEvaluation {
     /// Margin of a task's set; zero if the set is outside.
     pub margin: Option<Margin>,
-    /// Why it fails, if it does.
+    /// The reason if the step fails.
     pub failure: Option<Failure>,
     /// The risk that this step adds.
     pub risk: Risk,
@@ -171,7 +171,7 @@ pub struct Evaluation<const N: usize> {
 }
 
 impl<const N: usize> Evaluation<N> {
-    /// Returns the first step that fails, and why.
+    /// Returns the number of the first step that fails, and the reason.
     #[must_use]
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
         let mut steps = self.steps.iter().enumerate();

@@ -2,8 +2,8 @@
 //!
 //! Lengths of the estimate are in the layout's units of 2^k um. The extent has its own unit, 2^e um with
 //! e <= k. It is chosen so that the entries, including the effect of the yaw at the longest lever, use 14
-//! bits: a small set keeps its shape. Products of such numbers fit 32 bits, and so do the sums and
-//! squares that a facet needs, so the same instructions run on a core with 32-bit multiplication only.
+//! bits: a small set keeps its shape. Products of such numbers fit 32 bits, and so do the sums and squares that a
+//! facet needs. The same instructions run on a core with 32-bit multiplication only.
 
 use crate::pose::Pose;
 use crate::set::{Common, PoseSet};

@@ -8,7 +8,7 @@
 //! 1. `s >= |X| + |lever| + E` (no extent along any normal is larger), where `E = f |X|` is an upper bound of the bend
 //!    `-f u1 (h.u)`. This takes one comparison per facet; the rest is common to the frame.
 //! 2. `s >= E` and `(s - E)^2 >= |g|^2`.
-//!    An ellipsoid that has moved is tested in these two steps; what the movement adds along the normal is taken off `s` first.
+//!    A moved ellipsoid is tested in these two steps; the growth by the movement along the normal is first subtracted from `s`.
 //! 3. The maximum of `g.u - f u1 (h.u)` over `|u| <= 1`, bounded by weak duality. For any lambda above |Q|, with `Q`
 //!    the symmetric matrix of the bend, the maximum is at most `lambda + g' (lambda - Q)^-1 g / 4`. With lambda = r / 2
 //!    and r >= |g| this gives `r - f g1 (h.g) / r^2 + 2 |Q|^2 / (r - 2 |Q|)`, and `|Q| = f (|h| + |h1|) / 2`. This
@@ -224,7 +224,7 @@ fn holds_sharply(
             )
 }
 
-/// Returns `true` if step 2 accepts an ellipsoid that has moved; what it does not accept goes to step 4. `turns` are the largest turns of the ellipsoid and of
+/// Returns `true` if step 2 accepts a moved ellipsoid; otherwise step 4 decides. `turns` are the largest turns of the ellipsoid and of
 /// the movement; `moved` is the length of the movement, micrometres.
 ///
 /// The extents along the normal add up: `|F'a| + rho |a| + omega |lever|`, with the ellipsoid's own turn in F'a. The bend is the whole

@@ -19,12 +19,12 @@ use crate::table::{Cells, Grid, Run, Slab};
 const FARTHEST: i64 = (1 << 31) + SLACK_Q24 * crate::num::ANGLE_UNITS_PER_Q24;
 const TURN: i64 = 1 << 32;
 
-/// Why a walk does not show that a set is covered.
+/// The reason why a walk does not show that a set is covered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
     /// The offset of a pose that lies in no covered cell.
     NotCovered(Offset),
-    /// The walk reached the most runs that it may look at. It says nothing about the set.
+    /// The walk reached its limit of runs. The result for the set is unknown.
     TooCostly,
 }
 
@@ -36,8 +36,8 @@ impl From<Offset> for Stop {
 
 /// Returns `Ok` if every pose of the set lies in a covered cell.
 ///
-/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn. The walk looks at `most_runs` runs at
-/// most; a row without a run counts as one.
+/// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn. The walk reads at most
+/// `most_runs` runs; a row without a run counts as one.
 pub(super) fn covers<S: Section>(
     grid: &Grid<'_>,
     cells: &Cells,

@@ -11,7 +11,7 @@
 //!
 //! [`holds`] cuts `[-1, 1]` into slabs. Each slab has its middle e, its half width h in u and its half width
 //! `w = T h <= 1` in heading. C, S, G, H and N are evaluated at its middle heading; `x = u - e`. A slab
-//! holds if one of two upper bounds does, else it is halved. If the exact section at its middle sticks out, the
+//! holds if one of two upper bounds does, else it is halved. If the exact section at its middle is beyond the facet, the
 //! facet does not hold.
 //!
 //! # The bounds of a slab
@@ -25,14 +25,14 @@
 //! | robot axes: `abs(F23' n_t)`, a = F23' n, b = F23' J n | its square is `a.a + (b.b - a.a) sin^2 + a.b sin(2 T x)`, so with `p^2 = a.a + max(b.b - a.a, 0) sin^2 w` it is at most `p + (a.b / p) sin(2 T x) / 2` |
 //! | its `sin(2 T x) / 2` | `(1 - w^2/2) T x`, off by at most `w^3/6 + 2 w^5/15` |
 //! | its product with r(u) | `n r(u) + tilt r(e) x/h + abs(tilt) max abs(r(u) - r(e))` |
-//! | what a movement adds ([`Movement`]) | `rho abs(n) + d (abs(S) + abs(C) (w + d/2))`, and in robot axes d times the longest offset |
+//! | growth by a movement ([`Movement`]) | `rho abs(n) + d (abs(S) + abs(C) (w + d/2))`, and in robot axes d times the longest offset |
 //! | first bound: `g x + N r(e + x)` | its largest value on the slab: at an end, or `hypot(g, N) - g e` |
 //! | second bound: `N r(u)` | `N (p + (1 - u^2) / p) / 2` for any p > 0: a parabola, whose largest value is known |
 //!
 //! # Rounding
 //!
-//! Lengths are "fine": 2^-14 of the layout's length unit, below 2^31. What rounds to the nearest is paid by [`SLACK`]; all else
-//! rounds against acceptance. What the roundings of the estimate do is paid by the table (`super::facet_clearance_q14`).
+//! Lengths are "fine": 2^-14 of the layout's length unit, below 2^31. [`SLACK`] covers rounding to the nearest; all
+//! else rounds against acceptance. The table covers the roundings of the estimate (`super::facet_clearance_q14`).
 //!
 //! | rounded to the nearest | fine units, at most |
 //! |---|---|
@@ -43,8 +43,8 @@
 //! | kappa and its products; the product of G with `3 w^2/8` | 5 |
 //! | **sum** | **21.6** |
 //!
-//! In robot axes C and S hold `G e` and `H e` and may reach 2^29.9: 3.4 more. What a scale rounds (margins only) is paid by
-//! [`SCALED_UM_Q14`] and [`SCALED_YAW`].
+//! In robot axes C and S contain `G e` and `H e` and may reach 2^29.9: 3.4 more. [`SCALED_UM_Q14`] and [`SCALED_YAW`] cover the
+//! rounding of a scale (margins only).
 
 use super::compact;
 use super::facets::in_arc;
@@ -53,16 +53,16 @@ use crate::pose::Pose;
 use crate::set::{Extent, Growth, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS};
 
-/// What roundings to the nearest can take off a bound, fine units.
+/// Most by which roundings to the nearest can lower a bound, fine units.
 const SLACK: i64 = 28;
-/// What a factor's entries lose by a scale: 0.5 um in six of them, 1.23 um, 2^-14 um.
+/// Most by which a scale can lower a factor's entries: 0.5 um in six of them, 1.23 um, 2^-14 um.
 const SCALED_UM_Q14: i32 = 20_200;
 /// A factor's yaw times a scale, up by 2^-24 turn, times a point of 2^15 units: fine units.
 const SCALED_YAW: i32 = 202;
-/// What roundings can take off a bound of [`Sweep::broadly`], length units: a point, a chord, the set's width, and what a scale
-/// rounds (margins only).
+/// Most by which roundings can lower a bound of [`Sweep::broadly`], length units: of a point, a chord, the set's width, and a scale
+/// (margins only).
 const ROUNDED_BROADLY: i64 = 6;
-/// How often `[-1, 1]` is halved at most.
+/// Largest number of halvings of `[-1, 1]`.
 const DEEPEST: u32 = 6;
 /// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.
 const ONE_TURN: u32 = 1 << 24;
@@ -73,7 +73,7 @@ const U: u32 = 15;
 /// One in radians, cosines and sines: 2^-28.
 const ONE: i64 = 1 << 28;
 
-/// A pose-set's numbers for this test, and how much work is left.
+/// A pose-set's numbers for this test.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweep {
     /// The estimate above the goal, length units.
@@ -83,7 +83,7 @@ pub(super) struct Sweep {
     heading: BinaryAngle,
     /// Cosine and sine of the heading, 2^-30.
     facing: [i32; 2],
-    /// The largest heading offset, 2^-24 turn; one more than [`ONE_TURN`] for all that are larger.
+    /// The largest heading offset, 2^-24 turn; `ONE_TURN + 1` for every larger offset.
     pub yaw: u32,
     /// The same, 2^-28 rad, to the nearest.
     turn: i32,
@@ -91,26 +91,26 @@ pub(super) struct Sweep {
     pub columns: [[i32; 2]; 3],
     /// The radius of a cylinder, micrometres.
     pub radius: Option<i32>,
-    /// No offset in the plane is longer, micrometres.
+    /// Upper bound of the length of an offset in the plane, micrometres.
     pub broad: u32,
     /// The layout's length unit is 2^k micrometres.
     unit: u32,
-    /// What a scale's rounding can take off a set's reach (margins only), fine units.
+    /// Most by which a scale's rounding can lower a set's reach (margins only), fine units.
     scaled: i32,
-    /// What a movement adds to the set.
+    /// The growth of the set by a movement.
     movement: Movement,
 }
 
-/// What a movement adds to an ellipsoid at every heading of it. A cylinder has it in its own extents.
+/// The growth of an ellipsoid by a movement, at every heading. A cylinder includes it in its own extents.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Movement {
     /// The radius in the plane, fine units, up.
     length: i32,
-    /// The turn either way, 2^-28 rad, up: at most a turn.
+    /// The turn to either side, 2^-28 rad, up: at most a turn.
     turn: i32,
     /// One and a half times the ellipsoid's longest offset in the plane, fine units, up.
     broad: i32,
-    /// As it is given.
+    /// The movement as given.
     by: Growth,
 }
 
@@ -122,24 +122,24 @@ impl Movement {
         by: Growth::NONE,
     };
 
-    /// A movement that is not none has a length or a turn of a unit at least: both are rounded up.
+    /// Returns `true` if there is no movement. Any movement has a length or a turn of at least a unit, because both are rounded up.
     #[inline(always)]
     const fn is_none(&self) -> bool {
         self.length | self.turn == 0
     }
 }
 
-/// A set's point in a frame, and how far any of its poses moves it.
+/// A set's point in a frame, and a bound of its movement over all poses of the set.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Broadly {
-    /// Of the estimate, length units.
+    /// The point for the estimate, length units.
     point: [i32; 2],
-    /// Fine units.
+    /// The bound, fine units.
     moved: i64,
 }
 
 impl Broadly {
-    /// Whether a facet of the frame holds for every pose of the set. The cheapest test, and the loosest.
+    /// Returns `true` if a facet of the frame holds for every pose of the set. The cheapest test, and the loosest.
     #[inline(always)]
     pub fn hold(&self, facet: Facet) -> bool {
         let normal = [i32::from(facet.x), i32::from(facet.y)];
@@ -148,8 +148,8 @@ impl Broadly {
     }
 }
 
-/// Whether every pose of a set is within a facet of a frame. `slabs` is how many slabs of the set may still be
-/// evaluated. True only if all are; false if that is not shown.
+/// Returns `true` if every pose of a set is within a facet of a frame. `slabs` is the number of slabs that may still be
+/// evaluated. `false` if that is not shown.
 #[inline(never)]
 fn holds(sweep: &Sweep, facet: Facet, frame: &Frame<'_>, first: &Width, slabs: &mut u32) -> bool {
     let point = [i32::from(frame.x), i32::from(frame.y)];
@@ -165,7 +165,7 @@ fn holds_at(
     first: &Width,
     slabs: &mut u32,
 ) -> bool {
-    // Below a radian the slabs are few, and the heading's whole circle is far too much.
+    // Below a radian the slabs are few, and the heading's whole circle costs far too much.
     if (sweep.radius.is_some() || sweep.turn() > ONE)
         && let Some(decided) = at_once(sweep, facet, axes, point)
     {
@@ -174,8 +174,8 @@ fn holds_at(
     in_slabs(sweep, facet, axes, point, first, slabs)
 }
 
-/// Returns whether the facet holds, if that is decided without slabs: for a cylinder, and at any heading. A separate function, so that
-/// the slabs do not need its stack.
+/// Decides without slabs if the facet holds: for a cylinder, or for every heading. `None` if slabs are needed. A separate function,
+/// so that the slabs do not need its stack.
 #[inline(never)]
 fn at_once(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2]) -> Option<bool> {
     let section = sweep.section(facet, axes, point, 0);
@@ -188,7 +188,7 @@ fn at_once(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2]) -> Option<b
     (sweep.yaw > ONE_TURN).then_some(false)
 }
 
-/// The same for an ellipsoid that turns by at most one turn, slab by slab.
+/// As [`at_once`], slab by slab, for an ellipsoid that turns by at most one turn.
 #[inline(never)]
 fn in_slabs(
     sweep: &Sweep,
@@ -221,7 +221,7 @@ fn in_slabs(
                 width = sweep.width(depth);
             }
             Slab::Inside => {
-                // The next one: up from each second half.
+                // The next slab: up from each second half.
                 let was = depth;
                 while depth > first && index & 1 == 1 {
                     depth = depth.wrapping_sub(1);
@@ -243,7 +243,7 @@ fn in_slabs(
     }
 }
 
-/// A slab's half width and what its bounds need of it, each rounded against acceptance.
+/// A slab's half width and the terms of its bounds, each rounded against acceptance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Width {
     /// In u, 2^-15.
@@ -254,7 +254,7 @@ pub(super) struct Width {
     kappa: i32,
     /// `w^3/24 + w^5/3000`, 2^-28, up.
     rest: i32,
-    /// `w^2/8 + w^4/24`, 2^-28, up, and what `3 (1 - kappa)` is off `3 w^2 / 8`.
+    /// `w^2/8 + w^4/24`, 2^-28, up, and the error of `3 (1 - kappa)` for `3 w^2 / 8`.
     shortening_rest: i32,
     /// `cos w`, 2^-28, down.
     cos: i32,
@@ -262,7 +262,7 @@ pub(super) struct Width {
     sine_square: i32,
     /// `w - w^3/2`, 2^-28, to within 12 units.
     leaning: i32,
-    /// `w^3/6 + 2 w^5/15`, 2^-28, up, and what `leaning` and [`slope`] are off.
+    /// `w^3/6 + 2 w^5/15`, 2^-28, up, and the errors of `leaning` and [`slope`].
     leaning_rest: i32,
 }
 
@@ -283,34 +283,34 @@ impl Width {
 /// One facet at the middle of a slab, fine units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
-    /// What b leaves for the terms below.
+    /// The part of b that is left for the terms below.
     pub left: i64,
     pub c: i32,
     pub s: i32,
     pub g: i32,
     /// Robot axes only, as `turns`.
     pub h: i32,
-    /// What of g is of robot axes.
+    /// The part of g in robot axes.
     pub g_turning: i32,
-    /// An upper bound of `|along|` of what is of world axes, where both are added up.
+    /// An upper bound of the part of `|along|` in world axes, if both kinds are summed.
     pub still: u32,
     /// The other two columns along the normal, and along the normal a quarter turn ahead.
     pub along: [i32; 2],
     pub ahead: [i32; 2],
     /// The normal in world axes, 2^-14.
     pub normal: [i32; 2],
-    /// Whether the normal turns with the heading: robot axes.
+    /// `true` if the normal turns with the heading: robot axes.
     pub turns: bool,
 }
 
-/// What a slab is.
+/// The result of a slab's test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Slab {
-    /// No pose of it is beyond the facet.
+    /// No pose of the slab is beyond the facet.
     Inside,
-    /// Its middle section is beyond the facet.
+    /// The middle section of the slab is beyond the facet.
     Outside,
-    /// The bounds do not tell.
+    /// The bounds do not decide.
     Unsure,
 }
 
@@ -320,7 +320,7 @@ impl Sweep {
         Self::at(facets, set, compact::place(facets, set, goal)?)
     }
 
-    /// The same with the estimate above the goal in length units.
+    /// As [`Sweep::of`], with the estimate relative to the goal in length units.
     #[inline(never)]
     pub fn at(facets: &Facets<'_>, set: &PoseSet, [x, y]: [i32; 2]) -> Option<Self> {
         let by = match set.extent() {
@@ -373,7 +373,7 @@ impl Sweep {
         })
     }
 
-    /// Returns the same with a cylinder's disc as columns, up.
+    /// Returns the sweep with a cylinder's disc as columns, rounded up.
     pub fn with_disc(mut self) -> Self {
         if let Some(radius) = self.radius {
             let radius = (nearest(i64::from(radius) << 14, self.unit) as i32).wrapping_add(1);
@@ -382,7 +382,8 @@ impl Sweep {
         self
     }
 
-    /// Returns a pose relative to the estimate, um, um, 2^-24 turn: its place is from the goal in fine units, its heading where u is e.
+    /// Returns a pose relative to the estimate, um, um, 2^-24 turn. The input position is relative to the goal in fine
+    /// units; the heading is that at u = e.
     pub fn offset_of(&self, [x, y]: [i64; 2], e: i32) -> [i64; 3] {
         let um = |at: i64, from: i32| {
             let fine = at.wrapping_sub(i64::from(from) << 14);
@@ -393,7 +394,7 @@ impl Sweep {
         [um(x, self.x), um(y, self.y), yaw]
     }
 
-    /// Returns cosine and sine of the heading where u is e, 2^-30.
+    /// Returns cosine and sine of the heading at u = e, 2^-30.
     pub fn turned_to(&self, e: i32) -> [i32; 2] {
         if e == 0 {
             return self.facing;
@@ -420,7 +421,7 @@ impl Sweep {
         })
     }
 
-    /// Returns the set's point in a frame with a bound of how far any pose of the set moves it.
+    /// Returns the set's point in a frame with a bound of its movement over all poses of the set.
     #[inline(never)]
     pub fn broadly(&self, frame: &Frame<'_>) -> Broadly {
         self.broadly_at(frame.axes, [i32::from(frame.x), i32::from(frame.y)])
@@ -464,17 +465,17 @@ impl Sweep {
         }
     }
 
-    /// How far a movement turns the set either way, 2^-32 turn.
+    /// Returns the turn of the movement to either side, 2^-32 turn.
     pub fn swing(&self) -> i64 {
         i64::from(self.movement.by.yaw_q24()) << 8
     }
 
-    /// The largest heading offset, 2^-28 rad.
+    /// Returns the largest heading offset, 2^-28 rad.
     pub fn turn(&self) -> i64 {
         i64::from(self.turn)
     }
 
-    /// How often the whole is halved before slabs are narrow enough for the bounds: `T 2^-depth <= 1`.
+    /// Returns the number of halvings after which slabs are narrow enough for the bounds: `T 2^-depth <= 1`.
     pub fn first_depth(&self) -> u32 {
         (0..3)
             .find(|depth| self.turn().wrapping_shr(*depth).wrapping_add(4) <= ONE)
@@ -514,7 +515,7 @@ impl Sweep {
         }
     }
 
-    /// A length times the length of a facet's normal, fine units, up. The length is in micrometres.
+    /// Returns a length in micrometres times the length of a facet's normal, fine units, rounded up.
     fn along_any(&self, facet: Facet, length: i64) -> i64 {
         let (x, y) = (i64::from(facet.x), i64::from(facet.y));
         // Below 2^29 and 2^14.1.
@@ -522,7 +523,7 @@ impl Sweep {
         length.wrapping_shr(self.unit).wrapping_add(1)
     }
 
-    /// Whether a facet holds at every heading there is, by the section at the estimate's heading.
+    /// Returns `true` if a facet holds at every heading of the circle, by the section at the estimate's heading.
     fn holds_at_any_heading(&self, facet: Facet, section: &Section) -> bool {
         let reach = if section.turns {
             self.along_any(facet, i64::from(self.broad))
@@ -538,7 +539,7 @@ impl Sweep {
                 >= squares(i64::from(section.c), i64::from(section.s))
     }
 
-    /// Whether a facet holds for a cylinder: a disc about the estimate at each heading, exactly but for roundings.
+    /// Returns `true` if a facet holds for a cylinder: a disc about the estimate at each heading, exact except for roundings.
     ///
     /// `C cos t + S sin t` over `|t| <= T` is largest where the point is along the normal, or at an end.
     fn cylinder_holds(&self, facet: Facet, section: &Section, radius: i32) -> bool {
@@ -560,7 +561,7 @@ impl Sweep {
         self.yaw < ONE_TURN / 2 && rises >= 16 && at_end.wrapping_add(16) <= left
     }
 
-    /// A facet where u is e, unit 2^-15.
+    /// Returns the section of a facet at u = e, unit 2^-15.
     #[inline(never)]
     pub fn section(&self, facet: Facet, axes: Axes, point: [i32; 2], e: i32) -> Section {
         let [c, s] = self.turned_to(e);
@@ -626,8 +627,9 @@ impl Sweep {
 /// Headings on either side of the estimate's at which [`farthest`] evaluates facets.
 const SIDE: i32 = 8;
 
-/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one, of the sections at
-/// seventeen headings and of some around the farthest: relative to the estimate, in world axes: um, um, 2^-24 turn. For reports.
+/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one. Searches
+/// the sections at seventeen headings, and some around the farthest. Relative to the estimate, in world axes: um, um,
+/// 2^-24 turn. For reports.
 pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 3] {
     let Some(sweep) = Sweep::of(facets, set, goal) else {
         return [0; 3];
@@ -661,14 +663,14 @@ pub(super) fn farthest(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> [i64; 
     most.offset
 }
 
-/// Where a section reaches farthest along a facet's normal.
+/// The point where a section reaches farthest along a facet's normal.
 #[derive(Clone, Copy)]
 struct Touching {
-    /// How far that is beyond the facet, fine units.
+    /// Its distance beyond the facet, fine units.
     beyond: i64,
     /// u of the section, 2^-15.
     e: i32,
-    /// From the estimate: um, um, 2^-24 turn.
+    /// Relative to the estimate: um, um, 2^-24 turn.
     offset: [i64; 3],
 }
 
@@ -771,7 +773,7 @@ impl Sweep {
         touching.moved(&self.movement, section)
     }
 
-    /// Returns a facet's normal in world axes where u is e, for a facet in robot axes, 2^-14.
+    /// Returns a facet's normal in world axes at u = e, for a facet in robot axes, 2^-14.
     fn normal(&self, facet: Facet, e: i32) -> [i32; 2] {
         let [c, s] = self.turned_to(e);
         let (nx, ny) = (i32::from(facet.x), i32::from(facet.y));
@@ -782,7 +784,7 @@ impl Sweep {
 }
 
 impl Section {
-    /// What the slab about this section is.
+    /// Returns the result of the test of the slab about this section.
     pub fn slab(&self, sweep: &Sweep, e: i32, width: &Width) -> Slab {
         // Sections of a cylinder do not shrink with u.
         let is_cylinder = sweep.radius.is_some();
@@ -861,8 +863,8 @@ impl Section {
         }
     }
 
-    /// Returns what a movement adds along the normal at most, over a slab, fine units: where `C cos(T x)` counts as in the first
-    /// bound, and where it counts as in the parabola.
+    /// Returns upper bounds of a movement's growth along the normal over a slab, fine units: with `C cos(T x)` as in the first
+    /// bound, and as in the parabola.
     ///
     /// A turn by d changes `C cos y + S sin y` by the integral of `-C sin + S cos` over angles up to `|y| + d`: at most
     /// `d (|S| + |C| (w + d/2))`. The first bound takes C for `C cos` if C is above zero, which no turn exceeds. In robot axes the
@@ -897,7 +899,7 @@ impl Section {
 
     /// Returns an upper bound of a length times that of the section's normal, while normals of robot axes turn by up to w, 2^-28 rad.
     ///
-    /// Of a weighed sum a part of the normal turns; no normal and no weighed sum of some is longer than 1 by more than 2^-8.
+    /// In a weighted sum a part of the normal turns. No normal and no weighted sum of normals is longer than 1 by more than 2^-8.
     fn moved(&self, length: i64, w: i64) -> i64 {
         const LONGEST: i64 = (1 << 14) + (1 << 6) + 1;
         let [x, y] = self.normal.map(i64::from);
@@ -913,7 +915,7 @@ impl Section {
         (length.wrapping_mul(normal) >> 14).wrapping_add(1)
     }
 
-    /// Whether the section itself is beyond the facet.
+    /// Returns `true` if the section itself is beyond the facet.
     pub fn is_outside(&self, root: &Root) -> bool {
         let left = self
             .left
@@ -927,10 +929,10 @@ impl Section {
         left < 0 || left.unsigned_abs().saturating_mul(left.unsigned_abs()) < reach
     }
 
-    /// How far sections of the slab reach from their centres along the normal.
+    /// Returns the reach of the slab's sections from their centres along the normal.
     fn reach(&self, width: &Width) -> Reach {
         let ([a2, a3], [b2, b3]) = (self.along.map(i64::from), self.ahead.map(i64::from));
-        // Two coordinates within 1.6, and the least that the parabola takes.
+        // Two coordinates within 1.6, and the least value that the parabola accepts.
         let root = |a: i64, b: i64| sqrt_ceil(squares(a, b)).wrapping_add(4).max(16);
         if !self.turns {
             return Reach {
@@ -951,7 +953,7 @@ impl Section {
             .saturating_abs()
             .wrapping_mul(i64::from(width.leaning_rest)))
             >> 28;
-        // Of world axes, `cos(T x)` times the whole and the rest of what is still.
+        // In world axes: `cos(T x)` times the whole, and the rest of the part that does not turn.
         let versine = i64::from((ONE as i32).wrapping_sub(width.cos));
         let still = if self.still > 0 {
             (i64::from(self.still).wrapping_mul(versine) >> 28).wrapping_add(1)
@@ -1001,7 +1003,7 @@ const ROOTS: [u16; 65] = [
     11_403, 9_915, 8_128, 5_770, 0,
 ];
 
-/// `sqrt(1 - e^2)` where e is a multiple of 2^-6.
+/// `sqrt(1 - e^2)` for an e that is a multiple of 2^-6.
 pub(super) struct Root {
     e: i32,
     /// `1 - e^2`, 2^-30.
@@ -1011,7 +1013,7 @@ pub(super) struct Root {
 }
 
 impl Root {
-    /// Of a cylinder, at any heading.
+    /// For a cylinder, at any heading.
     pub const CYLINDER: Self = Self {
         e: 0,
         square: 1 << 30,
@@ -1030,7 +1032,7 @@ impl Root {
         }
     }
 
-    /// How much r differs on a slab from r at its middle e, 2^-15, up.
+    /// Returns the largest difference of r on a slab from r at its middle e, 2^-15, rounded up.
     fn change(&self, h: i32) -> u32 {
         let far = self.e.saturating_abs().wrapping_add(h);
         let near = self.e.saturating_abs().wrapping_sub(h).max(0);
@@ -1039,13 +1041,13 @@ impl Root {
         down.max(up)
     }
 
-    /// The root, down.
+    /// Returns the root, rounded down.
     pub const fn low(&self) -> u32 {
         self.up.saturating_sub(1)
     }
 }
 
-/// Whether `g x + N r(e + x) <= spare` for `|x| <= h`. Sound for any g below 2^34 and N below 2^32.
+/// Returns `true` if `g x + N r(e + x) <= spare` for `|x| <= h`. Sound for any g below 2^34 and N below 2^32.
 #[inline(never)]
 fn at_most(spare: i64, g: i64, n: i64, e: i32, h: i32) -> bool {
     // The slope at an end, times r, is surely not below zero.
@@ -1078,7 +1080,7 @@ fn at_most(spare: i64, g: i64, n: i64, e: i32, h: i32) -> bool {
     left.wrapping_mul(left) >= squares(up(g) as i64, up(n) as i64)
 }
 
-/// Whether `g x + N r(e + x) - curve (x / h)^2 <= spare` for `|x| <= h`, by a parabola above N r.
+/// Returns `true` if `g x + N r(e + x) - curve (x / h)^2 <= spare` for `|x| <= h`, by a parabola above N r.
 ///
 /// For any M > 0: `N r(u) <= (N^2 / M + M (1 - u^2)) / 2`. With `M = N / r(e)`, about, it touches at e.
 #[inline(never)]
@@ -1104,7 +1106,7 @@ fn parabola_at_most(spare: i64, g: i64, n: i64, curve: i64, root: &Root, h: i32)
     peak_at_most(left, slope, curve)
 }
 
-/// Whether `slope y - curve y^2 <= left` for `|y| <= 1`; the slope is not below zero.
+/// Returns `true` if `slope y - curve y^2 <= left` for `|y| <= 1`; the slope must not be below zero.
 #[inline(always)]
 fn peak_at_most(left: i64, slope: i64, curve: i64) -> bool {
     if !(left >= 0) {
@@ -1113,7 +1115,7 @@ fn peak_at_most(left: i64, slope: i64, curve: i64) -> bool {
     if !(slope < curve.wrapping_mul(2)) {
         return slope.wrapping_sub(curve) <= left;
     }
-    // No peak is higher than the slope alone, which also decides where the curve is too small for eighths.
+    // No peak is higher than the slope alone, which also decides if the curve is too small for eighths.
     if slope <= left {
         return true;
     }
@@ -1127,12 +1129,12 @@ fn squares(a: i64, b: i64) -> u64 {
     a.wrapping_mul(a).wrapping_add(b.wrapping_mul(b))
 }
 
-/// `a . b`.
+/// Returns `a . b`.
 fn dot([ax, ay]: [i32; 2], [bx, by]: [i32; 2]) -> i64 {
     product(ax, bx).wrapping_add(product(ay, by))
 }
 
-/// `value / 2^by` to the nearest.
+/// Returns `value / 2^by` to the nearest.
 fn nearest(value: i64, by: u32) -> i64 {
     value
         .wrapping_add(1i64.wrapping_shl(by) >> 1)

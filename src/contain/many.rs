@@ -1,6 +1,6 @@
 //! Decides on many pose-sets against one table: [`decide_many`], on all cores, and [`Filter`], one set after the other.
 //!
-//! The decisions are those of [`super::decide`], bit for bit. A filter in floats answers if the integer code is certain to
+//! The decisions equal those of [`super::decide`], bit for bit. A filter in floats answers if the integer code is certain to
 //! give the same answer. It leaves every other set to the integer code, so it adds no way to be permitted.
 //!
 //! ```
@@ -28,9 +28,9 @@
 //! of the integer code accepts from 1.2e-6 on.
 //!
 //! **Inside** (`many/facets.rs`). Step 2 of `contain::facets` is evaluated for every facet of one piece, with every number rounded
-//! against acceptance by more than the integer code can: the factor's excess by the table in `set::covariance`, the estimate by
-//! [`super::facet_clearance_q14`] and one length unit, all else by 24 units of the extent. What step 2 accepts, the integer
-//! code accepts.
+//! against acceptance by more than in the integer code: the factor's excess by the table in `set::covariance`, the estimate by
+//! [`super::facet_clearance_q14`] and one length unit, all else by 24 units of the extent. If step 2 accepts a set, so does the integer
+//! code.
 //!
 //! **Outside**. The filter names a pose of the given set that no piece and no cell contains, by more than the clearance of the
 //! table and one length unit. The integer code never accepts a set that has such a pose, because it is sound. The cause follows from
@@ -54,13 +54,13 @@ mod spread;
 #[cfg(test)]
 mod tests;
 
-/// Sets that one task of a thread decides at least. So few need no threads.
+/// Smallest number of sets per task of a thread. This number or fewer need no threads.
 const CHUNK: usize = 4096;
 
 /// Decides on many Gaussian pose-sets, on all cores. Each answer is that of [`PoseSet::gaussian`] and [`decide`].
 ///
-/// `poses` are x, y, yaw in metres and radians, `covariances` their matrices by rows. The answers are as many as the shorter
-/// slice has entries.
+/// `poses` are x, y, yaw in metres and radians, `covariances` their matrices by rows. The number of answers is the length
+/// of the shorter slice.
 #[must_use]
 pub fn decide_many(
     table: &Table<'_>,
@@ -114,7 +114,7 @@ impl<'a> Filter<'a> {
         }
     }
 
-    /// Returns the decision if the filter is certain of it. [`Filter::decide`] asks the integer code in all other cases.
+    /// Returns the decision if the filter is certain. [`Filter::decide`] uses the integer code in all other cases.
     #[inline]
     #[must_use]
     pub fn certain(&self, pose: [f64; 3], covariance: &[[f64; 3]; 3]) -> Option<Decision> {

@@ -41,8 +41,8 @@
 //! | the proof of the table treats borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
 //! | **sum** | **5.39 um** | **0.01 of 2^-24 turn** |
 //!
-//! An ellipsoid that has moved ([`Extent::Grown`]) is decided exactly by facets. For cells, the cylinder that contains it takes
-//! its place, so that a denial may be too strict.
+//! A moved ellipsoid ([`Extent::Grown`]) is decided exactly by facets. For cells, the cylinder that contains it is used
+//! instead, so a denial may be too strict.
 //!
 //! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are applied once: rows and slabs are widened by
 //! them, and the ends of runs are moved inwards by [`SLACK_UM`]. After that the walk is about X' alone, and each of
@@ -118,7 +118,7 @@ crate::messages::messages!(Cause {
 pub struct Margin(u32);
 
 impl Margin {
-    /// The margin of a set that fits, but would not fit if it were larger.
+    /// The margin 1: the set is inside, and no larger scale is proven.
     pub const ONE: Self = Self(1 << 16);
 
     /// The largest margin that is reported: 2^15.
@@ -230,8 +230,8 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
             worst_pose: None,
         };
     }
-    // A set that is too large for the table by its own size can be covered only by a table of the whole circle, and only
-    // by a rounding. There is no pose to name, so the estimate takes its place.
+    // Only a table of the whole circle, and only a rounding, can cover a set that is too large for the table. No pose can
+    // be named then, so the estimate is returned.
     if decision == Decision::Outside(Cause::OffTable)
         || !placed.is_covered(table, Margin(0))
         || placed.is_covered(table, Margin::ONE)
@@ -318,7 +318,7 @@ impl<'s> GoalFramePoseSet<'s> {
         })
     }
 
-    /// Returns the extent times `scale`, in world axes. `None` if it is beyond the numbers.
+    /// Returns the extent times `scale`, in world axes. `None` if it is out of range.
     fn scaled(&self, scale: Margin) -> Option<Extent> {
         match self.set.extent() {
             Extent::Gaussian(factor) => factor.scaled(scale.0).map(Extent::Gaussian),
@@ -380,7 +380,7 @@ impl<'s> GoalFramePoseSet<'s> {
         self.walked(grid, table, turned(table, extent))
     }
 
-    /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, as a walk within the table's limit tells.
+    /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, by a walk within the table's limit.
     fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
         let (cells, most_runs) = (table.cells(), table.most_runs());
         match extent {

@@ -75,7 +75,7 @@ impl DecisionObserver for Nearest {
         if !piece.is_whole_circle() {
             let above = set.above_goal.wrapping_sub(piece.from);
             let room = above.min(piece.width.saturating_sub(above));
-            // The scale is the room divided by 2^-10 of the reach, rounded up.
+            // The scale is the slack divided by 2^-10 of the reach, rounded up.
             let share = (turn.reach >> 10).wrapping_add(1);
             let scale = room.saturating_sub(8).checked_div(share).unwrap_or(0);
             self.scale_q10 = self.scale_q10.min(scale);

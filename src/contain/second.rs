@@ -47,7 +47,7 @@
 //!
 //! # Several pieces, and cells
 //! If no single piece contains a set and there are several, each of the outermost poses of the set must lie in one of them. If
-//! the table has cells, these poses are looked up there. Both are spot checks, not proofs. How much they wrongly accept is
+//! the table has cells, these poses are looked up there. Both are spot checks, not proofs. The share of wrong acceptances is
 //! measured.
 
 use crate::parts;
@@ -72,7 +72,7 @@ pub const INSIDE: u32 = 0x5a3c_96e1;
 const OUTSIDE: u32 = !INSIDE;
 
 /// Returns [`INSIDE`] if the plain formula finds the estimate's pose-set inside the table's success set, at
-/// the table's squared radius and as far as the source is trusted. Returns another word otherwise.
+/// the table's squared radius and with the trust in the source. Returns another word otherwise.
 ///
 /// `table` must be the bytes of a table that has been parsed before. For other bytes the answer is
 /// meaningless, but there is no panic. Invalid input is not inside: a value that is not a number, a variance

@@ -92,7 +92,7 @@ impl Disc {
         }
     }
 
-    /// Returns a cylinder that contains an ellipsoid and what a movement adds to it.
+    /// Returns a cylinder that contains an ellipsoid grown by a movement.
     pub fn around(factor: &SqrtFactor, by: Growth) -> Self {
         let radius = i64::from(broad_um(factor)).wrapping_add(i64::from(by.translation_um()));
         let yaw = i64::from(factor.yaw).wrapping_add(i64::from(by.yaw_q24()));

@@ -439,7 +439,7 @@ fn a_window_moves_only_what_lies_beyond_it() {
     assert!((99_990..=100_001).contains(&x) && yaw == 2, "{x} {yaw}");
 }
 
-/// Multipliers and rooms of 2^31 and more are not multiplied: each makes the row unproven, even if the
+/// Multipliers and slacks of 2^31 and more are not multiplied: each makes the row unproven, even if the
 /// set fits.
 #[test]
 fn multipliers_have_a_limit() {
@@ -960,7 +960,7 @@ fn an_estimate_outside_is_its_own_worst_pose() {
     }
 }
 
-/// A limit only ever turns an answer into [`Cause::TooCostly`], and from the number of runs that the walk needs on nothing changes.
+/// A limit only turns an answer into [`Cause::TooCostly`]. At the number of runs that the walk needs, or more, nothing changes.
 #[test]
 fn a_walk_beyond_its_limit_says_that_it_is_too_costly() {
     let bytes = include_bytes!("../../examples/tables/see-t7-grid.posegate");

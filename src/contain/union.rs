@@ -1,27 +1,27 @@
-//! A pose-set in several pieces of a facet layout together, where no single piece contains it.
+//! Tests if several pieces of a facet layout contain a pose-set together, although no single piece contains it.
 //!
 //! A set lies in the union of pieces if the poses of it that are beyond a facet of one piece lie in the others. So for
-//! one piece, the one in which the estimate lies deepest, each facet that does not hold cuts off a *cap* of the set, and
-//! another piece must contain that cap, or all of it but a cap of the cap, which a third piece must contain.
+//! one piece, the one in which the estimate lies deepest, each facet that does not hold cuts off a *cap* of the set.
+//! Another piece must contain that cap, except for a cap of the cap, which a third piece must contain.
 //!
 //! A facet `a . P <= b` holds on a cap, the poses of the set with `a1 . P >= b1`, if for some `beta` in `[0, 1)`
 //!
 //! `(1 - beta) a . P + beta a1 . P <= (1 - beta) b + beta b1`
 //!
 //! holds on the whole set (weak duality; for any beta this is an upper bound, and at a single heading the best beta makes it
-//! exact). Both sides are sums of what [`super::heading`] bounds slab by slab, so the numbers of two facets
+//! exact). Both sides are sums of terms that [`super::heading`] bounds slab by slab, so the numbers of two facets
 //! are added up for each slab ([`Section::weighed`]), with a beta of the slab's own.
-//! On a cap of a cap two such sums are made, one after the other.
+//! A cap of a cap needs two such sums, one after the other.
 //!
-//! Where pieces have arcs of their own, the headings of the set are cut at the ends of the arcs that lie among them.
+//! If pieces have arcs, the headings of the set are cut at the ends of these arcs.
 //!
 //! # Rounding
-//! A sum with weights `1 - beta` and `beta` has no more of any error than the larger of its two facets: what roundings to the
-//! nearest take off a bound, and what the proof of a table pays for (it raises both b). Adding up rounds each number to
+//! A sum with weights `1 - beta` and `beta` has each error at most as large as the larger one of its two facets: the roundings to
+//! the nearest, and the clearance of the proof of a table (it raises both b). Adding up rounds each number to
 //! the nearest fine unit: at most 3.6 units of a bound (left, C, S, G and their products, and two coordinates along the
-//! normal and ahead of it, 0.71 each). [`WEIGHED`] pays for that at each sum. The bounds need nothing else of a facet than that the
-//! numbers of its section are linear in its normal, its offset and its point; the two that are not, what of G belongs to robot axes and what
-//! of `along` to world axes, are carried beside the sum, the latter rounded up.
+//! normal and ahead of it, 0.71 each). [`WEIGHED`] covers that at each sum. The bounds only require that the
+//! numbers of a facet's section are linear in its normal, its offset and its point. Two numbers are not: the part of G in robot axes and
+//! the part of `along` in world axes. They are carried separately from the sum, the latter rounded up.
 
 use super::facets::in_arc;
 use super::heading::{Root, Section, Slab, Sweep, Width};
@@ -31,24 +31,24 @@ use crate::pose::Pose;
 use crate::set::PoseSet;
 use crate::table::{Axes, Facet, Facets, MOST_UNION_SLABS, Piece};
 
-/// What a weighed sum of two sections can take off a bound by rounding, fine units.
+/// Most by which rounding in a weighted sum of two sections can lower a bound, fine units.
 const WEIGHED: i64 = 4;
 /// Fraction bits of a weight.
 const WEIGHT_BITS: u32 = 12;
 /// Fraction bits of u.
 const U: u32 = 15;
-/// How often the range of u is halved at most.
+/// Largest number of halvings of the range of u.
 const DEEPEST: u32 = 6;
-/// A pose that is farther than this outside of every piece is outside of the union: length units, times 2^28.
+/// A pose farther than this outside of every piece is outside of the union: length units, times 2^28.
 const OUTSIDE: i64 = -(4 << 28);
 /// Slack of an arc, 2^-32 turn, as for a single piece.
 const ARC_SLACK: i64 = 3;
-/// How many facets a pose is beyond at most, in the search, when another piece must contain it.
+/// Largest number of facets that a pose is beyond, in the search, when another piece must contain it.
 const MOST_BEYOND: usize = 2;
-/// Ends of arcs among the headings of a set, at most. With more, the set is denied.
+/// Largest number of ends of arcs among the headings of a set. With more, the set is denied.
 const MOST_CUTS: usize = 6;
 
-/// Returns `true` if the pieces together contain every pose of the set. False if that is not shown.
+/// Returns `true` if the pieces together contain every pose of the set; `false` if that is not shown.
 #[inline(never)]
 pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
     search(facets, set, goal) == Some(Ok(()))
@@ -61,7 +61,7 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<
     search(facets, set, goal)?.err()
 }
 
-/// Returns how deep a pose is in the piece in which it is deepest: length units times 2^28, below zero if it is in none. For reports.
+/// Returns the depth of a pose in the piece where it is deepest: length units times 2^28, below zero outside of every piece. For reports.
 pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
     let unit = u32::from(facets.unit());
     let fine = |at: i32, goal: i32| {
@@ -85,7 +85,7 @@ pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
     depths.fold(i64::MIN, i64::max)
 }
 
-/// Whether the pieces together contain the set, or the offset of a pose for which none was found. `None` if that is no question for a
+/// Returns `Ok` if the pieces together contain the set, or the offset of a pose for which no piece was found. `None` without a
 /// search: the layout has one piece, or the set is far too wide.
 fn search(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Result<(), [i64; 3]>> {
     if !parts::UNIONS {
@@ -158,7 +158,7 @@ struct Bound {
     point: [i32; 2],
 }
 
-/// A pose: from the goal in world axes, length units times 2^14, and its u, 2^-15.
+/// A pose: relative to the goal in world axes, length units times 2^14, and its u, 2^-15.
 #[derive(Clone, Copy, Debug)]
 struct At {
     x: i64,
@@ -166,21 +166,21 @@ struct At {
     u: i32,
 }
 
-/// A pose-set, a range of its headings, and how much work is left.
+/// A pose-set, a range of its headings, and the remaining number of slabs.
 struct Search<'a> {
     sweep: &'a Sweep,
     facets: &'a Facets<'a>,
     above_goal: u32,
     /// u of the first and the last heading, 2^-15.
     range: [i32; 2],
-    /// How many more slabs may be evaluated.
+    /// Number of slabs that may still be evaluated.
     slabs: u32,
-    /// The last pose for which a piece was looked for.
+    /// The last pose for which a piece was searched.
     lost: At,
 }
 
 impl<'a> Search<'a> {
-    /// Whether the pieces together contain the set at the headings of the range.
+    /// Returns `true` if the pieces together contain the set at the headings of the range.
     fn is_covered(&mut self) -> bool {
         let [from, to] = self.range;
         let at = self.centre(from.wrapping_add(to) >> 1);
@@ -193,7 +193,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Whether the others contain what of the set is beyond a facet of the piece with this number; `at` is a pose there.
+    /// Returns `true` if the other pieces contain the part of the set beyond a facet of piece number `first`; `at` is a pose there.
     #[inline(never)]
     fn cap_is_covered(&mut self, first: usize, beyond: Bound, at: At) -> bool {
         let Some((second, piece)) = self.deepest(at, &[first]) else {
@@ -207,7 +207,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Whether one other piece contains what of the set is beyond both facets.
+    /// Returns `true` if one other piece contains the part of the set beyond both facets.
     #[inline(never)]
     fn rest_is_covered(
         &mut self,
@@ -224,7 +224,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Whether every facet of a piece that does not hold for the whole set by the cheapest test passes another.
+    /// Returns `true` if `test` accepts every facet of a piece that the cheapest test does not accept for the whole set.
     fn all_of(&mut self, piece: &Piece<'_>, test: impl Fn(&mut Self, Bound) -> bool) -> bool {
         piece.frames().all(|frame| {
             let broadly = self.sweep.broadly(&frame);
@@ -250,7 +250,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the piece that contains the range of headings, is none of these and contains a pose best. `None` if none contains it.
+    /// Returns the piece, except those in `not`, that contains the range of headings and in which a pose is deepest. `None` if no piece
+    /// contains the range.
     #[inline(never)]
     fn deepest(&mut self, at: At, not: &[usize]) -> Option<(usize, Piece<'a>)> {
         self.lost = at;
@@ -271,8 +272,8 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// Whether a facet holds for all poses of the set within the range of headings that are beyond all of the others. If not, a
-    /// pose that may be beyond it.
+    /// Returns `Ok` if a facet holds for all poses of the set within the range of headings that are beyond all facets of `beyond`. The
+    /// error is a pose that may be beyond the facet.
     #[inline(never)]
     fn holds(&mut self, bound: Bound, beyond: &[Bound]) -> Result<(), At> {
         let sweep = self.sweep;
@@ -303,7 +304,7 @@ impl<'a> Search<'a> {
                     continue;
                 }
             }
-            // The next one: up from each second half.
+            // The next slab: up from each second half.
             while depth > first && index & 1 == 1 {
                 depth = depth.wrapping_sub(1);
                 index >>= 1;
@@ -316,7 +317,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The same within a slab; if not, whether a pose of its middle section is beyond them all, and the farthest one.
+    /// As [`Search::holds`], within a slab. The error is the result of the middle section, and its farthest pose.
     #[inline(never)]
     fn slab_holds(
         &mut self,
@@ -331,8 +332,8 @@ impl<'a> Search<'a> {
         if found == Slab::Inside {
             return Ok(());
         }
-        // What is beyond all of them is a polygon at each heading. If the set's section, which is convex, does not meet it, two of
-        // its sides tell.
+        // The poses beyond all of them form a polygon at each heading. If the set's section, which is convex, does not meet it, two of
+        // its sides show that.
         let mut outermost = (found, self.farthest(&own, e));
         let mut first = None;
         for other in beyond {
@@ -349,7 +350,7 @@ impl<'a> Search<'a> {
         Err(outermost)
     }
 
-    /// Whether no pose of a slab is beyond both facets, by their best weighed sum.
+    /// Returns `true` if no pose of a slab is beyond both facets, by their best weighted sum.
     #[inline(never)]
     fn excludes(&mut self, first: &Section, second: &Section, e: i32, width: &Width) -> bool {
         self.slabs = self.slabs.saturating_sub(1);
@@ -359,7 +360,7 @@ impl<'a> Search<'a> {
         sum.slab(self.sweep, e, width) == Slab::Inside
     }
 
-    /// Whether a pose of a section is beyond both facets: the farthest by their best weighed sum there.
+    /// Returns `Outside` if a pose of a section is beyond both facets, and the farthest pose by their best weighted sum there.
     #[inline(never)]
     fn outermost(&self, first: &Section, second: &Section, e: i32) -> (Slab, At) {
         let weight = first.weight(second, self.sweep.turn(), self.root(e), 0);
@@ -377,7 +378,7 @@ impl<'a> Search<'a> {
         (found, self.farthest(&sum, e))
     }
 
-    /// `sqrt(1 - e^2)`, 2^-15; of a cylinder 1.
+    /// Returns `sqrt(1 - e^2)`, 2^-15; for a cylinder 1.
     fn root(&self, e: i32) -> i64 {
         if self.sweep.radius.is_some() {
             1 << U
@@ -428,7 +429,7 @@ impl<'a> Search<'a> {
         Some(cuts)
     }
 
-    /// Whether the headings of the range lie in a piece's arc.
+    /// Returns `true` if the headings of the range lie in a piece's arc.
     fn is_in_arc(&self, piece: &Piece<'_>) -> bool {
         let [first, last] = self.range;
         piece.is_whole_circle()
@@ -471,7 +472,7 @@ impl Bound {
         sweep.section(self.facet, self.axes, self.point, e)
     }
 
-    /// Returns what the facet leaves at a pose, length units times 2^28; `turn` is the cosine and sine of its heading, 2^-30.
+    /// Returns the slack of the facet at a pose, length units times 2^28; `turn` is the cosine and sine of its heading, 2^-30.
     fn spare(&self, at: At, [c, s]: [i32; 2]) -> i64 {
         let (c, s) = (i64::from(c), i64::from(s));
         let [px, py] = self.point.map(|v| i64::from(v) << 14);
@@ -510,7 +511,7 @@ impl Section {
         let sum = |a: i32, b: i32| wide(i64::from(a), i64::from(b)) as i32;
         let pair = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [sum(a, c), sum(b, d)];
         let turns = self.turns || other.turns;
-        // What is still among normals that turn.
+        // The part that does not turn, among normals that turn.
         let still = |section: &Self| {
             if section.turns || !turns {
                 return i64::from(section.still);
@@ -540,7 +541,7 @@ impl Section {
     /// Returns the weight of another section, 2^-12 and below 1, with which the sum says most about the poses beyond the
     /// other: over a slab of half width `half`, or at its middle alone for 0. Any weight is sound.
     ///
-    /// With p and q the reaches of both facets as vectors, and d what the other leaves at the estimate, the largest value of the sum is
+    /// With p and q the reaches of both facets as vectors, and d the slack of the other at the estimate, the largest value of the sum is
     /// least where `p + lambda q` is at an angle to q whose cosine is `d / |q|`.
     #[inline(never)]
     fn weight(&self, other: &Self, turn: i64, root: i64, half: i32) -> i32 {

@@ -28,11 +28,11 @@ const DIRECTIONS: [[i8; 3]; 13] = [
 const ONE: i64 = 1 << 12;
 
 impl GoalFramePoseSet<'_> {
-    /// Returns the pose that leaves the table first as the set grows, where `high` is a scale at which it is no longer covered.
+    /// Returns the pose that leaves the table first as the set grows, where `high` is a scale at which the set is no longer covered.
     ///
-    /// Of several pieces, that scale is one at which a proof ends, and the pose found there may be covered. So it is compared with those
-    /// at larger scales and with the result of a search among the outermost poses: the one that is farthest out of all pieces is
-    /// returned.
+    /// With several pieces, a proof ends at that scale, and the pose found there may be covered. So it is compared with the poses
+    /// at larger scales and with the result of a search among the outermost poses. Returns the pose that is farthest out of all
+    /// pieces.
     pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Pose {
         let first = self.witness_pose(table, high);
         let pieces = table
@@ -67,7 +67,7 @@ impl GoalFramePoseSet<'_> {
         self.set.nearest_of(pose)
     }
 
-    /// Searches the outermost pose of least depth: from each of 26 directions by ever smaller steps.
+    /// Searches the outermost pose of least depth: from each of 26 directions by smaller and smaller steps.
     fn farthest_out(&self, depth: impl Fn(Pose) -> i64) -> Pose {
         let mut best = [ONE, 0, 0];
         let mut least = i64::MAX;

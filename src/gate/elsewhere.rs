@@ -1,8 +1,8 @@
-//! What the hypotheses of a report leave out: the robot may be at none of them.
+//! The probability w that the robot is at none of a report's hypotheses.
 //!
-//! A pose-set holds the robot with the confidence of the site, epsilon. Where the hypotheses of a report hold it with the probability
-//! 1 - w only, the set of each must hold it with epsilon' so that (1 - w) epsilon' is at least epsilon. The sets grow by a factor of
-//! their covariances, which is found without an exponential on the decision path:
+//! A pose-set contains the robot with the confidence of the site, epsilon. If the hypotheses of a report contain it only with the
+//! probability 1 - w, each set must contain it with a confidence epsilon' such that (1 - w) epsilon' is at least epsilon. The sets grow
+//! by a factor of their covariances, which is found without an exponential on the decision path:
 //!
 //! - Q(x), the probability that a normal error of three dimensions is beyond the squared radius x, is read from a list of lower bounds.
 //! - Its hazard rate rises with x, and is at least x / (2 (x + 1)). So Q(x') is at most Q(x) exp(-(x' - x) x / (2 (x + 1))).
@@ -80,8 +80,8 @@ const BEYOND: [u32; 63] = [
 /// The natural logarithm of 2, unit 2^-16, rounded up.
 const LN_2_Q16: u64 = 45_427;
 
-/// Returns the trust with which a set of this squared radius makes up for what the hypotheses leave out. `None` if no set does: what
-/// is left out is more than the site's confidence leaves open, or the inflation is beyond 4096.
+/// Returns the trust with which a set of this squared radius compensates the probability `elsewhere`. `None` if no set does:
+/// `elsewhere` exceeds 1 - epsilon of the site, or the inflation exceeds 4096.
 #[inline(always)]
 pub(super) fn allowed_for(elsewhere: Risk, radius: RadiusSquared, trust: Trust) -> Option<Trust> {
     if elsewhere == Risk::NONE {
@@ -142,14 +142,14 @@ mod tests {
     }
 
     proptest! {
-        /// The sets hold the robot with the confidence of the radius, by the distribution in closed form.
+        /// The sets contain the robot with the confidence of the radius, by the distribution in closed form.
         #[test]
         fn the_confidence_is_kept(x in 1.0..32.0f64, share in 0.0..1.0f64) {
             let radius = RadiusSquared::from_q16((x * 65_536.0) as u32).unwrap();
             let x = f64::from(radius.q16()) / 65_536.0;
             let w = (share * beyond(x) * 2f64.powi(32)) as u32;
             let Some(factor) = inflation(w.max(1), radius.q16()) else {
-                // The list's steps give away a quarter at most.
+                // The list's steps lose a quarter at most.
                 prop_assert!(share > 0.7);
                 return Ok(());
             };
@@ -157,7 +157,7 @@ mod tests {
             let w = f64::from(w) / 2f64.powi(32);
             let held = (1.0 - w) * (1.0 - beyond(grown));
             prop_assert!(held >= 1.0 - beyond(x) - 1e-12, "{held} {}", 1.0 - beyond(x));
-            // Not wasteful where little is left out.
+            // Not too large if `elsewhere` is small.
             if share < 0.1 && x > 4.0 {
                 prop_assert!(beyond(grown) > 0.5 * beyond(x), "{grown} {x}");
             }

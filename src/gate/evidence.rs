@@ -1,4 +1,4 @@
-//! What a gate weighs in a step: a report, its other hypotheses, and what the robot can have moved beside them.
+//! The input of a step: a report, its other hypotheses, and the slip of its odometry.
 
 use crate::report::{PoseEstimate, Report};
 use crate::set::{Growth, Uncertainty};
@@ -7,12 +7,12 @@ use crate::task::Risk;
 /// Largest number of hypotheses of one report, the report's own estimate included.
 pub const MOST_HYPOTHESES: usize = 8;
 
-/// A report with what belongs to it.
+/// A report with its other hypotheses and the slip of its odometry.
 ///
-/// A source may believe in several places at once: the clusters of a particle filter, the two solutions of a tag that is seen
-/// squarely. The robot is at one of them. A gate permits only if the pose-set of *every* hypothesis is inside. What the listed
-/// hypotheses leave out (clusters of little weight) counts against the confidence of the site: the sets grow accordingly, or the
-/// report is denied. Sets with a bound, and fixes that were carried, cannot make up for it.
+/// A source may have several hypotheses: the clusters of a particle filter, or the two solutions of a tag that is seen
+/// head-on. The robot is at one of them. A gate permits only if the pose-set of *every* hypothesis is inside. The weight of
+/// omitted hypotheses (such as small clusters) reduces the confidence of the site: the sets grow accordingly, or the
+/// report is denied. Bounded sets and carried fixes cannot grow for this, so they are denied.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Evidence<'r> {
@@ -20,9 +20,9 @@ pub struct Evidence<'r> {
     pub report: &'r Report,
     /// Hypotheses 1, 2 and so on, at most seven, in the frame and with the stamp of the report.
     pub others: &'r [PoseEstimate],
-    /// What the robot can have moved beside the estimates until the stamp: the slip of its odometry.
+    /// Bound of the slip of the odometry until the stamp: added to the pose-set of every hypothesis.
     pub beside: Growth,
-    /// The probability that the robot is at none of the hypotheses: the weight of the clusters that are left out.
+    /// The probability that the robot is at none of the hypotheses: the weight of the omitted hypotheses.
     pub elsewhere: Risk,
     /// The time from the source's last fix (a tag, a scan that matched) until the stamp, milliseconds, rounded up; `None` if it is not
     /// known. It chooses the factor of [`super::Source::aging`]; without it the source's own inflation applies.
@@ -30,7 +30,7 @@ pub struct Evidence<'r> {
 }
 
 impl<'r> Evidence<'r> {
-    /// Returns a report alone.
+    /// Returns the evidence of a report without other hypotheses and without slip.
     #[must_use]
     pub const fn of(report: &'r Report) -> Self {
         Self {
@@ -42,8 +42,8 @@ impl<'r> Evidence<'r> {
         }
     }
 
-    /// Returns `true` if larger sets can make up for what is left out: of normal errors only. A bound states no distribution, and what
-    /// odometry leaves open is beside the sets.
+    /// Returns `true` if larger sets can compensate omitted hypotheses: only for normal errors. A bound states no distribution, and
+    /// slip is not part of the sets.
     pub(super) fn can_make_up(&self) -> bool {
         self.beside == Growth::NONE
             && self

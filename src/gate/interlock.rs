@@ -311,7 +311,7 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
                 heartbeat.left_ms = left;
                 return Ok(());
             }
-            // What this beat is late is taken off the time until the next one, so that beats keep their rate.
+            // The delay of this beat shortens the time until the next one, so that beats keep their rate.
             _ => {
                 let late = passed.wrapping_sub(heartbeat.left_ms);
                 heartbeat.left_ms = heartbeat.period_ms.saturating_sub(late).max(1);

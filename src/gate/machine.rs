@@ -1,4 +1,4 @@
-//! The gate's state machine: closed at first, closed after every error, open only after permits in a row.
+//! The gate's state machine: closed at first, closed after every error, open only after consecutive permits.
 
 use super::doubled::{CorruptWord, RedundantWord};
 use super::elsewhere::allowed_for;
@@ -21,7 +21,7 @@ use core::hint::black_box;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum State {
-    /// Closed: the last report was denied, or none has come.
+    /// Closed: the last report was denied, or there was no report yet.
     Inhibited(Reason),
     /// Closed: this number of consecutive reports have permitted. More must permit, or the hold time is not over.
     Qualifying(u16),
@@ -53,8 +53,8 @@ pub struct Step {
     pub permission: Permission,
     /// The state of the gate.
     pub state: State,
-    /// With a report: whether the report permits by itself, or why not. Without a report: whether the gate is open,
-    /// or why not.
+    /// With a report: `Ok` if this report permits, or the reason why not. Without a report: `Ok` if the gate is open,
+    /// or the reason why not.
     pub verdict: Result<(), Reason>,
 }
 
@@ -63,17 +63,17 @@ pub struct Step {
 /// It permits only after [`Settings::permits_in_a_row`] consecutive fresh permits of one source. It inhibits at once
 /// on a denial, a stale estimate, a sequence gap, another source, or time going backwards. Faults (damaged memory,
 /// table or code, evaluations that disagree, an interlock that does not follow) are latched until [`Gate::reset`].
-/// [`super::assumptions`] lists what it assumes and what it cannot know.
+/// [`super::assumptions`] lists its assumptions and the faults that it cannot detect.
 ///
-/// A report counts only if its stamp is newer than every earlier stamp, of any source. Delayed reports that arrive
-/// late open nothing.
+/// A report counts only if its stamp is newer than every earlier stamp, of any source. Delayed reports
+/// never open the gate.
 ///
-/// Each word of the gate's state is stored with its complement, and the second evaluation reads the table from flash,
-/// so that a bit flip in memory cannot turn a denial into a permit. Every step and tick revokes the permit first, and
+/// Each word of the gate's state is stored with its complement. The second evaluation reads the table from flash. So
+/// a bit flip in memory cannot turn a denial into a permit. Every step and tick revokes the permit first, and
 /// checks that the settings are unchanged. Only a complete pass through the checks gives the permit again, so a
 /// program that skips a part of its path leaves the gate closed.
 ///
-/// A gate cannot be copied: a saved copy would not know of a fault that was latched later.
+/// A gate cannot be copied: a saved copy would not contain a fault that was latched later.
 ///
 /// ```compile_fail,E0382
 /// fn restored(gate: posegate::gate::Gate<'_>) -> posegate::gate::Gate<'_> {
@@ -95,7 +95,7 @@ pub struct Gate<'a> {
     settings: &'a Settings<'a>,
     /// The digest of the settings at the start, when they were checked.
     checked: RedundantWord,
-    /// The checksum of the table at the start. Another table may later be in its place.
+    /// The checksum of the table at the start. Another table may replace it later.
     table_crc: RedundantWord,
     /// The table's mark ([`table::stored_mark`]) at the start.
     table_mark: RedundantWord,
@@ -134,7 +134,7 @@ type Weighed = Result<Result<(), Reason>, CorruptWord>;
 impl<'a> Gate<'a> {
     /// Makes a closed gate on the bytes of a table, at the controller's time `now_ms`. Runs [`self_test`] and checks
     /// the whole table. A table that is damaged, of another task or of another site gives a gate that denies with
-    /// that reason, because a controller with damaged flash must still answer.
+    /// that reason: a controller with damaged flash must still answer.
     ///
     /// # Errors
     /// [`InvalidParameter`] if a parameter would switch a check off.
@@ -203,7 +203,7 @@ impl<'a> Gate<'a> {
         self.step_on(now_ms, &Evidence::of(report))
     }
 
-    /// As [`Gate::step`], for a report with several hypotheses, or one that was carried along odometry.
+    /// As [`Gate::step`], for a report with several hypotheses, or a report that was carried along odometry.
     #[inline(always)]
     pub fn step_on(&mut self, now_ms: u32, evidence: &Evidence<'_>) -> Step {
         let verdict = self
@@ -274,8 +274,8 @@ impl<'a> Gate<'a> {
         self.examine_on(&Evidence::of(report)).1
     }
 
-    /// As [`Gate::examine`], for a report with several hypotheses, or one that was carried along odometry. Returns the number of the
-    /// hypothesis that the verdict is about: the first that is denied, else the one of least margin.
+    /// As [`Gate::examine`], for a report with several hypotheses, or a report that was carried along odometry. Returns the number of
+    /// the verdict's hypothesis: the first denied hypothesis, else the one with the least margin.
     pub fn examine_on(&self, evidence: &Evidence<'_>) -> (u8, Verdict) {
         let mut least = (0, Verdict::deny(Reason::TooManyHypotheses));
         if !(evidence.others.len() < MOST_HYPOTHESES) {
@@ -393,7 +393,7 @@ impl<'a> Gate<'a> {
 
     /// Returns `true` if the table in flash still has the mark that it had at the start: its length, site digest and
     /// checksum. Another valid table has another length, or another checksum at the same place; it has the same mark
-    /// with a probability of 2^-32. [`Gate::scrub`] finds the changes that the mark does not show. A table that was
+    /// with a probability of 2^-32. [`Gate::scrub`] detects changes that leave the mark unchanged. A table that was
     /// refused at the start may change.
     fn table_is_the_same(&self) -> Result<bool, CorruptWord> {
         let expected = self.table_mark.get()?;
@@ -438,7 +438,7 @@ impl<'a> Gate<'a> {
             } else if !(since <= self.settings.permit_hold_ms) {
                 Some(Reason::Silent)
             } else if before.standing.is_open() && !(passed <= self.settings.response_ms) {
-                // The last permission was in force for longer than the time that its age was judged for.
+                // The last permission was valid for longer than the time for which its age was checked.
                 Some(Reason::CycleLate)
             } else {
                 None
@@ -591,7 +591,7 @@ impl<'a> Gate<'a> {
         Ok(follows)
     }
 
-    /// Returns what the robot can move until a permission on a report ends, from the complements and in another form: the time
+    /// Returns the largest movement until a permission on a report ends, from the complements and in another form: within the time
     /// until the estimate is too old, or the time since its stamp until the hold time is over, whichever is less.
     #[inline(always)]
     fn movement_by_complement(&self, report: &Report, source: &Source) -> Growth {
@@ -718,8 +718,8 @@ impl<'a> Gate<'a> {
         Ok(())
     }
 
-    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and
-    /// not from the future, which is an age of half the clock's range or more.
+    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and not from
+    /// the future. A stamp from the future has an age of half the clock's range or more.
     fn is_fresh(&self, stamp_ms: u32) -> Result<bool, CorruptWord> {
         Ok(self.is_fresh_at(self.now_ms.get()?, stamp_ms))
     }
@@ -729,7 +729,7 @@ impl<'a> Gate<'a> {
         now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()
     }
 
-    /// Restores the state from before a report that the first checks found to be the last one again. Closes the gate
+    /// Restores the state from before a report that the first checks found to be a repetition. Closes the gate
     /// if the second check, from the complements, finds another report.
     fn repeat(&mut self, report: &Report, before: &StateSnapshot) {
         if self.is_last_again(report) {
@@ -739,8 +739,8 @@ impl<'a> Gate<'a> {
         }
     }
 
-    /// Adds one permit, and opens the gate if there are enough. Checks again, from the complements, what the first
-    /// checks found: `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree.
+    /// Adds one permit, and opens the gate if there are enough. Repeats the first checks from the complements:
+    /// `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree.
     fn permit(
         &mut self,
         report: &Report,

@@ -1,9 +1,9 @@
-//! The gate: a state machine that opens an interlock after fresh permits in a row, its reasons, and the
+//! The gate: a state machine that opens an interlock after consecutive fresh permits, its reasons, and the
 //! interlock.
 //!
 //! The gate is closed at first and after every error. [`Gate`] takes reports and keeps state between them. To decide
-//! single estimates, for recordings and benches only, use [`crate::recordings`]. [`assumptions`] lists what the gate
-//! assumes, what it checks and what it cannot know.
+//! single estimates, for recordings and benches only, use [`crate::recordings`]. [`assumptions`] lists the gate's
+//! assumptions, its checks and the faults that it cannot detect.
 //!
 //! ```
 //! use posegate::gate::{Gate, Restart, Settings, Source};
@@ -105,7 +105,7 @@ impl Verdict {
     }
 }
 
-/// Returns the verdict on a pose-set, with its margin and worst pose. For telemetry: the verdict opens nothing, and
+/// Returns the verdict on a pose-set, with its margin and worst pose. For telemetry: the verdict opens no interlock, and
 /// the age of the estimate is ignored.
 pub fn judge(table: &Table<'_>, set: &PoseSet) -> Verdict {
     let examination = contain::examine(table, set);

@@ -1,20 +1,20 @@
-//! Does the error model of a source still hold? A test of every accepted fix against its prediction.
+//! Is the error model of a source still valid? A test of every accepted fix against its prediction.
 //!
 //! A camera that was knocked, or a tag that has moved, gives fixes with larger errors than their covariance claims. Such fixes differ from
-//! their predictions by more than both claim. The monitor tests the claim:
+//! their predictions by more than both covariances claim. The monitor tests the claim:
 //!
 //! - The square of the normalised innovation, `d^2 = r' S^-1 r`, has at most the chi-square distribution with 3 degrees of freedom if the
-//!   claims hold. `r` is the difference of fix and prediction, `S` the sum of their covariances.
+//!   claims are true. `r` is the difference of fix and prediction, `S` the sum of their covariances.
 //! - Under the claim the factor `e = s^-3 exp(d^2 (1 - s^-2) / 2)` has a mean of at most 1: it is the likelihood ratio of errors that are
 //!   `s` times as large. The monitor uses `s` of root 2 and of 2.
 //! - The product of the factors, restarted whenever it falls below 1, exceeds a bound A after A fixes on average, or later (e-detectors:
 //!   Shin, Ramdas and Rinaldo 2022, arXiv 2203.03532). Two products are watched, so each may reach 2 A.
 //!
-//! Assumed: given all fixes before it, each innovation has at most the distribution that it claims. Errors that repeat from fix to fix (the
-//! same wrong survey at every look) are what is looked for; errors that are only slow, such as those of a filter that shares its past with
-//! the prediction, belong into the covariance ([`Innovation::of_dependent`]).
+//! Assumed: given all fixes before it, each innovation has at most the distribution that it claims. The monitor searches for errors that repeat
+//! from fix to fix, such as one wrong survey. Slow errors, such as those of a filter that shares its past with the prediction, belong
+//! into the covariance ([`Innovation::of_dependent`]).
 //!
-//! Floating point: nothing here can permit. A contradicted model only ever adds a denial.
+//! Floating point is used, because nothing here can permit: a contradicted model only adds a denial.
 
 // Errors of floating point are far below the margin of a bet.
 #![allow(clippy::float_arithmetic)]
@@ -26,22 +26,22 @@ use core::f64::consts::{LOG2_E, TAU};
 /// The bets: the square of how much larger the errors are than claimed, and its binary logarithm.
 const BETS: [(f64, f64); 2] = [(2.0, 1.0), (4.0, 2.0)];
 
-/// A fix against its prediction.
+/// The difference of a fix and its prediction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Innovation {
     /// The fix minus the prediction: x and y in metres in world axes, yaw in radians within half a turn.
     pub difference: [f64; 3],
-    /// The covariance that both claim for it, by rows: m^2, m rad, rad^2.
+    /// The covariance of this difference that both claim, by rows: m^2, m rad, rad^2.
     pub covariance: [[f64; 3]; 3],
 }
 
 impl Innovation {
-    /// Returns the difference of a fix from a prediction for the same time, whose errors are independent: a tag that is seen, against a
-    /// pose that odometry carried from an earlier tag. What slip can explain (`beside`, of the prediction) is taken off the difference.
+    /// Returns the difference of a fix from a prediction for the same time, whose errors are independent: a fix from a tag, and a
+    /// pose that odometry carried from an earlier tag. The slip of the prediction (`beside`) is subtracted from the difference.
     ///
     /// # Errors
-    /// [`InputError`] if one of both is no valid estimate, or is a bounded set, which states no distribution
+    /// [`InputError`] if fix or prediction is not a valid estimate, or is a bounded set, which states no distribution
     /// ([`InputError::CovarianceUnknown`]).
     pub fn of_independent(
         fix: &PoseEstimate,
@@ -52,7 +52,7 @@ impl Innovation {
     }
 
     /// As [`Innovation::of_independent`], for errors that may depend on each other in any way: twice the sum of both covariances bounds that
-    /// of the difference. Finds a wrong model later.
+    /// of the difference. Detects a wrong model later.
     ///
     /// # Errors
     /// As for [`Innovation::of_independent`].
@@ -135,12 +135,12 @@ fn covariance(estimate: &PoseEstimate) -> Result<[[f64; 3]; 3], InputError> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub enum ModelStanding {
-    /// Nothing speaks against it.
+    /// No sign of a contradiction.
     #[default]
     Holds,
-    /// Half of the evidence that contradicts it, in logarithms, is there: check camera and tags soon.
+    /// The logarithm of the evidence has reached half of the limit for a contradiction: check camera and tags soon.
     InDoubt,
-    /// It is contradicted. Deny with [`super::Reason::ModelContradicted`] until a person has looked.
+    /// It is contradicted. Deny with [`super::Reason::ModelContradicted`] until a manual check.
     Contradicted,
 }
 
@@ -173,8 +173,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Returns a monitor. Where the model holds, it contradicts it wrongly once in `fixes_between_false_alarms` fixes on average, or less
-    /// often. `None` for fewer than 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+    /// Returns a monitor. While the model is valid, a false alarm comes on average once in `fixes_between_false_alarms` fixes, or less
+    /// often. `None` for fewer than 100. At 10 fixes per second, a million means once in 28 hours, 100 million once in four months.
     #[must_use]
     pub fn new(fixes_between_false_alarms: u32) -> Option<Self> {
         (fixes_between_false_alarms >= 100).then(|| Self {
@@ -190,7 +190,7 @@ impl Monitor {
     /// Takes an accepted fix, and returns the standing of the model with it. A contradiction stays until [`Monitor::reset`].
     ///
     /// # Errors
-    /// [`InputError`] of an innovation that is not valid: it counts for nothing.
+    /// [`InputError`] of an innovation that is not valid: it is ignored.
     pub fn fix(&mut self, innovation: &Innovation) -> Result<ModelStanding, InputError> {
         let squared = innovation.normalised_squared()?;
         for (doubt, scale) in self.doubts.iter_mut().zip(BETS) {
@@ -214,7 +214,7 @@ impl Monitor {
         }
     }
 
-    /// Forgets all fixes. Call it after a person has removed the cause.
+    /// Discards all fixes. A manual action: call it after the cause was removed.
     pub fn reset(&mut self) {
         self.doubts = [0.0; 2];
         self.is_contradicted = false;

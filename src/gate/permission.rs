@@ -13,7 +13,7 @@ pub const DENY: u8 = 0;
 /// skips a check has another signature.
 ///
 /// A permission is valid only in the cycle for which it was made: [`super::Interlock::apply`] refuses a
-/// permit of another time, so a stored permission opens nothing later.
+/// permit of another time, so a stored permission never opens the interlock later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -126,7 +126,7 @@ pub(super) enum Check {
     FollowedAgain = 0x4cb2,
     /// The stamp is fresh, read from the complements.
     FreshAgain = 0x1d97,
-    /// Enough permits have come in a row, and the hold time is over.
+    /// There were enough consecutive permits, and the hold time is over.
     Qualified = 0xe2c4,
     /// The permit has not expired. Checked in every step and tick.
     Stands = 0xb14d,

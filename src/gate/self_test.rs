@@ -10,7 +10,7 @@ use crate::table::Table;
 /// obliqueness and a turned goal (`crates/posegate-host/tests/golden_tables.rs` makes it).
 static TABLE: &[u8] = include_bytes!("self_test.posegate");
 
-/// An estimate and its known answer. What estimates share is shared: this takes flash in every firmware.
+/// An estimate and its known answer. Common values are shared, because this takes flash in every firmware.
 struct KnownAnswer {
     /// x and y in metres, and the heading in radians unless `quaternion` states it.
     at: [f64; 3],

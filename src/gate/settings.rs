@@ -10,13 +10,13 @@ use crate::set::{Aging, CrossTerms, Growth, Inflation, Trust};
 pub struct Source {
     /// The frame that its reports must be in: the world frame of the site.
     pub frame: FrameId,
-    /// How far its covariances are trusted, whatever the time since its last fix.
+    /// The trust in its covariances, for any time since its last fix.
     pub trust: Trust,
     /// Smaller inflations for estimates soon after a fix ([`super::Evidence::since_fix_ms`]); none is larger than that of `trust`.
     /// [`Aging::NONE`] if one factor is used.
     pub aging: Aging,
-    /// How fast the robot may move, from the stamp of an estimate until a permission on it ends.
-    /// [`MotionBounds::STANDS_STILL`] if something else makes sure that it does not.
+    /// The largest speeds of the robot, from the stamp of an estimate until its permission ends.
+    /// [`MotionBounds::STANDS_STILL`] if other means ensure that it does not move.
     pub motion: MotionBounds,
 }
 
@@ -50,7 +50,7 @@ impl Source {
         })
     }
 
-    /// Returns the trust in an estimate at a time since the last fix: the factor of its age, or that of the source if its age is not known.
+    /// Returns the trust in an estimate at a time since the last fix: the factor of its age, or that of the source if `since_fix_ms` is `None`.
     #[must_use]
     pub fn trust_after(&self, since_fix_ms: Option<u32>) -> Trust {
         match since_fix_ms {
@@ -72,7 +72,7 @@ impl Source {
     }
 }
 
-/// Whether a gate whose permit has ended needs a reset.
+/// The condition for a restart after a permit has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -113,9 +113,9 @@ pub struct Settings<'a> {
     pub inhibit_hold_ms: u32,
     /// The number of consecutive reports that must permit before the gate opens: from 1 to 65,535.
     pub permits_in_a_row: u16,
-    /// Whether a gate whose permit has ended needs a reset.
+    /// The condition for a restart after a permit has ended.
     pub restart: Restart,
-    /// The most runs of cells that a decision looks at (a row without a run counts as one), of a table that has cells. A pose-set that
+    /// The largest number of runs of cells that a decision reads (a row without a run counts as one), for a table with cells. A pose-set that
     /// needs more is denied with [`super::Reason::TooCostly`]. `Table::within(most_runs).worst_case()` bounds the instructions: a run takes
     /// at most 2,500 on a Cortex-M4F. Facets are not affected. Zero: cells permit nothing. Read once, when the gate is made or reset.
     pub most_runs: u32,
@@ -152,14 +152,14 @@ pub enum InvalidParameter {
     InterlockTime,
     /// The report period is zero, or at least half of the range of the millisecond clock.
     ReportPeriod,
-    /// A permit ends before the next report comes: permits in a row are never counted, or the inhibit hold time is not over then.
+    /// A permit ends before the next report: consecutive permits are never counted, or the inhibit hold time is not over then.
     PermitHoldTooShort {
-        /// The least permit hold time that would do, in milliseconds.
+        /// The smallest permit hold time that is valid, in milliseconds.
         least_ms: u32,
     },
-    /// An estimate is too old before the next report comes, with the same result.
+    /// An estimate is too old before the next report, with the same result.
     MaximumAgeTooShort {
-        /// The least maximum age that would do, in milliseconds.
+        /// The smallest maximum age that is valid, in milliseconds.
         least_ms: u32,
     },
 }
@@ -233,9 +233,9 @@ impl Settings<'static> {
     /// - `permits_in_a_row` is 3.
     /// - `most_runs` is 1,000, such as 50 rows in each of 20 slabs of headings: 1 m and 20 deg on cells of 2 cm and 1 deg.
     ///
-    /// One lost report closes the gate. To bear one, give twice the period. Longer times cost margin, since a robot that moves is
-    /// granted what it can move in them ([`Source::motion`]); odometry makes the times short ([`crate::track`]): then the period is
-    /// that of the odometry. Times beyond 2^31 ms are refused when the gate is made.
+    /// One lost report closes the gate. To tolerate one, give twice the period. Longer times cost margin, since the movement that is
+    /// possible in them ([`Source::motion`]) is added to every set. Odometry makes the times short ([`crate::track`]): then the period
+    /// is that of the odometry. Times beyond 2^31 ms are refused when the gate is made.
     #[must_use]
     pub const fn for_source(period_ms: u32, jitter_ms: u32) -> Self {
         const RESPONSE_MS: u32 = 20;
@@ -325,7 +325,7 @@ impl Settings<'_> {
         self.maximum_age_ms.saturating_sub(self.response_ms)
     }
 
-    /// Returns what the robot can move from the stamp of an estimate of this age until a permission on it ends: at the
+    /// Returns the largest movement from the stamp of an estimate of this age until its permission ends: at the
     /// maximum age at the latest, and when the permit hold time and the response time are over.
     #[must_use]
     pub fn movement(&self, motion: MotionBounds, age_ms: u32) -> Growth {

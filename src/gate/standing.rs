@@ -82,7 +82,7 @@ impl StateSnapshot {
         })
     }
 
-    /// Returns `true` if one more permit makes `needed` permits in a row, read from the complement.
+    /// Returns `true` if one more permit makes `needed` consecutive permits, read from the complement.
     pub fn has_earned_by_complement(&self, needed: u16) -> bool {
         let word = self.state.by_complement();
         match word >> 16 {

@@ -26,7 +26,7 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// Returns the inverse. That of zero has no meaning.
+    /// Returns the inverse; meaningless for zero.
     #[must_use]
     pub const fn of(d: u32) -> Self {
         let up = d.leading_zeros() & 31;

@@ -268,7 +268,7 @@ impl Float {
             return (middle >> 32, middle << 32 | lowest & 0xffff_ffff);
         }
         let (f2, f1) = ((factor >> 64) as u32, (factor >> 32) as u32);
-        // Each sum is below 2^64: a product of two words leaves room for two more.
+        // Each sum is below 2^64: a product of two words and two more words fit.
         let middle = wide(m0, f1).wrapping_add(lowest >> 32);
         let other = wide(m1, f0).wrapping_add(middle & 0xffff_ffff);
         let highest = wide(m0, f2).wrapping_add(wide(m1, f2) << 32);

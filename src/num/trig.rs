@@ -67,8 +67,8 @@ const fn high(a: u32, b: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Returns the largest distance from the true vectors for headings `first`, `first + step`, ...,
-    /// and a digest of every bit of every value, so that no change in rounding goes unnoticed.
+    /// Returns the largest distance from the true vectors for headings `first`, `first + step`, ... Also returns a
+    /// digest of every bit of every value, which detects any change in rounding.
     fn worst(first: u32, step: usize) -> (f64, u64) {
         let mut worst = 0.0f64;
         let mut digest = 0xcbf2_9ce4_8422_2325u64;

@@ -1,7 +1,7 @@
 //! For recordings and benches only: evaluates estimates one by one, without state. An interlock is driven by
 //! [`crate::gate::Gate`].
 //!
-//! An [`Evaluator`] checks the age of a stamp, then the numbers, and decides. It does not wait for permits in a row,
+//! An [`Evaluator`] checks the age of a stamp, then the numbers, and decides. It does not wait for consecutive permits,
 //! runs no second evaluation and checks no settings. It does not notice lost, repeated or foreign reports. One bad
 //! estimate or one flipped bit is enough for a wrong permit.
 //!
@@ -75,8 +75,8 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Evaluates a pose-set with the stamp `stamp_ms` at the time of use `now_ms`, both of one wrapping millisecond
-    /// clock. (A clock of 32 bits cannot distinguish an age from the same age plus 49.7 days, so the source must not
-    /// keep estimates that long.) Returns the verdict with its margin and worst pose, at the cost of
+    /// clock. A clock of 32 bits cannot distinguish an age from the same age plus 49.7 days, so the source must not
+    /// keep estimates that long. Returns the verdict with its margin and worst pose, at the cost of
     /// [`contain::examine`]. A control loop that needs only the answer calls [`Evaluator::permits`].
     pub fn evaluate(
         &self,
@@ -107,7 +107,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Checks what a set needs before it is decided: a valid table, a fresh stamp, valid numbers.
+    /// Checks the preconditions of a decision: a valid table, a fresh stamp, valid numbers.
     fn admit(
         &self,
         now_ms: u32,
@@ -137,7 +137,7 @@ mod tests {
     const SET: Result<PoseSet, InputError> = Err(InputError::CovarianceZero);
 
     #[test]
-    fn no_maximum_age_switches_the_check_off() {
+    fn no_maximum_age_disables_the_age_check() {
         for bad in [0, 1 << 31, u32::MAX] {
             assert_eq!(
                 Evaluator::new(&[], bad).err(),
@@ -149,7 +149,7 @@ mod tests {
 
     /// Ages 0, maximum and one more; stamps from the future; the wrap of the clock.
     #[test]
-    fn only_fresh_stamps_pass() {
+    fn only_stamps_within_maximum_age_are_fresh() {
         let evaluator = Evaluator {
             table: Err(TableError::Magic),
             maximum_age_ms: 100,
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_radius_without_a_table_is_not_smaller_than_099s() {
+    fn default_radius_is_at_least_that_of_confidence_099() {
         assert!(f64::from(RADIUS_099) / 65536.0 >= 11.344866730144373);
     }
 }

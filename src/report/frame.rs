@@ -2,8 +2,8 @@
 
 /// A frame, as the digest of its name (64-bit FNV-1a; a leading `/` is dropped, as ROS 1 wrote it).
 ///
-/// Numbers of another frame look as valid as those of the right one, so a gate denies a report whose
-/// frame differs from the declared frame of its source. Two names have the same digest with a probability
+/// Numbers of another frame look as valid as those of the right one. So a gate denies a report whose frame differs
+/// from the declared frame of its source. Two names have the same digest with a probability
 /// of 2^-64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -50,13 +50,13 @@ mod tests {
 
     /// Published check values of FNV-1a (its authors' test vectors).
     #[test]
-    fn digests_are_fnv_1a() {
+    fn frame_digest_is_fnv_1a() {
         assert_eq!(FrameId::of("a").digest(), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(FrameId::of("foobar").digest(), 0x8594_4171_f739_67e8);
     }
 
     #[test]
-    fn names_are_told_apart() {
+    fn frame_names_differ_except_one_leading_slash() {
         assert_eq!(FrameId::of("/map"), FrameId::of("map"));
         assert_ne!(FrameId::of("odom"), FrameId::of("map"));
         assert_ne!(FrameId::of("//map"), FrameId::of("map"));

@@ -186,14 +186,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn directions_are_the_nearest(radians in -4.0f64..4.0, bits in 54i32..58) {
+        fn directions_round_to_nearest(radians in -4.0f64..4.0, bits in 54i32..58) {
             let length = 2f64.powi(bits);
             let angle = angle_of((length * radians.cos()) as i64, (length * radians.sin()) as i64);
             prop_assert!(off(angle, radians).abs() <= 0.51, "{}", off(angle, radians));
         }
 
         #[test]
-        fn quaternions_give_their_yaw(
+        fn quaternion_yaw_is_exact_to_rounding(
             roll in -0.05f64..0.05, pitch in -0.05f64..0.05, yaw in -3.2f64..3.2,
             length in 0.99999f64..1.00001, flipped: bool,
         ) {
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_rotation_is_refused() {
+    fn invalid_rotations_are_refused() {
         for entries in [
             [0.0; 4],
             [0.0, 0.0, 0.0, 1.0001],

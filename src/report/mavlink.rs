@@ -11,7 +11,7 @@
 //! };
 //! let belief = message.belief(Axes::Down);
 //! assert_eq!((belief.x_m, belief.y_m), (2.0, -1.0));
-//! // NaN in the first entry: the source does not know, and a gate denies.
+//! // NaN in the first entry: the covariance is unknown, and a gate denies.
 //! assert!(belief.spread.is_none());
 //! ```
 

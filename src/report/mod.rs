@@ -46,12 +46,12 @@ pub struct PoseEstimate {
     pub y_m: f64,
     /// The robot's heading in the report's frame.
     pub heading: Heading,
-    /// The uncertainty of the estimate, in the axes of the report's frame; `None` if the source reports that it
-    /// does not know.
+    /// The uncertainty of the estimate, in the axes of the report's frame; `None` if the source reports
+    /// no uncertainty.
     pub spread: Option<Uncertainty>,
 }
 
-/// A pose estimate with everything that a gate needs to know about it.
+/// A pose estimate with its source, frame, sequence number and stamp: the input of a gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {

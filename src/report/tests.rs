@@ -14,7 +14,7 @@ fn covariances() -> impl Strategy<Value = [[f64; 3]; 3]> {
     })
 }
 
-/// Returns the 36 numbers of ROS. Every entry that must not count has a value that would be noticed.
+/// Returns the 36 numbers of ROS. Every entry that must not count has a value that would change the result.
 fn spread_over_ros([[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]]: [[f64; 3]; 3]) -> [f64; 36] {
     let mut all = [777.0; 36];
     for (index, value) in [
@@ -80,7 +80,7 @@ fn least_beyond(covariance: [[f64; 3]; 3], cross_terms: CrossTerms) -> Option<f6
 
 /// The hardest true covariance is a line: x, y and yaw are fully correlated, with either sign.
 #[test]
-fn every_share_covers_what_goes_together() {
+fn every_split_weight_covers_correlated_terms() {
     for share in 1..=u8::MAX {
         let cross_terms = CrossTerms::AllUnknown(SplitWeight::from_q8(share).unwrap());
         for signs in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
@@ -99,7 +99,7 @@ fn quaternion(yaw: f64) -> [f64; 4] {
 proptest! {
     /// Every form gives the same pose-set, except for the last bit of a heading.
     #[test]
-    fn all_forms_of_one_belief_are_one_set(
+    fn all_message_forms_of_one_estimate_give_one_set(
         x in -50.0f32..50.0, y in -50.0f32..50.0, yaw in -3.0f32..3.0, covariance in covariances(),
     ) {
         // Numbers that f32 can represent, and equal upper and lower halves.
@@ -225,7 +225,7 @@ proptest! {
 }
 
 #[test]
-fn an_unknown_covariance_is_impossible() {
+fn unknown_covariance_is_invalid() {
     let mut covariance =
         spread_over_mavlink([[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]]);
     let belief = |covariance| {
@@ -247,7 +247,7 @@ fn an_unknown_covariance_is_impossible() {
 
 /// Each of the nine entries that count is read: a wrong index would read another number.
 #[test]
-fn every_entry_of_ros_is_read_from_its_place() {
+fn every_ros_covariance_entry_is_read_from_its_index() {
     for (index, expected) in [
         (0, InputError::CovarianceNotFinite),
         (1, InputError::CovarianceNotFinite),
@@ -278,7 +278,7 @@ fn every_entry_of_ros_is_read_from_its_place() {
 }
 
 #[test]
-fn no_inflation_weakens() {
+fn inflation_never_shrinks_the_set() {
     for bad in [
         0.0,
         -1.0,

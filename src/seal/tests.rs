@@ -40,7 +40,7 @@ fn with_record(before: usize, after: usize) -> Vec<u8> {
 }
 
 #[test]
-fn a_sealed_image_has_the_sum_and_one_change() {
+fn sealed_image_differs_only_in_its_checksum() {
     for (before, after) in [(0, 0), (4, 1), (400, 3), (8, 1000)] {
         let image = with_record(before, after);
         let file = elf(&[(0x0800_0000, &[1, 2, 3, 4], 0), (0x0800_0004, &image, 5)]);
@@ -63,7 +63,7 @@ fn a_sealed_image_has_the_sum_and_one_change() {
 }
 
 #[test]
-fn a_linkers_gap_is_filled_and_another_is_refused() {
+fn linker_gap_is_filled_and_larger_gap_is_refused() {
     // The record in the second segment, and in the first, which is then loaded from a copy.
     let image = with_record(12, 0);
     for (first, second) in [(&image[..], &[9; 10][..]), (&[9; 10], &image)] {
@@ -94,7 +94,7 @@ fn a_linkers_gap_is_filled_and_another_is_refused() {
 }
 
 #[test]
-fn what_cannot_be_sealed_is_said() {
+fn unsealable_image_is_refused_with_reason() {
     let no_elf = |file: &[u8]| matches!(seal(file), Err(SealError::NotElf(_)));
     assert!(no_elf(&[]) && no_elf(b"POSEGATE") && no_elf(&[0; 200]));
     assert_eq!(seal(&elf(&[])).unwrap_err(), SealError::Empty);
@@ -119,7 +119,7 @@ fn what_cannot_be_sealed_is_said() {
 
 /// The controller checks every bit that the tool seals.
 #[test]
-fn the_controller_finds_every_flipped_bit_of_what_was_sealed() {
+fn controller_detects_every_flipped_bit_of_sealed_image() {
     let image = with_record(20, 40);
     let mut sealed = seal(&elf(&[(0, &image, 0)])).unwrap().image;
     for bit in 0..sealed.len() * 8 {

@@ -2,13 +2,13 @@
 //!
 //! The host makes the rules of a plan (`posegate plan --rules`). Each rule states where the estimate may be when its
 //! step begins and how large the pose-set may be: the conditions for which the plan was proven. A [`Sequencer`] keeps
-//! the state and takes the step whose condition holds. If the state's own condition does not hold (the set is larger
-//! than expected, or the robot was carried away), it looks for another entry of the plan whose condition holds. If
+//! the state and takes the step whose condition holds. The state's own condition fails if the set is larger than
+//! expected, or the robot was moved by hand. Then it searches another entry of the plan whose condition holds. If
 //! there is none, it inhibits.
 //!
 //! A sequencer does not permit anything. Before a look or a work task the task's own [`Gate`](crate::gate::Gate)
-//! decides, on its table, with all of its checks. A sequencer only says which gate to ask, and what to do if the task
-//! fails: retry, continue without the tag, or give up.
+//! decides, on its table, with all of its checks. A sequencer only selects the gate to ask, and the reaction if the task
+//! fails: retry, continue without the tag, or stop.
 //!
 //! ```
 //! use posegate::sequencer::{Instruction, Rules, RulesError, Sequencer};
@@ -85,8 +85,8 @@ pub enum Instruction<'a> {
 pub enum StopReason {
     /// The work is done.
     Done,
-    /// A task failed as often as its rule allows and the plan has no alternative, or there were more than 1,000
-    /// surprises.
+    /// A task failed as often as its rule allows and the plan has no alternative, or a condition failed more than
+    /// 1,000 times.
     GaveUp,
     /// No entry of the plan is proven for the pose-set.
     NoEntry,
@@ -107,7 +107,7 @@ enum State {
     Ended(StopReason),
 }
 
-/// A plan is given up after this many surprises, so that endless surprises end.
+/// A plan ends after this number of failed conditions, so that it cannot repeat without end.
 const MOST_SURPRISES: u16 = 1_000;
 
 /// Executes the rules of a plan.
@@ -148,7 +148,7 @@ impl<'a> Sequencer<'a> {
         {
             return self.instruction(&rule);
         }
-        // A surprise: use another entry of the plan. The last one is tried first, because it is nearest to the work.
+        // The condition does not hold: use another entry of the plan. The last entry is tried first, because it is nearest to the work.
         self.surprises = self.surprises.saturating_add(1);
         if self.surprises > MOST_SURPRISES {
             self.state = State::Ended(StopReason::GaveUp);
@@ -173,7 +173,7 @@ impl<'a> Sequencer<'a> {
         }
     }
 
-    /// Reports that the last instruction succeeded: after a drive or a look the plan goes on, after the work it ends.
+    /// Reports that the last instruction succeeded: after a drive or a look the plan continues, after the work it ends.
     pub fn succeeded(&mut self) {
         if let State::Before(number) = self.state {
             self.tries = 0;
@@ -186,7 +186,7 @@ impl<'a> Sequencer<'a> {
     }
 
     /// Reports that the last instruction failed: the tag was not seen, the gate did not permit, or the drive was
-    /// stopped. The step is tried as often as its rule says; then the plan goes on without the tag, or gives up.
+    /// stopped. The step is repeated as often as its rule allows; then the plan continues without the tag, or ends.
     pub fn failed(&mut self) {
         if let State::Before(number) = self.state {
             let Some(rule) = self.rules.get(number) else {

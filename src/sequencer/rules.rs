@@ -14,8 +14,8 @@
 //! | end - 4 | u32 | CRC-32C of all bytes before |
 //!
 //! A rule: kind (u8: 0 work, 1 look, 2 drive), attempts (u8), task name (u16), tag (u32), the next rule (u16), the next
-//! rule after a failure (u16, 65535 for none), the pose where the step begins (i32 um, i32 um, u32 of 2^-32 turn), how
-//! far from it the estimate may be (i32 um, i32 of 2^-24 turn), how large the pose-set may be (i32 um, i32 of 2^-24
+//! rule after a failure (u16, 65535 for none), the pose where the step begins (i32 um, i32 um, u32 of 2^-32 turn), the
+//! tolerance of the estimate there (i32 um, i32 of 2^-24 turn), the largest pose-set (i32 um, i32 of 2^-24
 //! turn), the target pose of a drive (same encoding), zero (u32). All little-endian.
 
 use crate::num::BinaryAngle;
@@ -69,9 +69,9 @@ pub struct Rule {
     pub otherwise: Option<u16>,
     /// Pose where the step begins.
     pub place: Pose,
-    /// How far from `place` the estimate may be.
+    /// Largest distance of the estimate from `place`.
     pub spread: Cylinder,
-    /// How large the pose-set may be, whatever its confidence: the plan's risk is for the sets that it was made for.
+    /// The largest pose-set, for any confidence: the plan's risk is for the sets that it was made for.
     pub set: Cylinder,
     /// Target pose of a drive.
     pub to: Pose,

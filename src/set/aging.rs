@@ -10,12 +10,12 @@ const AGE_POWER: u32 = 6;
 /// The unit of a factor in a step is 2^-6: this power less than that of an [`Inflation`].
 const FACTOR_POWER: u32 = 10;
 
-/// Factors by the time since the last fix: up to four steps, each an age and the factor up to that age. Neither falls from a step to the
-/// next one, so an older estimate never has a smaller factor.
+/// Factors by the time since the last fix: up to four steps, each an age and the factor up to that age. Neither decreases from a step to the
+/// next, so an older estimate never has a smaller factor.
 ///
 /// Each word has an age in its lower 16 bits, in units of 64 ms, rounded down; and in its upper ones a factor in units of 2^-6, rounded
-/// up, at least 1. A word 0 is not used; used ones come first. The factor of an age is that of the first step whose age is not less,
-/// so it is never below the factor that was given for this age. Beyond the last step, or if the time since the last fix is not
+/// up, at least 1. A word 0 is unused; used words come first. The factor of an age is that of the first step whose age is not less,
+/// so it is never below the factor given for this age. Beyond the last step, or if the time since the last fix is not
 /// known, the source's own inflation applies, which no step exceeds ([`Aging::is_within`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -37,8 +37,8 @@ impl Aging {
     }
 
     /// Returns factors by age, from the youngest: up to `age_ms` milliseconds, ends included, the factor. Ages are rounded down to 64 ms,
-    /// factors up to 2^-6. `None` if there are more than [`MOST_AGES`] steps, an age is below 64 ms or above 4194 s, ages do not
-    /// rise by 64 ms, factors fall, or a factor is above 1023.
+    /// factors up to 2^-6. `None` if there are more than [`MOST_AGES`] steps, an age is below 64 ms or above 4194 s,
+    /// or ages do not rise by 64 ms. Also `None` if factors decrease or a factor is above 1023.
     #[must_use]
     pub fn new(steps: &[(u32, Inflation)]) -> Option<Self> {
         let mut words = [0; MOST_AGES];
@@ -76,7 +76,7 @@ impl Aging {
         self.digest
     }
 
-    /// Returns `true` if the words are those of the digest. No single flipped bit leaves it so.
+    /// Returns `true` if the words match the digest. Every single flipped bit makes it `false`.
     const fn is_whole(self) -> bool {
         self.digest == digest(self.words)
     }
@@ -127,7 +127,7 @@ impl Aging {
         inflation
     }
 
-    /// Returns the same from the other end and in another form, for the second evaluation.
+    /// As [`Aging::at`], from the other end and in another form, for the second evaluation.
     #[must_use]
     pub(crate) fn at_from_oldest(self, since_fix_ms: u32, inflation: Inflation) -> Inflation {
         let mut factor = inflation;
@@ -262,7 +262,7 @@ mod tests {
                 most = most.max(step.1);
                 step.1 = most;
             }
-            // Room for the rounding of the last factor.
+            // Slack for the rounding of the last factor.
             let largest = factor(most.q16() + 1024 + more);
             if let Some(aging) = Aging::new(&steps) {
                 prop_assert!(aging.is_within(largest));

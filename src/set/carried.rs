@@ -33,14 +33,14 @@ const LEVER_Q56: i128 = 26_986_075_409;
 /// The longest path, micrometres, and the largest variance of the yaw.
 const LONGEST: i64 = 1 << 26;
 const LARGEST: i64 = 1 << 56;
-/// What roundings of a product take off an entry, with some to spare.
+/// Bound of the rounding of a product in an entry, with some slack.
 const ROUNDED: i64 = 8;
 
 /// Returns the covariance of an estimate after a path `[x, y]`, micrometres in world axes, with the trust in its source applied: `G P G'`
 /// with the path's noise.
 ///
 /// # Errors
-/// The [`InputError`] of the covariance; [`InputError::CovarianceTooLarge`] beyond the numbers here.
+/// The [`InputError`] of the covariance; [`InputError::CovarianceTooLarge`] if a number is out of range.
 pub(crate) fn carried(
     covariance: &[[f64; 3]; 3],
     trust: Trust,
@@ -92,7 +92,7 @@ pub(crate) fn carried(
     let xy = sum([p.xy, by(a, p.yt), by(b, p.xt), by(a, btt), noise.xy])?;
     let xt = sum([p.xt, att, 0, 0, noise.xt])?;
     let yt = sum([p.yt, btt, 0, 0, noise.yt])?;
-    // What the floats' last bits may take off.
+    // The rounding of the floats' last bits.
     let up = |entry: i64| entry.wrapping_add(entry >> 40);
     let [xx, yy] = [xx, yy].map(|entry| encoded(up(entry), UM2));
     let tt = encoded(up(tt), Q24_2);
@@ -151,7 +151,7 @@ mod tests {
             prop_assert!(near(encoded(value, Q24_2), value as f64 * q24 * q24));
         }
 
-        /// Against floats: the carried covariance is larger by little, in every direction.
+        /// Compared with floats: the carried covariance is slightly larger in every direction.
         #[test]
         fn a_carried_covariance_contains_the_true_one(
             sigma in prop::array::uniform3(1e-3..0.3f64),

@@ -17,9 +17,9 @@
 //! | a covariance, to the correlations' 30 bits | nearest | half a unit of the correlations |
 //! | a covariance, to the unit of the target | nearest | 1/2 |
 //!
-//! A correlation is at most 2^30 of its units and a scale at least 2^30.2, so the first row is worth 1.65 units of the
-//! correlations at most, and the slack of a covariance is `3 + d` of these units, where d is what its two halves differ
-//! by, and `1/2`, rounded up.
+//! A correlation is at most 2^30 of its units and a scale at least 2^30.2, so the first row is worth 1.65 units of
+//! the correlations at most. The slack of a covariance is `3 + d` of these units, where d is the difference of its two
+//! halves, and `1/2`, rounded up.
 //!
 //! # The factor
 //! The integer ellipsoid contains the true one because `F F' >= r2 P` in the order of positive semi-definite matrices.

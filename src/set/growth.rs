@@ -1,4 +1,4 @@
-//! What a movement adds to a pose-set: a cylinder of offsets, which every pose of the set may have made.
+//! The growth of a pose-set by a movement: a cylinder of offsets, each of which may apply to every pose of the set.
 //!
 //! The grown set is `{ p + c : p in the set, |(cx, cy)| <= translation, |c_yaw| <= yaw }` (the Minkowski sum). It is not
 //! an ellipsoid. The decision keeps both parts apart: along any normal, the extent of the sum is the sum of the extents.
@@ -25,8 +25,8 @@ impl Growth {
         yaw_q24: 0,
     };
 
-    /// Returns a growth of a length in micrometres and a turn in units of 2^-24 turn. Lengths beyond 268 m and turns beyond one
-    /// turn count as that: no table holds a set of that size, or the heading can be any.
+    /// Returns a growth of a length in micrometres and a turn in units of 2^-24 turn. Lengths are limited to 268 m and turns to one
+    /// turn: no table contains a set of that size, and one turn is every heading.
     #[must_use]
     pub const fn new(translation_um: u32, yaw_q24: u32) -> Self {
         let translation_um = if translation_um < REACH_UM.unsigned_abs() {
@@ -45,7 +45,7 @@ impl Growth {
         }
     }
 
-    /// Returns a growth of a length in metres and a turn in radians, rounded up. `None` if one is below zero or not a number.
+    /// Returns a growth of a length in metres and a turn in radians, rounded up. `None` if one is negative or not finite.
     #[must_use]
     pub fn of(translation_m: f64, yaw_rad: f64) -> Option<Self> {
         let up = |value: f64, factor: u128, shift: i32| {
@@ -70,7 +70,7 @@ impl Growth {
         self.translation_um
     }
 
-    /// Returns the largest turn either way, 2^-24 turn: at most one turn.
+    /// Returns the largest turn to either side, 2^-24 turn: at most one turn.
     #[must_use]
     pub const fn yaw_q24(self) -> i32 {
         self.yaw_q24
@@ -100,7 +100,7 @@ impl Growth {
         Self::new(up(self.translation_um), up(self.yaw_q24))
     }
 
-    /// Returns the growth times `q16 / 2^16`, rounded up. `None` if that is beyond the numbers.
+    /// Returns the growth times `q16 / 2^16`, rounded up. `None` if that is out of range.
     pub(crate) fn scaled(self, q16: u32) -> Option<Self> {
         let up = |value: i32, most: i32| {
             let scaled = u64::from(value.unsigned_abs())

@@ -171,7 +171,7 @@ pub enum Extent {
         /// 2^-24 turn, rounded up; at most half a turn.
         yaw_q24: i32,
     },
-    /// An ellipsoid and what a movement adds to it: every sum of an offset of both.
+    /// An ellipsoid grown by a movement: the Minkowski sum of both.
     Grown {
         /// The ellipsoid.
         factor: SqrtFactor,
@@ -303,7 +303,7 @@ impl PoseSet {
         }
     }
 
-    /// Returns the set with a movement added: every pose to which the robot may have moved, or may yet move.
+    /// Returns the set grown by a movement: every pose to which the robot may have moved or may move.
     ///
     /// The result is exact but for the rounding of the movement itself. Cost: about a hundred instructions on a Cortex-M4F; a decision about a
     /// grown ellipsoid costs about as much as one about the ellipsoid.

@@ -133,7 +133,7 @@ impl CrossTerms {
     }
 }
 
-/// The trust in a source.
+/// The trust in a source's covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Trust {

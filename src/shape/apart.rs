@@ -203,7 +203,7 @@ mod tests {
 
     /// A tolerance widens the cone at every width.
     #[test]
-    fn square_views_grow_by_the_turn() {
+    fn head_on_views_grow_by_rotation() {
         let view = Visibility {
             psi_max_deg: 90.0,
             tag_tolerance: Tolerance {

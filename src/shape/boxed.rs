@@ -87,11 +87,11 @@ impl BoxSet {
 /// Largest number of boxes that [`maximal`] keeps.
 const MOST: usize = 64;
 
-/// Returns boxes of a union, each as large as the union allows, in place of its boxes: two that share a face, or overlap, give a third
-/// that reaches across. Together they are the union itself. Only comparisons: no limit is rounded.
+/// Replaces the boxes of a union by boxes that are as large as the union allows. Two boxes that overlap or share a face give a third
+/// box across both. Together the boxes still equal the union. Only comparisons: no limit is rounded.
 ///
-/// On one axis the third has both intervals as one, which must meet; on the others it has what both have in common. This is repeated
-/// until nothing is new. (All boxes of the union that are not part of a larger one are found so; beyond [`MOST`], what was found.)
+/// On one axis the third box has the union of both intervals, which must meet; on the others it has their intersection. This is
+/// repeated until no box is new. (It finds all boxes of the union that are not part of a larger one, but at most [`MOST`].)
 #[must_use]
 pub(crate) fn maximal(mut boxes: Vec<BoxSet>) -> Vec<BoxSet> {
     let mut first = 0;
@@ -113,7 +113,7 @@ pub(crate) fn maximal(mut boxes: Vec<BoxSet>) -> Vec<BoxSet> {
             break;
         }
     }
-    // The last of equal boxes stays.
+    // The last of equal boxes is kept.
     let kept = (0..boxes.len()).filter(|number| {
         let own = &boxes[*number];
         !boxes.iter().enumerate().any(|(other, larger)| {
@@ -128,13 +128,13 @@ impl BoxSet {
         [self.x, self.y, self.yaw_deg]
     }
 
-    /// Whether each interval contains the other's.
+    /// Returns `true` if each interval contains that of the other box.
     fn holds(&self, other: &Self) -> bool {
         let pairs = self.intervals().into_iter().zip(other.intervals());
         pairs.into_iter().all(|([a, b], [c, d])| a <= c && d <= b)
     }
 
-    /// Returns the box in the union of two that reaches across them along an axis; `None` if they do not meet there.
+    /// Returns the box across two boxes along an axis, in their union; `None` if they do not meet on that axis.
     fn joined(&self, other: &Self, axis: usize) -> Option<Self> {
         let mut both = self.intervals();
         for (number, ([lo, hi], [from, to])) in both.iter_mut().zip(other.intervals()).enumerate() {
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_and_a_bay_that_share_a_face_have_a_box_across() {
+    fn lane_and_bay_with_common_face_get_a_box_across() {
         let (lane, bay) = (
             of([-2.0, 0.0], [-0.5, 0.5], [-25.0, 25.0]),
             of([0.0, 0.8], [-0.15, 0.15], [-10.0, 10.0]),
@@ -186,7 +186,7 @@ mod tests {
     proptest! {
         /// On small whole numbers: the same union, and each box cannot grow by one on any side.
         #[test]
-        fn they_are_the_union_and_cannot_grow(
+        fn maximal_boxes_equal_the_union_and_cannot_grow(
             limits in proptest::collection::vec(proptest::array::uniform6(0i32..6), 1..6)
         ) {
             let boxes: Vec<BoxSet> = limits

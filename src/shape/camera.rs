@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_is_that_of_its_numbers() {
+    fn window_of_changed_camera_is_empty() {
         let half = Window::of_pinhole(&CAMERA, 100.0);
         let mut camera = CAMERA.through(
             Lens::Pinhole,

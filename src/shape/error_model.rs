@@ -167,7 +167,7 @@ mod tests {
 
     /// Every view of the parts is within the limit, and the parts hold most of the views that are.
     #[test]
-    fn bounds_that_fall_with_psi_keep_the_oblique_views() {
+    fn bounds_falling_with_psi_keep_oblique_views() {
         let limits = [
             // Both bounds fall; one grows while the other one falls; both grow.
             ([0.05, 0.001, 0.01, -0.03], [2.0, 0.02, 0.1, -1.3]),
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tag_that_may_hang_askew_may_be_seen_more_head_on() {
+    fn tilted_tag_may_be_seen_more_head_on() {
         // The bound is 4.5 deg at a psi of 23.4 deg.
         let limit = |yaw_deg| ErrorLimit {
             model: ErrorModel {

@@ -6,7 +6,7 @@ use super::scalar::{NONE, Scalar, Selection, selected};
 
 /// The poses at which a convex footprint lies inside a convex region.
 ///
-/// Both polygons are convex and counter-clockwise; [`Footprint::new`] is the only way to make one.
+/// Both polygons are convex and counter-clockwise; only [`Footprint::new`] creates this type.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Footprint {
     footprint: Vec<[f64; 2]>,
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_each_fault() {
+    fn each_invalid_footprint_is_refused() {
         use PolygonError::{
             Clockwise, FootprintCorners, NotConvex, NotFinite, TooFewCorners, TooLarge,
         };

@@ -53,8 +53,8 @@ fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
 }
 
 impl SuccessSet {
-    /// Returns the set in which a wall does not hide a tag, because the tag is mounted on that wall, whatever the tag's
-    /// tolerance. The wall still hides other tags.
+    /// Returns the set in which a wall does not hide a tag, because the tag is mounted on that wall, for any
+    /// tolerance of the tag. The wall still hides other tags.
     #[must_use]
     pub fn without_wall(&self, name: &str, tag: &Tag) -> Self {
         let mut set = self.clone();

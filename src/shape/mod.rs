@@ -17,11 +17,11 @@
 //!         yaw_deg: [-4.0, 4.0],
 //!     }),
 //! };
-//! // 7 cm before the dock is inside; 7 cm beside it is not, and `y` is the constraint that fails.
+//! // 7 cm before the dock is inside; 7 cm to its side is not, and `y` is the constraint that fails.
 //! let heading = core::f64::consts::FRAC_PI_2;
 //! assert!(success.membership([2.0, 0.93, heading]).inside);
-//! let beside = success.membership([1.93, 1.0, heading]);
-//! let worst = beside.slack.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+//! let aside = success.membership([1.93, 1.0, heading]);
+//! let worst = aside.slack.iter().min_by(|a, b| a.1.total_cmp(&b.1));
 //! assert_eq!(worst.map(|(name, _)| *name), Some("y"));
 //! ```
 
@@ -137,7 +137,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Returns the visibility set in it if there is exactly one: what the camera looks at.
+    /// Returns the visibility set in the shape if there is exactly one: the camera and its tag.
     #[must_use]
     pub fn visibility(&self) -> Option<&Visibility> {
         match self {
@@ -167,7 +167,7 @@ impl Shape {
         }
     }
 
-    /// Returns the error limit in it if there is exactly one.
+    /// Returns the error limit in the shape if there is exactly one.
     #[must_use]
     pub fn error_limit(&self) -> Option<&ErrorLimit> {
         match self {
@@ -191,7 +191,7 @@ impl Shape {
         }
     }
 
-    /// Returns `true` if a box in it contains no pose; a tolerance can cause this.
+    /// Returns `true` if a box of the shape contains no pose; a tolerance can cause this.
     #[must_use]
     pub fn has_empty_box(&self) -> bool {
         match self {
@@ -231,7 +231,7 @@ pub struct SuccessSet {
 }
 
 impl SuccessSet {
-    /// Returns how deep the goal itself is in an obstacle that no alternative avoids, metres (negative);
+    /// Returns the depth of the goal itself in an obstacle that no alternative avoids, metres (negative);
     /// `None` if the goal is clear.
     #[must_use]
     pub fn covered_by(&self) -> Option<f64> {

@@ -46,7 +46,7 @@ pub struct Membership {
     pub inside: bool,
     /// The slack of each constraint by name: at least 0 inside, roughly metres or radians.
     pub slack: Vec<(&'static str, f64)>,
-    /// For visibility sets: what the camera sees.
+    /// For visibility sets: the tag as the camera sees it.
     pub sight: Option<Sight>,
 }
 
@@ -70,7 +70,7 @@ impl SuccessSet {
         super::Parts::of(self).only().is_some()
     }
 
-    /// Returns whether a world pose `(x m, y m, yaw rad)` is in the set, with the slack of every constraint. In
+    /// Returns `inside: true` if a world pose `(x m, y m, yaw rad)` is in the set, and the slack of every constraint. In
     /// `f64`: a pose within 1e-12 of a border may be on either side.
     #[must_use]
     pub fn membership(&self, world: [f64; 3]) -> Membership {

@@ -85,7 +85,7 @@ pub struct Line<S> {
     name: &'static str,
 }
 
-/// Returns a vector scaled to a length of at most one, whatever the rounding.
+/// Returns a vector scaled to a length of at most one, for any rounding.
 fn shortened<const N: usize>(v: [f64; N]) -> [f64; N] {
     let length = libm::sqrt(v.iter().map(|c| c * c).sum());
     v.map(|c| {

@@ -14,7 +14,7 @@
 //! floor. The bounds add up, and some positions of tag and camera within the tolerances reach the sum.
 //!
 //! Errors are measured along the floor. A detector's pose of the robot may lean by beta and be off in height by up to
-//! `sin(beta) l`, where l is the distance in space from the tag to the robot's reference point. A camera that is turned
+//! `sin(beta) l`. Here l is the distance in space from the tag to the robot's reference point. A camera that is turned
 //! by alpha relative to the camera with which the errors were measured projects `sin(alpha) sin(beta) l` of that height
 //! onto the floor, and turns the yaw by up to `asin(sin(alpha) / cos(beta))`. Both are included for a beta of
 //! [`LARGEST_LEAN_DEG`]. The yaw is off by at most the detector's own error, delta, and this angle.
@@ -111,7 +111,7 @@ impl Visibility {
     }
 
     /// Reduces `d_max` until the error that the tolerances add is within [`Self::error_room`]. If no distance satisfies
-    /// this, `d_max` becomes 0, from where nothing is seen.
+    /// this, `d_max` becomes 0, at which no tag is seen.
     pub fn keep_error_room(&mut self) {
         let Some([translation, yaw_deg]) = self.error_room else {
             return;

@@ -1,6 +1,6 @@
 //! Tolerances of tags, cameras and docks.
 
-/// How far a surveyed pose may be off. A success set must hold for every pose within this tolerance.
+/// The largest error of a surveyed pose. A success set must hold for every pose within this tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tolerance {
     /// Metres, in any direction.
@@ -9,7 +9,7 @@ pub struct Tolerance {
     pub turn_deg: f64,
 }
 
-/// How far a calibration's numbers may be off. (Lens coefficients are assumed to be exact.)
+/// The largest errors of a calibration's numbers. (Lens coefficients are assumed to be exact.)
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Intrinsics {
     /// Relative error of each focal length; below 1.
@@ -25,7 +25,7 @@ impl Intrinsics {
         centre_px: 0.0,
     };
 
-    /// Returns how far an image point can be from its position by the calibration, along a row and along a column,
+    /// Returns the largest distance of an image point from its position by the calibration, along a row and along a column,
     /// for an image of this size, pixels; rounded up. A focal error moves a point by that share of its distance from
     /// the optical axis.
     #[must_use]
@@ -57,7 +57,7 @@ impl Tolerance {
         *self == Self::NONE
     }
 
-    /// Returns how far a point can be from its surveyed position if it is `distance` metres from the centre of the
+    /// Returns the largest distance of a point from its surveyed position if it is `distance` metres from the centre of the
     /// object, metres; rounded up.
     #[must_use]
     pub fn reach(&self, distance: f64) -> f64 {

@@ -38,9 +38,9 @@ pub struct Visibility {
     pub psi_max_deg: f64,
     /// Smallest depth of a corner, metres.
     pub z_near: f64,
-    /// How far the tag may be from its surveyed pose; its rotation error is about the vertical.
+    /// The largest error of the tag's surveyed pose; the rotation error is about the vertical.
     pub tag_tolerance: Tolerance,
-    /// How far the camera may be from its calibrated pose on the robot; its rotation error is about any axis.
+    /// The largest error of the camera's calibrated pose on the robot; the rotation error is about any axis.
     pub mount_tolerance: Tolerance,
     /// The resolution at which the tag must be seen. `f b cos psi / d`, with the smaller focal length and the width b
     /// of a bit, is no more than the width of any bit at the tag's centre in a pinhole's image.
@@ -51,7 +51,7 @@ pub struct Visibility {
     pub error_room: Option<[f64; 2]>,
 }
 
-/// What the camera sees of a tag's centre and corners at a pose.
+/// A tag's centre and corners as the camera sees them at a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
     /// Camera centre to tag centre, metres.
@@ -381,7 +381,7 @@ impl Resolved<f64> {
         slacks.try_fold(f64::INFINITY, |least, slack| Some(least.min(slack?)))
     }
 
-    /// Returns what the camera sees at a pose.
+    /// Returns the tag as the camera sees it at a pose.
     pub(crate) fn sight(&self, pose: &Planar<f64>) -> Sight {
         let camera = &self.set.camera;
         let ray = self.in_camera(pose, self.centre);

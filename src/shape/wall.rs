@@ -7,7 +7,7 @@ use super::{Planar, PoseDeg};
 /// A vertical wall (two corners) or a block over a convex outline, from one height to another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wall {
-    /// Its name in the site file.
+    /// The wall's name in the site file.
     pub name: String,
     /// Corners `[x, y]` in the world, metres: two of a wall, or a convex outline counter-clockwise.
     pub corners: Vec<[f64; 2]>,
@@ -23,7 +23,7 @@ pub struct Wall {
 pub(crate) const WALL_BORDER: f64 = 1e-9;
 
 impl Wall {
-    /// Returns the distance of a point `[x, y]` from it in the plan, metres: 0 within a block.
+    /// Returns the distance of a point `[x, y]` from the wall in the plan, metres: 0 within a block.
     pub fn distance(&self, [x, y]: [f64; 2]) -> f64 {
         let count = self.corners.len();
         let edge = |i: usize| (self.corners[i], self.corners[(i + 1) % count]);

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_window_is_empty() {
+    fn invalid_planes_give_an_empty_window() {
         for planes in [&[][..], &[[0.0, 0.0, 1.0]; 17], &[[f64::NAN, 0.0, 1.0]]] {
             assert_eq!(Window::of_planes(planes), Window::EMPTY);
         }

@@ -1,8 +1,8 @@
-//! What the camera sees: the tag's corners, d, phi and psi at a pose, and whether the tag is visible.
+//! The predicted view of a tag: its corners, d, phi and psi at a pose, and its visibility.
 //!
-//! [`Scene::of`] takes camera and tag from the table of a visibility set. [`Scene::look`] returns what the camera sees
-//! from a pose: whether the visibility set contains the pose, as one of three values, and the quantities behind this
-//! answer, for telemetry. Integers only; nothing can fail after the scene is made.
+//! [`Scene::of`] takes camera and tag from the table of a visibility set. [`Scene::look`] returns the
+//! view from a pose: one of three values for "does the visibility set contain the pose?", and the quantities behind
+//! this answer, for telemetry. Integers only; nothing can fail after the scene is made.
 //!
 //! ```
 //! use posegate::pose::Pose;
@@ -58,7 +58,7 @@ pub const LENGTH_ERROR_UM: i64 = 6;
 /// component along the axis minus `cos(phi_max) d`, and the same along the normal.
 pub const ANGLE_ERROR_UM: i64 = 11;
 
-/// Whether the tag is visible from a pose.
+/// The visibility of the tag from a pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
@@ -107,7 +107,7 @@ pub struct Pixel {
     pub v_q8: i32,
 }
 
-/// What the camera sees of a tag from a pose.
+/// The view of a tag from a pose.
 ///
 /// The answer is a bound. The other fields are for telemetry, each within the stated error of its true value. None of
 /// them is used in the answer.
@@ -115,7 +115,7 @@ pub struct Pixel {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
 pub struct Sighting {
-    /// Whether the tag is visible.
+    /// The visibility of the tag.
     pub answer: TagVisibility,
     /// The tag's number within its family.
     pub tag: u32,

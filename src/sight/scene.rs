@@ -75,7 +75,7 @@ impl Scene {
         &self.record
     }
 
-    /// Returns what the camera sees from a pose of the robot in the world.
+    /// Returns the view of the tag from a pose of the robot in the world.
     ///
     /// Integers only; no panic, no loop that depends on the pose. Sums of products stay below 2^61.
     pub fn look(&self, pose: &Pose) -> Sighting {

@@ -1,4 +1,4 @@
-//! Angles for humans to read. The only module of the core that calculates with floats: these functions turn a
+//! Angles for display. The only module of the core that calculates with floats: these functions turn a
 //! sighting into a number, and no other module uses this one.
 //!
 //! `micromath` is enough for this. Its arc tangent is off by up to 2.8e-3 rad (0.16 degrees) and its square

@@ -6,7 +6,7 @@
 /// The reflected polynomial.
 const POLYNOMIAL: u32 = 0x82f6_3b78;
 
-/// What four bits that leave the register add to it. 64 bytes of flash; a table of 256 entries would take 1 kB and halve the time.
+/// The terms that the four bits shifted out add to the register. 64 bytes of flash; 256 entries would take 1 kB and halve the time.
 static OF_FOUR_BITS: [u32; 16] = of_four_bits();
 
 const fn of_four_bits() -> [u32; 16] {
@@ -59,14 +59,14 @@ mod tests {
 
     /// Published check values of CRC-32/ISCSI (RFC 3720, B.4, and the usual "123456789").
     #[test]
-    fn the_checksum_is_crc_32c() {
+    fn checksum_is_crc_32c() {
         assert_eq!(checksum(b"123456789"), 0xe306_9283);
         assert_eq!(checksum(&[0; 32]), 0x8a91_36aa);
         assert_eq!(checksum(&[0xff; 32]), 0x62a8_ab43);
     }
 
     #[test]
-    fn a_checksum_goes_on() {
+    fn checksum_can_be_continued() {
         let bytes: Vec<u8> = (0..200u8).map(|v| v.wrapping_mul(37)).collect();
         for at in 0..=bytes.len() {
             let (first, rest) = bytes.split_at(at);
@@ -75,9 +75,9 @@ mod tests {
         assert_eq!(checksum(&[]), 0);
     }
 
-    /// Bit by bit, as the definition has it.
+    /// Compares the table with the definition, bit by bit.
     #[test]
-    fn the_table_of_four_bits_is_the_polynomial() {
+    fn nibble_table_matches_polynomial() {
         for length in 0..64_u8 {
             let bytes: Vec<u8> = (0..length)
                 .map(|v| v.wrapping_mul(91).wrapping_add(length))

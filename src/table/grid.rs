@@ -379,7 +379,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read() {
+    fn grid_reads_back_written_runs() {
         let one = two_slabs();
         let mut more = one.clone();
         more[0].runs[1] = vec![(0, 1), (3, 4), (6, 9)];
@@ -416,7 +416,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn another_width_of_columns_is_refused() {
+    fn other_column_width_is_refused() {
         for head in [[0, 0, 0, 0], [3, 0, 0, 0], [1, 1, 0, 0], [2, 0, 0, 1]] {
             let mut bytes = layout(&two_slabs(), head[0] == 2, false);
             bytes[..4].copy_from_slice(&head);
@@ -466,7 +466,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn an_empty_row_has_one_spelling() {
+    fn empty_row_has_one_encoding() {
         for (wide, ones) in [(false, 0xff), (true, u16::MAX)] {
             let with = |first: u16, last: u16, several: bool| {
                 let bytes = layout(&[rows(0, &[&[(first, last)]])], wide, several);
@@ -525,7 +525,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn past_the_last_slab_there_are_no_rows() {
+    fn slab_past_the_last_has_no_rows() {
         let mut runs: Vec<&[(u16, u16)]> = vec![&[(0, 0)]; 300];
         runs[3] = &[(0, 1)];
         let bytes = layout(&[rows(0, &runs)], false, false);

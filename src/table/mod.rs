@@ -1,7 +1,7 @@
 //! Success sets as bytes in flash: format version 1.
 //!
 //! [`Table::parse`] is the only entry point. It checks the magic, the version, every field, every run and the CRC over
-//! all bytes. After it has returned `Ok`, no accessor can fail, and every cell that an accessor reports as covered was
+//! all bytes. After it has returned `Ok`, no accessor can fail. Every cell that an accessor reports as covered was
 //! inside the success set when the table was proven (`posegate table verify`). A table borrows its bytes; nothing is
 //! copied.
 //!
@@ -145,7 +145,7 @@ pub enum TableError {
     Header,
     /// The grid's directory or runs are out of range.
     Grid,
-    /// The facets' counts do not add up, or an arc, a frame or a facet is out of range.
+    /// The facets' counts are inconsistent, or an arc, a frame or a facet is out of range.
     Facets,
     /// A number of the sight record is out of its range.
     Sight,
@@ -257,7 +257,7 @@ pub struct Table<'a> {
     grid: Option<Grid<'a>>,
     facets: Option<Facets<'a>>,
     sight: Option<&'a sight::Words>,
-    /// Of the grid, that a decision looks at.
+    /// The largest number of runs of the grid that a decision reads.
     most_runs: u32,
 }
 
@@ -394,15 +394,15 @@ impl<'a> Table<'a> {
         }))
     }
 
-    /// Returns the same table, on which a decision looks at no more than `most_runs` runs of cells (a row without a run counts as one).
-    /// A walk that would look at more ends with [`crate::contain::Cause::TooCostly`]. Facets are not affected. A table that was parsed has no
-    /// limit.
+    /// Returns the same table with a limit: a decision reads at most `most_runs` runs of cells (a row without a run counts as one).
+    /// A walk that needs more ends with [`crate::contain::Cause::TooCostly`]. Facets are not affected. A table from
+    /// [`Table::parse`] has no limit.
     #[must_use]
     pub const fn within(self, most_runs: u32) -> Self {
         Self { most_runs, ..self }
     }
 
-    /// Returns the most runs of cells that a decision looks at.
+    /// Returns the largest number of runs of cells that a decision reads.
     pub(crate) const fn most_runs(&self) -> u32 {
         self.most_runs
     }
@@ -468,7 +468,7 @@ impl<'a> Table<'a> {
         self.facets.as_ref()
     }
 
-    /// Returns the features of this crate that firmware needs to decide on all of this table, in alphabetical order. Without one
+    /// Returns the features of this crate that firmware needs to decide on all of this table, in alphabetical order. Without such a feature
     /// the gate denies more, or refuses the table.
     #[cfg(feature = "std")]
     #[must_use]
@@ -490,7 +490,7 @@ impl<'a> Table<'a> {
     /// Returns the grid layout, if there is one and this build has the feature `cells`.
     #[must_use]
     pub const fn grid(&self) -> Option<&Grid<'a>> {
-        // A constant `None` lets the compiler drop all that only cells need.
+        // A constant `None` lets the compiler drop the code that only cells need.
         if parts::CELLS {
             self.grid.as_ref()
         } else {
@@ -530,7 +530,7 @@ pub(crate) mod tests {
     use super::*;
 
     #[test]
-    fn slabs_share_their_edges() {
+    fn heading_on_slab_edge_is_in_both_slabs() {
         for (span, slabs) in [
             (1u64 << 32, 360u16),
             (1 << 32, 7),
@@ -562,7 +562,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn only_unit_vectors_turn() {
+    fn goal_rotation_must_be_a_unit_vector() {
         assert!(is_unit(1 << 30, 0));
         assert!(is_unit(759_250_125, -759_250_125));
         assert!(!is_unit(0, 0));
@@ -635,7 +635,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_table_gives_what_was_written() {
+    fn table_reads_back_written_header() {
         let bytes = small();
         let table = Table::parse(&bytes).unwrap();
         let goal = GoalFrame {
@@ -677,7 +677,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn faults_have_their_names() {
+    fn each_invalid_table_has_its_error() {
         let error = |bytes: &[u8]| Table::parse(bytes).err();
         for length in 0..HEADER_LENGTH + CRC_LENGTH {
             assert_eq!(error(&vec![0; length]), Some(TableError::TooShort));

@@ -237,7 +237,7 @@ pub(crate) mod tests {
     };
 
     #[test]
-    fn a_record_comes_back_from_its_bytes() {
+    fn record_round_trips_through_bytes() {
         assert!(GOOD.is_valid());
         let bytes = GOOD.bytes();
         assert_eq!(SightRecord::of_words(checked(&bytes).unwrap()), GOOD);
@@ -260,7 +260,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn numbers_have_their_ranges() {
+    fn record_numbers_out_of_range_are_refused() {
         for (value, expected) in [
             (0, false),
             (1, true),
@@ -329,7 +329,7 @@ pub(crate) mod tests {
     /// A unit vector may be off by its rounding, and a little more: here by 1 of 2^-30 along itself (2^31 of its
     /// square), and by 3 across.
     #[test]
-    fn axes_and_edges_are_a_frame() {
+    fn non_orthogonal_axes_and_edges_are_refused() {
         for axis in 0..3 {
             let long = GOOD.axes[axis].map(|v| v / ONE);
             for (more, expected) in [(1, true), (-2, true), (2, false), (-3, false)] {

@@ -2,9 +2,9 @@
 
 use super::{Axes, Table};
 
-/// Slabs of headings of one pose-set that are evaluated, at most.
+/// Largest number of slabs of headings of one pose-set that are evaluated.
 pub(crate) const MOST_SLABS: u32 = 33;
-/// Slabs and pairs of facets on slabs that are evaluated, at most, where several pieces may contain a pose-set together.
+/// Largest number of slabs, and of pairs of facets on slabs, that are evaluated if several pieces may contain a pose-set together.
 pub(crate) const MOST_UNION_SLABS: u32 = 96;
 
 /// The largest number of steps of each kind in a decision.
@@ -19,7 +19,7 @@ pub struct WorstCase {
     pub world_facets: u32,
     /// Facets of frames in robot axes, where a set can bend.
     pub robot_facets: u32,
-    /// Slabs of headings at which facets are evaluated; where there are several pieces, also what their union may take, in slabs. Zero
+    /// Slabs of headings at which facets are evaluated. With several pieces, also the cost of their union, in slabs. Zero
     /// for one piece with no point that turns with the heading.
     pub heading_slabs: u32,
     /// Slabs of cells that are walked. A range of headings over the whole circle meets its first two slabs again.
@@ -124,7 +124,7 @@ mod tests {
     use crate::table::tests::{Rows, table_of};
 
     #[test]
-    fn every_step_has_its_price() {
+    fn every_step_adds_to_worst_case() {
         let worst = WorstCase {
             pieces: 2,
             frames: 3,

@@ -1,4 +1,4 @@
-//! How a path changes the knowledge of the pose: navigation's F, in integers.
+//! The change of the pose knowledge along a path: navigation's F, in integers.
 //!
 //! # Rounding
 //! Models are floats, evaluated once and rounded up. Lengths are rounded to the micrometre after 2^-40 of them is
@@ -28,9 +28,9 @@ use crate::set::{Estimate, InputError, RadiusSquared, ScaledCovariance, pose_of}
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PathTolerance {
-    /// How far the estimate may be from the path's beginning.
+    /// Largest distance of the estimate from the path's beginning.
     pub start: Cylinder,
-    /// How far from the path's end the controller may stop.
+    /// Largest distance from the path's end at which the controller may stop.
     pub end: Cylinder,
 }
 
@@ -198,7 +198,7 @@ impl MotionUpdate {
         self.to
     }
 
-    /// Returns how far the estimate may be from the path's ends.
+    /// Returns the tolerances of the estimate at the path's ends.
     #[must_use]
     pub const fn within(&self) -> PathTolerance {
         self.within
@@ -291,7 +291,7 @@ impl PathTolerance {
 }
 
 impl BoundedDriveModel {
-    /// Returns what driving adds: to the position, metres, and to the heading, radians.
+    /// Returns the error that driving adds: to the position, metres, and to the heading, radians.
     #[allow(clippy::float_arithmetic)]
     fn added(&self, length_m: f64, turning_rad: f64) -> [f64; 2] {
         [

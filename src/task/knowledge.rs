@@ -27,7 +27,7 @@ impl Cylinder {
     };
 
     /// Creates a cylinder from metres and radians, rounded up. `None` if one is negative or not finite, or the length
-    /// is 268 m or more. Angles beyond half a turn stand for every heading.
+    /// is 268 m or more. Angles beyond half a turn mean every heading.
     #[must_use]
     pub fn new(translation_m: f64, yaw_rad: f64) -> Option<Self> {
         Self::from_um_q24(length_um(translation_m)?, angle_q24(yaw_rad)?)
@@ -217,7 +217,7 @@ impl PoseErrorSet {
         }
     }
 
-    /// Returns the pose-set of an estimate that is anywhere within a cylinder of a pose: the ellipsoid itself if
+    /// Returns the pose-set of an estimate within the cylinder `spread` about `mean`: the ellipsoid itself if
     /// `spread` and the cylinder part are single poses, else the cylinder that encloses everything. `None` if it is 268
     /// m or more.
     ///

@@ -1,8 +1,8 @@
-//! Tasks and how each changes the knowledge of the robot's pose: the pose-set modifiers F of work, localization and
+//! Tasks, and the change of the pose knowledge by each: the pose-set modifiers F of work, localization and
 //! navigation (Definitions 2 to 5).
 //!
 //! The knowledge is a [`PoseErrorSet`]: the true pose is the estimate, plus an error that is certain to lie in a
-//! cylinder, plus a normally distributed error. A task is checked by whether the set of all these poses lies in its
+//! cylinder, plus a normally distributed error. A task succeeds if the set of all these poses lies in its
 //! success set ([`PoseErrorSet::about`]). F then gives the knowledge after the task:
 //!
 //! | task | F |

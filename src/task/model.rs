@@ -1,4 +1,4 @@
-//! How driving changes the knowledge of the pose: the models [`BoundedDriveModel`] and [`Odometry`].
+//! The change of the pose knowledge by driving: the models [`BoundedDriveModel`] and [`Odometry`].
 //!
 //! Uses floats, on a host and when a controller starts: no decision is made here.
 #![allow(clippy::arithmetic_side_effects, clippy::float_arithmetic)]

@@ -1,4 +1,4 @@
-//! Paths: what a robot drives from its estimated pose to the pose where it should be.
+//! Paths that a robot drives from its estimated pose to a target pose.
 //!
 //! Uses floats, on a host and when a controller starts: no decision is made here.
 #![allow(clippy::float_arithmetic)]
@@ -73,7 +73,7 @@ impl Motion {
     }
 }
 
-/// How far the ends of a path or of a leg may be off: metres and radians.
+/// Tolerances at the ends of a path or of a leg: metres and radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ends {

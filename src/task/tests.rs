@@ -34,7 +34,7 @@ fn square_of(factor: &crate::set::SqrtFactor) -> Matrix3<f64> {
 }
 
 /// Returns the least eigenvalue of `larger - smaller`, in units in which `larger` is about 1.
-fn room(larger: &Matrix3<f64>, smaller: &Matrix3<f64>) -> f64 {
+fn least_excess(larger: &Matrix3<f64>, smaller: &Matrix3<f64>) -> f64 {
     let scale = Vector3::from_fn(|k, _| 1.0 / larger[(k, k)].sqrt());
     let scale = Matrix3::from_diagonal(&scale);
     let difference = scale * (larger - smaller) * scale;
@@ -129,7 +129,7 @@ proptest! {
         let ended = ended(&path, left, missed);
         let exact = odometry.grow(covariance, &estimate(begun), &ended) * r2;
         let got = square_of(&after.random.unwrap().factor);
-        prop_assert!(room(&got, &exact) >= -1e-9, "{got} {exact}");
+        prop_assert!(least_excess(&got, &exact) >= -1e-9, "{got} {exact}");
         if reach.0 == 0.0 && left == 0.0 {
             // The factor's heading is 2^-11 wider, with the driven length as its lever.
             let swung = way * way * 1.3e-3 * r2 * covariance[(2, 2)];
@@ -239,7 +239,7 @@ fn both_kinds_of_error_add_up() {
 }
 
 #[test]
-fn starts_that_are_too_far_are_told() {
+fn start_outside_its_tolerance_is_refused() {
     let drift = BoundedDriveModel {
         k_turn: 0.0,
         k_drift: 0.0,
@@ -262,7 +262,7 @@ fn starts_that_are_too_far_are_told() {
 }
 
 #[test]
-fn gains_below_zero_are_refused() {
+fn negative_gains_are_refused() {
     let drift = BoundedDriveModel {
         k_turn: 0.0,
         k_drift: -0.1,
@@ -326,7 +326,7 @@ fn arcs_are_tangent() {
 }
 
 #[test]
-fn turns_in_place_point_where_the_robot_looks() {
+fn turn_in_place_keeps_the_robots_direction() {
     for k in -1000..=1000 {
         let yaw = f64::from(k) * core::f64::consts::PI / 1000.0;
         let here = estimate([1.0, 2.0, yaw]);

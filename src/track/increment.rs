@@ -4,7 +4,8 @@ use crate::motion::MotionBounds;
 use crate::num::{BinaryAngle, Float, Rounding, sqrt_ceil};
 use crate::set::Q24_PER_RADIAN_Q52;
 
-/// A movement since the increment before, in the robot's axes at its start. It states when it began, so that a lost one is noticed.
+/// A movement since the previous increment, in the robot's axes at its start. It states its begin time, so that a lost increment is
+/// detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Increment {
@@ -16,7 +17,7 @@ pub struct Increment {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Step {
-    /// Along the robot's axis, micrometres: at most 4 m either way.
+    /// Along the robot's axis, micrometres: from -4 m to 4 m.
     pub x_um: i32,
     /// To the robot's left, micrometres.
     pub y_um: i32,
@@ -28,13 +29,13 @@ pub(super) struct Step {
 
 /// Half a turn, 2^-24 turn.
 const HALF_TURN_Q24: u64 = 1 << 23;
-/// The longest way of an increment on an axis, micrometres.
+/// The largest entry of an increment on an axis, micrometres.
 const LONGEST: i32 = 1 << 22;
 
 impl Increment {
     /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit, and the times of
-    /// its beginning and its end: the end of one is the beginning of the next. `None` if a number is not finite, a way is longer than
-    /// 4 m, or the turn is half a turn or more.
+    /// its beginning and its end: the end of one increment is the beginning of the next. `None` if a number is not finite, a length is
+    /// above 4 m, or the turn is half a turn or more.
     #[must_use]
     pub fn of(ahead_m: f64, left_m: f64, turn_rad: f64, span_ms: [u32; 2]) -> Option<Self> {
         let length = |value: f64| {
@@ -47,8 +48,8 @@ impl Increment {
         Self::new(length(ahead_m)?, length(left_m)?, turn.signed(), span_ms)
     }
 
-    /// Returns an increment from micrometres and units of 2^-32 turn, and the times of its beginning and its end. `None` if a way is longer
-    /// than 4 m.
+    /// Returns an increment from micrometres and units of 2^-32 turn, and the times of its beginning and its end. `None` if a length is
+    /// above 4 m.
     #[must_use]
     pub const fn new(
         ahead_um: i32,
@@ -78,7 +79,7 @@ impl Increment {
         [self.begins_ms, self.step.stamp_ms]
     }
 
-    /// Returns the ways ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn.
+    /// Returns the movement ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn.
     #[must_use]
     pub const fn entries(&self) -> [i32; 3] {
         [self.step.x_um, self.step.y_um, self.step.turn]
@@ -86,7 +87,7 @@ impl Increment {
 }
 
 impl Step {
-    /// The length of the way, micrometres, rounded up.
+    /// Returns the length of the movement, micrometres, rounded up.
     pub fn length_um(&self) -> u32 {
         if self.y_um == 0 {
             return self.x_um.unsigned_abs();
@@ -94,18 +95,18 @@ impl Step {
         sqrt_ceil(self.length_squared()) as u32
     }
 
-    /// The square of the length of the way, um^2: at most 2^45.
+    /// Returns the square of the length of the movement, um^2: at most 2^45.
     fn length_squared(&self) -> u64 {
         let [x, y] = [self.x_um, self.y_um].map(|v| u64::from(v.unsigned_abs()));
         x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y))
     }
 
-    /// The size of the turn, 2^-24 turn, rounded up.
+    /// Returns the magnitude of the turn, 2^-24 turn, rounded up.
     pub fn turn_q24(&self) -> u32 {
         self.turn.unsigned_abs().wrapping_add(0xff) >> 8
     }
 
-    /// Whether a robot can move like this within a time, with a millisecond for the rounding of both stamps.
+    /// Returns `true` if a robot can make this movement within `ms` and one millisecond for the rounding of both stamps.
     pub fn is_within(&self, bounds: MotionBounds, ms: u32) -> bool {
         let most = bounds.within(ms.saturating_add(1));
         let length_um = u64::from(most.translation_um().unsigned_abs().saturating_add(2));
@@ -113,7 +114,7 @@ impl Step {
             && self.turn_q24() <= most.yaw_q24().unsigned_abs().saturating_add(2)
     }
 
-    /// Returns the first `after` of `whole` parts of the movement, from its end.
+    /// Returns the last `after / whole` of the movement.
     pub fn part(&self, [after, whole]: [u32; 2]) -> Self {
         let share = |value: i32| {
             let product = i64::from(value).wrapping_mul(i64::from(after));

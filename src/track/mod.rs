@@ -1,9 +1,9 @@
-//! A fix carried forward by odometry: an estimate that came half a second ago, at the place where the robot is now.
+//! Carries a fix forward by odometry: an estimate of half a second ago becomes an estimate of the current pose.
 //!
 //! A [`Tracker`] keeps the newest fix of a slow source (AMCL, a tag detector) and the increments of the odometry since its stamp. In
-//! every control cycle [`Tracker::tracked`] gives a report for *now*: the pose is moved along, the covariance is carried by the
-//! adjoint of the way and grows by the odometry's noise, and what may have slipped is told beside it. A gate weighs it as any other
-//! report ([`crate::gate::Gate::step_on`]).
+//! every control cycle [`Tracker::tracked`] gives a report for *now*: the pose is moved along the path, and the covariance is
+//! carried by the adjoint of the path and grows by the odometry's noise. The slip is a bound next to the covariance. A gate evaluates
+//! the result as any other report ([`crate::gate::Gate::step_on`]).
 //!
 //! ```
 //! use posegate::motion::MotionBounds;
@@ -30,21 +30,21 @@
 //! };
 //! // The odometry at 50 Hz, 5 mm ahead each time. The fix arrives late.
 //! for cycle in 0..10u32 {
-//!     let increment = Increment::of(0.005, 0.0, 0.0, [940 + 20 * cycle, 960 + 20 * cycle]).expect("a short way");
+//!     let increment = Increment::of(0.005, 0.0, 0.0, [940 + 20 * cycle, 960 + 20 * cycle]).expect("a short movement");
 //!     tracker.odometry(increment)?;
 //! }
 //! tracker.fix(&fix)?;
-//! // The robot is 35 mm ahead of where it was at the stamp of the fix.
+//! // The robot is 35 mm ahead of its pose at the stamp of the fix.
 //! let tracked = tracker.tracked(1_150)?;
 //! assert_eq!(tracked.report.stamp_ms, 1_140);
 //! assert_eq!(tracked.report.belief.mean()?.x_um, 1_035_000);
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 //!
-//! # What it assumes
-//! The errors of the odometry are those of [`OdometryErrors`], beside the slip independent of the fix and from way to way. The
-//! tracker stands before both evaluations of a gate, as a filter does: a fault of its memory is not found by the second one.
-//! All numbers are integers; roundings and the curvature of the way's error are added outwards.
+//! # Assumptions
+//! The errors of the odometry are those of [`OdometryErrors`]. Except for the slip, they are independent of the fix and of each other.
+//! Both evaluations of a gate use the tracker's result, as that of a filter: the second evaluation does not detect a fault of its
+//! memory. All numbers are integers; roundings and the curvature of the path's error are added outwards.
 
 use crate::gate::{Evidence, Reason};
 use crate::motion::MotionBounds;
@@ -67,22 +67,22 @@ mod ring;
 mod tests;
 mod way;
 
-/// What a tracker needs to know.
+/// The settings of a tracker.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrackerSettings {
     /// The errors of the odometry.
     pub errors: OdometryErrors,
-    /// How fast the robot moves at most. A larger increment is a jump.
+    /// The largest speeds of the robot. A larger increment is a jump.
     pub bounds: MotionBounds,
-    /// How far the covariances of fixes are trusted. The tracker applies it, so the gate's source is declared with
+    /// The trust in the covariances of fixes. The tracker applies it, so the gate's source is declared with
     /// [`Trust::FULL`].
     pub trust: Trust,
     /// The squared radius of the table ([`crate::table::Table::radius_squared`]).
     pub radius_squared: RadiusSquared,
     /// The longest time between two increments, and from the newest to now, milliseconds.
     pub maximum_gap_ms: u32,
-    /// The oldest fix that is carried, milliseconds. Its growth limits its use long before that.
+    /// The largest age of a carried fix, milliseconds. The growth of its set usually ends its use much earlier.
     pub maximum_fix_age_ms: u32,
 }
 
@@ -92,12 +92,12 @@ pub struct TrackerSettings {
 pub struct Tracked {
     /// The report, with the stamp of the newest odometry.
     pub report: Report,
-    /// What may have slipped, and what the numbers leave out: beside the covariance.
+    /// Bound of the slip and of the rounding errors, in addition to the covariance.
     pub beside: Growth,
 }
 
 impl Tracked {
-    /// Returns what a gate weighs.
+    /// Returns the evidence for [`crate::gate::Gate::step_on`].
     #[must_use]
     pub const fn evidence(&self) -> Evidence<'_> {
         Evidence {
@@ -110,14 +110,14 @@ impl Tracked {
     }
 }
 
-/// A fix, and the way since its stamp.
+/// A fix, and the path since its stamp.
 #[derive(Clone, Copy, Debug)]
 struct Fix {
     report: Report,
     way: Way,
 }
 
-/// Carries the newest fix along the odometry. N is the number of increments that are kept for fixes that come late.
+/// Carries the newest fix along the odometry. N is the number of increments that are kept for late fixes.
 #[derive(Debug)]
 pub struct Tracker<const N: usize> {
     settings: TrackerSettings,
@@ -129,7 +129,7 @@ pub struct Tracker<const N: usize> {
     /// The stamp of the newest increment, if there is one.
     newest_ms: Option<u32>,
     fix: Option<Fix>,
-    /// The number of reports that were given, and the stamp of the last.
+    /// The number of reports returned, and the stamp of the last.
     sequence: u32,
     given_ms: Option<u32>,
 }
@@ -154,15 +154,15 @@ impl<const N: usize> Tracker<N> {
         })
     }
 
-    /// Takes an increment of the odometry: the movement since the one before.
+    /// Takes an increment of the odometry: the movement since the previous increment.
     ///
     /// # Errors
-    /// [`Reason::OdometryGap`], [`Reason::OdometryJump`] or [`Reason::OdometryBackwards`]. The way is then broken: the tracker begins
-    /// again with this increment, and waits for a fix that is newer. Close the gate with the reason
+    /// [`Reason::OdometryGap`], [`Reason::OdometryJump`] or [`Reason::OdometryBackwards`]. The path is then broken: the tracker
+    /// restarts with this increment, and waits for a newer fix. Close the gate with the reason
     /// ([`crate::gate::Gate::inhibit`]).
     pub fn odometry(&mut self, increment: Increment) -> Result<(), Reason> {
         let Some(before) = self.newest_ms else {
-            // Where it began is not known, so it only marks the time.
+            // Its beginning is unknown, so it only marks the time.
             self.restart(increment.step.stamp_ms);
             return Ok(());
         };
@@ -171,7 +171,7 @@ impl<const N: usize> Tracker<N> {
         let broken = if !(1..1 << 31).contains(&passed) {
             Some(Reason::OdometryBackwards)
         } else if begins_ms != before || !(passed <= self.settings.maximum_gap_ms) {
-            // One that began elsewhere: another was lost in between.
+            // It began at another time: an increment was lost in between.
             Some(Reason::OdometryGap)
         } else if !step.is_within(self.settings.bounds, passed) {
             Some(Reason::OdometryJump)
@@ -195,12 +195,12 @@ impl<const N: usize> Tracker<N> {
         Ok(())
     }
 
-    /// Forgets the fix: for one that came and cannot be carried, such as one of several hypotheses.
+    /// Discards the fix. Call it after a fix that cannot be carried, such as one with several hypotheses.
     pub fn drop_fix(&mut self) {
         self.fix = None;
     }
 
-    /// Forgets the way and the fix, as after a jump: for odometry that is not a number. The next increment marks only the time.
+    /// Discards the path and the fix, as after a jump. Call it for odometry that is not a number. The next increment only marks the time.
     pub fn forget(&mut self) {
         self.restart(self.newest_ms.unwrap_or(0));
         self.newest_ms = None;
@@ -213,15 +213,15 @@ impl<const N: usize> Tracker<N> {
         self.fix = None;
     }
 
-    /// Takes a fix, also one that comes late: it is carried along the increments since its stamp.
+    /// Takes a fix, also a late one: it is carried along the increments since its stamp.
     ///
     /// All fixes come from one source, each with another sequence number: a source that sends an old estimate with a new stamp would
     /// place the robot where it was. After such a fix, and after one of another source, nothing is carried until the next.
     ///
     /// # Errors
     /// [`Reason::Silent`] if there was no odometry yet; [`Reason::OdometryTooShort`] if the kept increments do not reach back to the
-    /// stamp; [`Reason::TimeBackwards`] if the fix is not newer than the one that is carried, or newer than the odometry by more than
-    /// its longest gap. The tracker then carries what it carried before. [`Reason::SequenceStuck`], [`Reason::SourceChanged`] or
+    /// stamp; [`Reason::TimeBackwards`] if the fix is not newer than the carried fix, or newer than the odometry by more than
+    /// its longest gap. The tracker then keeps the previous fix. [`Reason::SequenceStuck`], [`Reason::SourceChanged`] or
     /// [`Reason::FrameMismatch`]: the tracker then carries nothing.
     pub fn fix(&mut self, report: &Report) -> Result<(), Reason> {
         let newest = self.newest_ms.ok_or(Reason::Silent)?;
@@ -248,7 +248,7 @@ impl<const N: usize> Tracker<N> {
         let mut way = Way::START;
         let ahead = report.stamp_ms.wrapping_sub(newest);
         if ahead < 1 << 31 {
-            // At the newest odometry or after it. What the robot moved in between counts twice, in both directions: once as the
+            // At the newest odometry or after it. The movement in between counts twice, in both directions: once as the
             // part of the next increment before the fix.
             if !(ahead <= self.settings.maximum_gap_ms) {
                 return Err(Reason::TimeBackwards);
@@ -285,7 +285,7 @@ impl<const N: usize> Tracker<N> {
         Ok(())
     }
 
-    /// Returns the report for now: the newest fix at the place of the newest odometry.
+    /// Returns the report for now: the newest fix, carried to the newest odometry.
     ///
     /// # Errors
     /// [`Reason::Silent`] without a fix; [`Reason::OdometryGap`] if the newest odometry is too old; [`Reason::Stale`] if the fix is;
@@ -340,7 +340,7 @@ impl<const N: usize> Tracker<N> {
                 translation_m,
                 yaw_rad,
             } => {
-                // The cylinder is carried beside the noise of the way, which is an ellipsoid.
+                // The cylinder is carried separately from the noise of the path, which is an ellipsoid.
                 let cylinder = Growth::of(*translation_m, *yaw_rad)
                     .filter(|growth| growth.translation_um() > 0 && growth.yaw_q24() > 0)
                     .ok_or(Reason::BoundInvalid)?;
@@ -362,9 +362,9 @@ impl<const N: usize> Tracker<N> {
     }
 }
 
-/// Returns for how long a robot at its bounds moves as far as it can be from an even movement, milliseconds, when a time of an increment
-/// of `whole` is left: with a known end, at most `2 after (whole - after) / whole`. Rounded up, with a millisecond for the stamps of the
-/// increment.
+/// Returns the largest deviation from an even movement, as the time in milliseconds that a robot at its bounds needs for it, when
+/// `after` of an increment of `whole` is left: with a known end, at most `2 after (whole - after) / whole`. Rounded up, with a
+/// millisecond for the stamps of the increment.
 fn unevenness([after, whole]: [u32; 2]) -> u32 {
     let before = whole.wrapping_sub(after);
     let product = u64::from(after)
@@ -374,7 +374,7 @@ fn unevenness([after, whole]: [u32; 2]) -> u32 {
     (ms as u32).saturating_add(2)
 }
 
-/// What a way adds to a covariance, in the robot's axes at its start, turned into world axes.
+/// Returns the noise of a path, in the robot's axes at its start, rotated into world axes.
 fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
     let (c, s) = (i128::from(c), i128::from(s));
     // Below 2^30 and 2^60 each, so below 2^121.

@@ -2,26 +2,26 @@
 
 use crate::num::{Float, Rounding};
 
-/// How far an odometry errs. Deviations grow with the root of the way, as the sum of many small independent errors does; slip is a
-/// bound: a share of every movement that may be wrong in the worst direction.
+/// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip
+/// is a bound: the share of every movement that may be wrong in the worst direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OdometryErrors {
-    /// Deviation of the place on each axis, metres per root of a metre driven.
+    /// Standard deviation of the position on each axis, metres per root of a metre driven.
     pub m_per_sqrt_m: f64,
-    /// Deviation of the heading, radians per root of a radian turned.
+    /// Standard deviation of the heading, radians per root of a radian turned.
     pub rad_per_sqrt_rad: f64,
-    /// Deviation of the heading, radians per root of a metre driven.
+    /// Standard deviation of the heading, radians per root of a metre driven.
     pub rad_per_sqrt_m: f64,
-    /// Deviation of the place on each axis, metres per root of a second.
+    /// Standard deviation of the position on each axis, metres per root of a second.
     pub m_per_sqrt_s: f64,
-    /// Deviation of the heading, radians per root of a second.
+    /// Standard deviation of the heading, radians per root of a second.
     pub rad_per_sqrt_s: f64,
-    /// The share of a way that may be wrong, in any direction.
+    /// The share of a driven length that may be wrong, in any direction.
     pub slip: f64,
-    /// The share of a turn that may be wrong, either way.
+    /// The share of a turn that may be wrong, in either direction.
     pub turn_slip: f64,
-    /// The turn that may be wrong beside that, radians per metre driven.
+    /// The additional turn that may be wrong, radians per metre driven.
     pub turn_slip_per_m: f64,
 }
 
@@ -39,7 +39,7 @@ impl OdometryErrors {
     };
 }
 
-/// The same in units of the way: variances in um^2 and squares of 2^-24 turn, 2^-8.
+/// The errors in units of the path: variances in um^2 and squares of 2^-24 turn, 2^-8.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Noise {
     plane_per_um: u64,
@@ -93,7 +93,7 @@ impl Noise {
         })
     }
 
-    /// The variances that a movement adds: um^2 on each axis, and squares of 2^-24 turn; rounded up.
+    /// Returns the variances that a movement adds: um^2 on each axis, and squares of 2^-24 turn; rounded up.
     pub fn variances(&self, length_um: u32, turn_q24: u32, ms: u32) -> [i64; 2] {
         let part = |per: u64, of: u32| per.saturating_mul(u64::from(of));
         let up = |sum: u64| i64::try_from((sum >> 8).saturating_add(1)).unwrap_or(i64::MAX);
@@ -104,7 +104,7 @@ impl Noise {
         [up(plane), up(turn)]
     }
 
-    /// What may have slipped on a way: micrometres and 2^-24 turn, rounded up.
+    /// Returns the bound of the slip on a path: micrometres and 2^-24 turn, rounded up.
     pub fn slip(&self, length_um: u64, turned_q24: u64) -> [u64; 2] {
         let up = |per: u64, of: u64, down: u32| {
             let product = u128::from(per).wrapping_mul(u128::from(of));
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_that_are_no_numbers_are_refused() {
+    fn invalid_errors_are_refused() {
         for bad in [-1e-9, f64::NAN, f64::INFINITY, 1e9] {
             for which in 0..8 {
                 let mut all = [0.0; 8];

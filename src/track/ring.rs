@@ -24,7 +24,7 @@ impl<const N: usize> Ring<N> {
         *self = Self::new();
     }
 
-    /// Adds the newest increment. Returns the oldest one if it had to leave.
+    /// Adds the newest increment. Returns the oldest one if it is overwritten.
     pub fn push(&mut self, newest: Step) -> Option<Step> {
         let Err(newest) = self.items.push(newest) else {
             return None;
@@ -51,7 +51,7 @@ mod tests {
     use std::vec::Vec as List;
 
     #[test]
-    fn it_keeps_the_newest_in_order() {
+    fn ring_keeps_newest_entries_in_order() {
         let of = |stamp_ms| Step {
             x_um: 1,
             y_um: 2,

@@ -98,10 +98,10 @@ fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// Drives with fixes and odometry that err as they say. The carried sets hold the truth as often as they should, and are hardly larger
-/// than those of an exact propagation in floats.
+/// Drives with fixes and odometry whose errors are as stated. The carried sets contain the truth as often as required, and are hardly
+/// larger than those of an exact propagation in floats.
 #[test]
-fn carried_sets_hold_the_truth_and_are_not_much_larger_than_exact_ones() {
+fn carried_sets_contain_truth_and_are_nearly_exact() {
     let mut random = Random(5);
     let sigma = [0.02, 0.03, 0.015];
     let p: Matrix = core::array::from_fn(|i| {
@@ -173,7 +173,7 @@ fn carried_sets_hold_the_truth_and_are_not_much_larger_than_exact_ones() {
                 if i == 2 { wrapped(by) } else { by }
             });
             held[place] += u32::from(level(&carried, e) <= 11.3449);
-            // The area of the plane's ellipse grown by what is beside it, and that of the exact one.
+            // The area of the plane's ellipse grown by the slip, and that of the exact ellipse.
             let area = |p: &Matrix, more: f64| {
                 let det = p[0][0] * p[1][1] - p[0][1] * p[0][1];
                 let middle = 0.5 * (p[0][0] + p[1][1]);
@@ -199,9 +199,9 @@ fn carried_sets_hold_the_truth_and_are_not_much_larger_than_exact_ones() {
     assert!(median <= 1.3, "{median}");
 }
 
-/// An odometry that slips by as much as it may, in the worst way: the truth is within what is told beside.
+/// An odometry that slips by its bound in the worst direction: the truth is within the reported movement.
 #[test]
-fn slip_at_its_bound_is_told_beside() {
+fn slip_at_its_bound_is_reported_as_movement() {
     let mut random = Random(9);
     let slipping = OdometryErrors {
         slip: 0.05,
@@ -261,9 +261,9 @@ fn slip_at_its_bound_is_told_beside() {
     }
 }
 
-/// A fix that comes 300 ms late gives what it gives in time; one between two increments lies between, and says what is open.
+/// A fix that arrives 300 ms late gives the same result as in time. A fix between two increments lies between, with a larger bound.
 #[test]
-fn a_late_fix_is_carried_along_the_increments_since_its_stamp() {
+fn late_fix_is_carried_along_increments_since_its_stamp() {
     let p = [[1e-4, 0.0, 0.0], [0.0, 2e-4, 0.0], [0.0, 0.0, 1e-4]];
     let report = fix([0.5, 0.25, 1.0], p, 1_100);
     let way = |cycle: u32| {
@@ -292,7 +292,7 @@ fn a_late_fix_is_carried_along_the_increments_since_its_stamp() {
 }
 
 #[test]
-fn what_breaks_the_way_is_named() {
+fn broken_path_has_its_reason() {
     let p = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
     let span = |span_ms: [u32; 2]| Increment::of(0.004, 0.0, 0.0, span_ms).unwrap();
     let ready = || {
@@ -330,7 +330,7 @@ fn what_breaks_the_way_is_named() {
         (span([newest - 20, newest]), Reason::OdometryBackwards),
         (span([newest, newest - 1]), Reason::OdometryBackwards),
         (span([newest, newest + 61]), Reason::OdometryGap),
-        // The one from 180 to 200 ms was lost.
+        // The increment from 180 to 200 ms was lost.
         (span([newest + 20, newest + 40]), Reason::OdometryGap),
         (span([newest - 1, newest + 20]), Reason::OdometryGap),
         (
@@ -345,7 +345,7 @@ fn what_breaks_the_way_is_named() {
         let mut tracker = ready();
         tracker.fix(&good).unwrap();
         assert_eq!(tracker.odometry(increment), Err(reason));
-        // The way is broken: the old fix is of no use.
+        // The path is broken: the old fix is not used.
         assert_eq!(tracker.tracked(newest + 20), Err(Reason::Silent));
     }
     // A source that is stuck, another one, and another frame: nothing is carried any more.
@@ -369,7 +369,7 @@ fn what_breaks_the_way_is_named() {
         assert_eq!(tracker.fix(&next), Err(reason));
         assert_eq!(tracker.tracked(newest), Err(Reason::Silent));
     }
-    // A fix grows old where the odometry goes on.
+    // A fix grows old while the odometry continues.
     let mut tracker = ready();
     tracker.fix(&good).unwrap();
     let mut now = newest;
@@ -380,12 +380,12 @@ fn what_breaks_the_way_is_named() {
     assert!(tracker.tracked(5_150).is_ok());
     tracker.odometry(span([now, now + 1])).unwrap();
     assert_eq!(tracker.tracked(5_151), Err(Reason::Stale));
-    // It is dropped, so that it does not seem new when the clock wraps.
+    // The fix is dropped, so that it does not seem new when the clock wraps.
     tracker.odometry(span([now + 1, now + 41])).unwrap();
     assert_eq!(tracker.tracked(now + 41), Err(Reason::Silent));
 }
 
-/// Every report is new to a gate if the odometry is, and a repeated one is the same.
+/// Every report is new to a gate if the odometry is new; a repeated report is the same.
 #[test]
 fn sequence_numbers_count_the_stamps() {
     let p = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
@@ -404,7 +404,7 @@ fn sequence_numbers_count_the_stamps() {
     assert_eq!(second.report.stamp_ms, 20);
 }
 
-/// A bounded fix is carried beside the noise of the way.
+/// A bounded fix is carried separately from the noise of the path.
 #[test]
 fn a_bounded_fix_is_carried_as_a_cylinder() {
     let mut tracker = Tracker::<8>::new(settings(ERRORS)).unwrap();

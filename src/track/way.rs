@@ -1,7 +1,8 @@
-//! The way of a robot since a fix: its sum, what its noise adds to a covariance, and how long it is.
+//! The path of a robot since a fix: its sum, its noise, and its length.
 //!
-//! Everything is in the robot's axes at the fix. An increment `w` (turned to these axes) moves the error of the place by `J w` times the
-//! error of the heading, so the covariance N of both grows by `G N G'` and the increment's own noise.
+//! Everything is in the robot's axes at the fix. An increment `w` (turned to these axes) moves the error of the
+//! position by `J w` times the error of the heading. So the covariance N of both grows by `G N G'` and the
+//! increment's own noise.
 
 use super::increment::Step;
 use super::model::Noise;
@@ -13,31 +14,31 @@ use crate::set::{Growth, PathNoise, RadiusSquared};
 const LEVER_Q56: u32 = 1_216_271_633;
 /// The fraction of 2 pi times 2^32, unit 2^-32.
 const LEVER_REST: u32 = 189_141_414;
-/// What roundings take off the entries on the diagonal in one increment, at most. A product is off by less than 1.8 units; one of a product,
-/// for a way of 4 m on each axis, by less than 5.6. So the entries of x and y, and the one between them, are off by 9.2, and those with
+/// Most by which roundings lower the entries on the diagonal in one increment. A product is off by less than 1.8 units; one of a product,
+/// for a movement of 4 m on each axis, by less than 5.6. So the entries of x and y, and the one between them, are off by 9.2, and those with
 /// the yaw by 1.8; half of an odd variance is off by 1.2 and 2.5 more. A symmetric matrix does not get smaller if each entry on its diagonal
 /// grows by the errors in its row: 28.
 const ROUNDED: i64 = 32;
-/// The largest noise that is carried: a heading that is off by two turns, a place that is off by 500 m.
+/// The largest noise that is carried: an error of two turns in the heading, of 500 m in the position.
 const WIDEST_TURN: i64 = 1 << 50;
 const WIDEST_PLANE: i64 = 1 << 58;
-/// Fraction bits of the place.
+/// Fraction bits of the position.
 const FINER: u32 = 8;
 
-/// The way since a fix.
+/// The path since a fix.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
-    /// The place, 2^-8 um.
+    /// The position, 2^-8 um.
     x: i64,
     y: i64,
     /// The turn, 2^-32 turn, wrapping.
     turn: u32,
-    /// What the noise adds.
+    /// The covariance that the noise adds.
     noise: PathNoise,
-    /// The length of the way, micrometres, and the sum of its turns, 2^-24 turn: up.
+    /// The length of the path, micrometres, and the sum of its turns, 2^-24 turn: rounded up.
     length_um: u64,
     turned_q24: u64,
-    /// What the first increment may have of the time before the fix.
+    /// Bound of the part of the first increment that belongs to the time before the fix.
     left_out: Growth,
 }
 
@@ -108,11 +109,11 @@ impl Way {
         self.turned_q24 = self.turned_q24.saturating_add(u64::from(turn_q24));
         let n = &mut self.noise;
         if n.tt >= WIDEST_TURN || n.xx.max(n.yy) >= WIDEST_PLANE {
-            // Without use, and refused later: such a sum is not carried.
+            // Too large to be used, and refused later: such a sum is not carried.
             n.tt = i64::MAX;
             return;
         }
-        // Below 2^31: the ways are at most 2^22 um on each axis.
+        // Below 2^31: increments are at most 2^22 um on each axis.
         let (a, b) = ((y as i32).wrapping_neg(), x as i32);
         // The heading errs all along the increment: of its own variance q, `q l / 2` is shared with the place aside, and `q l^2 / 3`
         // is there. Half of q at the start gives the one, and more than the other along one direction.
@@ -139,7 +140,7 @@ impl Way {
         n.tt = n.tt.saturating_add(turn).saturating_add(ROUNDED);
     }
 
-    /// States what the first increment may have of the time before the fix.
+    /// Sets the bound of the part of the first increment that belongs to the time before the fix.
     pub fn leave_out(&mut self, growth: Growth) {
         self.left_out = self.left_out.plus(growth);
     }
@@ -148,7 +149,7 @@ impl Way {
         self.turn
     }
 
-    /// Returns the place in world axes, micrometres, for a heading at the fix.
+    /// Returns the position in world axes, micrometres, for a heading at the fix.
     pub fn in_world(&self, yaw: BinaryAngle) -> [i64; 2] {
         let [c, s] = yaw.cos_sin_q30().map(i128::from);
         let (x, y) = (i128::from(self.x), i128::from(self.y));
@@ -159,12 +160,12 @@ impl Way {
         ]
     }
 
-    /// Returns what the noise adds, in world axes, for a heading at the fix.
+    /// Returns the covariance that the noise adds, in world axes, for a heading at the fix.
     pub fn noise_in_world(&self, yaw: BinaryAngle) -> PathNoise {
         turned(&self.noise, yaw.cos_sin_q30())
     }
 
-    /// Returns what may have slipped, with what the roundings of the place take off: a turn that slips swings all of the way after it.
+    /// Returns the bound of the slip and of the rounding of the position: a slip of a turn rotates the whole path after it.
     pub fn slip(&self, noise: &Noise) -> Growth {
         let [length, turn] = noise.slip(self.length_um, self.turned_q24);
         let turn = turn.saturating_add(u64::from(self.left_out.yaw_q24().unsigned_abs()));
@@ -178,13 +179,13 @@ impl Way {
         Growth::new(limited(length), limited(turn.saturating_add(1)))
     }
 
-    /// Returns how far a turn by up to `yaw_q24` at the start moves the end, micrometres, up.
+    /// Returns the largest movement of the end by a turn of up to `yaw_q24` at the start, micrometres, rounded up.
     pub fn swung(&self, yaw_q24: i32) -> u32 {
         let swung = self.chord(u64::from(yaw_q24.unsigned_abs()));
         u32::try_from(swung).unwrap_or(u32::MAX)
     }
 
-    /// The way's length times a turn, micrometres, up.
+    /// Returns the path's length times a turn, micrometres, rounded up.
     fn chord(&self, turn_q24: u64) -> u64 {
         let product = u128::from(self.length_um).wrapping_mul(u128::from(turn_q24));
         // 2 pi / 2^24 from above.
@@ -192,8 +193,8 @@ impl Way {
         u64::try_from(swung).unwrap_or(u64::MAX).saturating_add(1)
     }
 
-    /// Returns what the curvature of the way's error adds: a heading that is off by t moves the end of the way along a circle, which
-    /// leaves its tangent by at most `L t^2 / 2`.
+    /// Returns the bound of the curvature of the path's error: an error t of the heading moves the end of the path along a circle, which
+    /// deviates from its tangent by at most `L t^2 / 2`.
     pub fn curvature(&self, covariance: &[[f64; 3]; 3], radius_squared: RadiusSquared) -> Growth {
         let [.., [_, _, tt]] = covariance;
         // The square of the largest turn, rad^2 times 2^-32.
@@ -231,7 +232,7 @@ mod tests {
     }
 
     proptest! {
-        /// One increment of any length: what is carried is not smaller than the exact `G N G' + Q`, and larger by the roundings alone.
+        /// One increment of any length: the carried noise is not smaller than the exact `G N G' + Q`, and larger only by the roundings.
         #[test]
         fn carried_noise_is_never_smaller_than_the_exact_one(
             roots in prop::array::uniform9(-1.0e6..1.0e6f64),
@@ -268,7 +269,7 @@ mod tests {
             let found = matrix(&way.noise);
             let more: Matrix = core::array::from_fn(|r| core::array::from_fn(|s| {
                 let mut exact = if r == s { own[r] } else { 0.0 };
-                // What the increment's own turn adds.
+                // The error of the increment's own turn.
                 exact += own[2] * match (r, s) {
                     (2, 2) => 0.0,
                     (2, k) | (k, 2) => [p, q][k] / 2.0,
@@ -291,7 +292,7 @@ mod tests {
         }
     }
 
-    /// One coarse increment is not more certain than many fine ones of the same way.
+    /// One coarse increment is not more certain than many fine increments of the same path.
     #[test]
     fn a_coarse_increment_is_not_more_certain_than_fine_ones() {
         let errors = OdometryErrors {
@@ -324,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_without_use_is_not_carried() {
+    fn unused_noise_is_not_carried() {
         let noise = Noise::of(&OdometryErrors::NONE).unwrap();
         let increment = Step {
             x_um: 1 << 22,

@@ -191,8 +191,8 @@ impl BuildError {
     }
 }
 
-/// Bakes a table and proves it. If facets are not proven, more of the set is given up for them ([`Effort`]);
-/// pieces that are still not proven are left out. `auto` writes facets; it falls back to a grid if the set has no facets, if they exceed the
+/// Bakes a table and proves it. If facets are not proven, they are moved inwards ([`Effort`]);
+/// pieces that are still not proven are omitted. `auto` writes facets; it falls back to a grid if the set has no facets, if they exceed the
 /// format, or if none are proven.
 ///
 /// # Errors

@@ -173,7 +173,7 @@ mod tests {
     /// The baked number is the nearest; its neighbour may also be accepted in a narrow case, and nothing
     /// beyond.
     #[test]
-    fn the_nearest_numbers_and_no_others_are_proven() {
+    fn only_nearest_integers_are_proven() {
         for tilt_deg in [0.0, 12.3, -98.7] {
             let success = odd(tilt_deg);
             let record = sight_record(&success).unwrap();

@@ -51,7 +51,7 @@ fn runs_across_parts_are_proven() {
 /// More effort for one piece can lengthen the layout's lever, and so increase the decision's rounding errors for
 /// the others: pieces that were proven before are proven again.
 #[test]
-fn pieces_are_proven_beside_each_other() {
+fn adjacent_pieces_are_proven() {
     let square =
         |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
     let robot = [
@@ -94,7 +94,7 @@ fn round(corners: u32, radius: f64) -> Vec<[f64; 2]> {
 
 /// A set without a pose in the table's extent, although each of its constraints has one.
 #[test]
-fn what_is_empty_is_told() {
+fn set_without_pose_in_extent_names_its_constraint() {
     let footprint = Footprint::new(
         vec![[0.4, 0.2], [-0.4, 0.2], [-0.4, -0.2], [0.4, -0.2]],
         vec![[0.35, 1.0], [-0.35, 1.0], [-0.35, -1.0], [0.35, -1.0]],
@@ -116,7 +116,7 @@ fn what_is_empty_is_told() {
 
 /// A robot with more corners than facets have frames.
 #[test]
-fn what_has_too_many_corners_for_facets_has_cells() {
+fn set_with_too_many_corners_gets_cells() {
     let region = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
     let footprint = Footprint::new(round(300, 0.3), region).unwrap();
     let success = set(0.0, Shape::Footprint(footprint));

@@ -52,7 +52,7 @@ mod tests {
     proptest! {
         /// Compares with the `cobs` crate in both directions.
         #[test]
-        fn it_is_the_encoding(plain in proptest::collection::vec(prop_oneof![Just(0u8), any::<u8>()], 1..118)) {
+        fn cobs_matches_reference_encoding(plain in proptest::collection::vec(prop_oneof![Just(0u8), any::<u8>()], 1..118)) {
             let mut theirs = [0u8; 300];
             let length = ::cobs::try_encode(&plain, &mut theirs).unwrap();
             let ours = encode(&plain).unwrap();
@@ -63,7 +63,7 @@ mod tests {
         }
 
         #[test]
-        fn nonsense_is_no_more_than_the_crate_takes(frame in proptest::collection::vec(1u8..=255, 1..119)) {
+        fn decoded_frames_equal_those_of_cobs_crate(frame in proptest::collection::vec(1u8..=255, 1..119)) {
             let mut theirs = [0u8; 300];
             let report = ::cobs::decode(&frame, &mut theirs);
             match (decode(&frame), report) {

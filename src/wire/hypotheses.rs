@@ -1,7 +1,7 @@
 //! A report with several hypotheses: one message for each, then the report with their number (version 2).
 //!
-//! A controller must not evaluate a report without a hypothesis that was lost on the line, so the report states how many there are.
-//! The messages carry no weights: a sender that leaves hypotheses out inflates its covariances, or denies by itself.
+//! A controller must not evaluate a report if one of its hypotheses was lost on the line, so the report states their number.
+//! The messages carry no weights: a sender that omits hypotheses inflates its covariances, or does not send the report.
 
 use super::report::{REPORT, body_of, read};
 use super::{LONGEST_BODY, WireError};
@@ -36,7 +36,7 @@ fn typed(message: u8, number: u8, report: &Report) -> Option<Vec<u8, LONGEST_BOD
         .then(|| body_of(message | number, report))
 }
 
-/// What the hypotheses of a report have in common with it.
+/// The fields that the hypotheses of a report share with it.
 type Common = (u8, FrameId, u32, u32);
 
 fn common(report: &Report) -> Common {
@@ -53,7 +53,7 @@ fn common(report: &Report) -> Common {
 pub struct HypothesisCollector {
     others: Vec<PoseEstimate, OTHERS>,
     of: Option<Common>,
-    /// The report that was completed.
+    /// The completed report.
     report: Option<Report>,
 }
 
@@ -76,12 +76,12 @@ impl HypothesisCollector {
         }
     }
 
-    /// Takes the body of a message: a hypothesis, or a report with or without hypotheses. Returns the report with its hypotheses, once
-    /// it has come.
+    /// Takes the body of a message: a hypothesis, or a report with or without hypotheses. Returns the report with its hypotheses as soon
+    /// as it is complete.
     ///
     /// # Errors
-    /// [`WireError::Content`] if the body is neither, if a hypothesis is missing, or if one belongs to another report. What was
-    /// collected is then forgotten.
+    /// [`WireError::Content`] if the body is neither, if a hypothesis is missing, or if a hypothesis belongs to another report. The
+    /// collected hypotheses are then discarded.
     pub fn take(&mut self, body: &[u8]) -> Result<Option<Evidence<'_>>, WireError> {
         if self.report.take().is_some() {
             self.forget();
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn hypotheses_come_with_their_report() {
+    fn hypotheses_round_trip_with_their_report() {
         let mut collector = HypothesisCollector::new();
         for others in [0, 1, 7, 3, 0] {
             let sequence = 40 + u32::from(others);
@@ -182,7 +182,7 @@ mod tests {
     proptest! {
         /// Whatever is lost, doubled or reordered: a report that is returned has all of its hypotheses.
         #[test]
-        fn no_report_comes_without_a_hypothesis(
+        fn returned_report_has_all_its_hypotheses(
             counts in prop::collection::vec(0u8..=7, 1..6),
             order in prop::collection::vec(any::<prop::sample::Index>(), 1..40),
             keep_order: bool,
@@ -206,7 +206,7 @@ mod tests {
         }
 
         #[test]
-        fn nonsense_is_no_hypothesis(body in prop::collection::vec(any::<u8>(), 0..160)) {
+        fn collected_report_re_encodes_to_its_body(body in prop::collection::vec(any::<u8>(), 0..160)) {
             let mut collector = HypothesisCollector::new();
             if let Ok(Some(evidence)) = collector.take(&body) {
                 prop_assert_eq!(&super::super::report_body(evidence.report)[..], &body[..]);

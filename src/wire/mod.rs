@@ -40,7 +40,7 @@
 //! | | | | its reason, 0 for a permit | u8 |
 //! | | | | bytes received, bytes lost, frames refused, reports skipped | 4 u32 |
 //!
-//! Two more messages go to a gate of a robot that moves. A report with several hypotheses comes as one message for each of them, in
+//! Two more messages go to a gate of a robot that moves. A report with several hypotheses is sent as one message for each of them, in
 //! order, and then the report ([`HypothesisCollector`]); these have the bytes of a report, but the message is `0x10 + k` for hypothesis
 //! k and `0x20 + n` for the report after n hypotheses. An increment of the odometry ([`increment_body`]) is:
 //!
@@ -440,7 +440,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn requests_come_back_bit_for_bit(
+        fn requests_round_trip_bit_for_bit(
             bits in proptest::array::uniform12(any::<u64>()), sequence: u16, gaussian: bool,
         ) {
             let sent = request(bits, sequence, gaussian);
@@ -453,7 +453,7 @@ mod tests {
         }
 
         #[test]
-        fn a_flipped_bit_is_never_a_request(
+        fn request_with_flipped_bit_is_refused(
             bits in proptest::array::uniform12(any::<u64>()), at in 0usize..119, bit in 0u8..8,
         ) {
             let sent = request(bits, 7, true);
@@ -467,7 +467,7 @@ mod tests {
         }
 
         #[test]
-        fn garbage_is_survived(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+        fn receiver_recovers_after_random_bytes(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
             let mut stream = bytes;
             stream.push(0);
             let good = request([1; 12], 9, false);
@@ -478,7 +478,7 @@ mod tests {
         }
 
         #[test]
-        fn replies_come_back(
+        fn replies_round_trip(
             margin: u32, x_um: i32, y_um: i32, yaw: u32, interlock_high: bool,
         ) {
             let margin = Margin::from_q16(margin);
@@ -495,7 +495,7 @@ mod tests {
 
     /// The checksum cannot distinguish these bodies from their cut versions.
     #[test]
-    fn what_is_too_long_has_no_frame() {
+    fn too_long_body_has_no_frame() {
         let mut body = [0; LONGEST_BODY + 1];
         body[..4].fill(0xff);
         assert_eq!(checksum(&body), checksum(&body[..LONGEST_BODY]));
@@ -515,7 +515,7 @@ mod tests {
 
     /// The sender may be stricter than the site, but not less strict.
     #[test]
-    fn a_radius_below_the_tables_is_refused() {
+    fn radius_below_table_radius_is_refused() {
         let gates = [Evaluator::new(&[], 100).unwrap()];
         let mut asked = request([0; 12], 0, true);
         assert!(asked.evaluate(&gates).is_ok());
@@ -528,7 +528,7 @@ mod tests {
     }
 
     #[test]
-    fn a_radius_that_switches_the_check_off_is_no_request() {
+    fn radius_that_disables_the_check_is_refused() {
         let mut body = request([0; 12], 0, true).body();
         for byte in &mut body[13..17] {
             *byte = 0;

@@ -24,7 +24,7 @@ pub fn increment_body(increment: &Increment) -> Vec<u8, LONGEST_BODY> {
 /// Parses an increment from the body of a message.
 ///
 /// # Errors
-/// [`WireError::Content`] if the body is not an increment, or a way in it is longer than 4 m.
+/// [`WireError::Content`] if the body is not an increment, or an entry is longer than 4 m.
 pub fn increment_from_body(body: &[u8]) -> Result<Increment, WireError> {
     read(body).ok_or(WireError::Content)
 }
@@ -50,7 +50,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn increments_come_back_bit_for_bit(ahead in -4_194_304i32..=4_194_304, left in -4_194_304i32..=4_194_304, turn: i32, span: [u32; 2]) {
+        fn increments_round_trip_bit_for_bit(ahead in -4_194_304i32..=4_194_304, left in -4_194_304i32..=4_194_304, turn: i32, span: [u32; 2]) {
             let sent = Increment::new(ahead, left, turn, span).unwrap();
             let body = increment_body(&sent);
             prop_assert_eq!(increment_from_body(&body), Ok(sent));
@@ -60,7 +60,7 @@ mod tests {
         }
 
         #[test]
-        fn nonsense_is_no_increment(body in prop::collection::vec(any::<u8>(), 0..30)) {
+        fn decoded_increment_re_encodes_to_its_body(body in prop::collection::vec(any::<u8>(), 0..30)) {
             if let Ok(increment) = increment_from_body(&body) {
                 prop_assert_eq!(&increment_body(&increment)[..], &body[..]);
             }

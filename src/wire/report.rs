@@ -164,7 +164,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn reports_come_back_bit_for_bit(
+        fn reports_round_trip_bit_for_bit(
             bits: [u64; 17], heading in 0u8..3, spread in 0u8..3,
         ) {
             let sent = report(bits, heading, spread);
@@ -178,7 +178,7 @@ mod tests {
         }
 
         #[test]
-        fn nonsense_is_no_report(body in proptest::collection::vec(any::<u8>(), 0..160)) {
+        fn decoded_report_re_encodes_to_its_body(body in proptest::collection::vec(any::<u8>(), 0..160)) {
             if let Ok(report) = report_from_body(&body) {
                 prop_assert_eq!(&report_body(&report)[..], &body[..]);
             }
@@ -187,7 +187,7 @@ mod tests {
 
     /// Every flipped bit of every kind of report, and every truncation.
     #[test]
-    fn a_damaged_frame_is_never_a_report() {
+    fn damaged_frame_is_never_a_report() {
         let bits = core::array::from_fn(|i| (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let is_report = |bytes: &[u8]| {
             received(bytes)
@@ -251,7 +251,7 @@ mod tests {
 
     /// Neither version is taken for the other, and no other type is taken for a report.
     #[test]
-    fn versions_and_types_are_told_apart() {
+    fn other_versions_and_types_are_refused() {
         let body = report_body(&report([0; 17], 0, 1));
         assert!(Request::from_body(&body).is_err());
         for (at, wrong) in [

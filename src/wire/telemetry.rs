@@ -56,7 +56,7 @@ pub struct ReportOutcome {
 pub struct LinkCounters {
     /// Bytes received.
     pub bytes: u32,
-    /// Bytes lost: they came faster than they could be stored.
+    /// Bytes lost: they arrived faster than they could be stored.
     pub lost: u32,
     /// Frames that were damaged, or not reports.
     pub refused: u32,
@@ -197,7 +197,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn telemetry_comes_back(
+        fn telemetry_round_trips(
             words: [u32; 9], count: u16, source: u8, mark in 0u8..4, reasons: [u8; 2],
             flags in 0u8..8, fault in 0usize..5,
         ) {
@@ -229,7 +229,7 @@ mod tests {
 
         /// A body that is accepted as telemetry encodes back to the same bytes, so no bit is ignored.
         #[test]
-        fn nonsense_is_no_telemetry(
+        fn decoded_telemetry_re_encodes_to_its_body(
             tail in proptest::collection::vec(prop_oneof![Just(0u8), 0u8..5, any::<u8>()], 40..46),
         ) {
             let body = [&[VERSION_2, TELEMETRY][..], &tail].concat();

@@ -6,9 +6,9 @@
 
 use crate::oracle::{Pose, PoseSet, Rng, below, level, scale};
 use crate::sets::hard_case;
-use crate::trial::{Known, SCALE_ERROR, Trial, scaled, size, yaw};
+use crate::trial::{PriorKnowledge, SCALE_ERROR, Trial, scaled, size, yaw};
 
-/// Number of bases that are tried before a burst is given up.
+/// Number of bases to try before a burst is skipped.
 const TRIES: usize = 12;
 
 /// A pose-set with the scales at which it reaches the true border (scale 1) and the table's.
@@ -100,7 +100,7 @@ fn scale_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) 
         let set = rounded_otherwise(rng, &scaled(&base.set, by));
         // The moved set lies in the base's set at a scale that is larger by that of the move.
         let moved = level(&base.set, base.estimate, estimate);
-        let known = Known {
+        let known = PriorKnowledge {
             inside: by + moved <= 1.0 + SCALE_ERROR,
             near: border * off * whole <= trial.stage.cell,
         };
@@ -149,7 +149,7 @@ fn move_burst(rng: &mut Rng, trial: &mut Trial<'_>, base: &Base, count: usize) -
         let border = if rng.chance(0.7) { own } else { exact };
         let off = rng.log_within(1e-7, most);
         let t = border + if rng.chance(0.4) { off } else { -off };
-        let known = Known {
+        let known = PriorKnowledge {
             inside: !turns && t >= 0.0 && t <= exact,
             near: true,
         };

@@ -4,14 +4,14 @@ use crate::oracle::{
     Effort, Rng, pose_from_deg, random_estimate, random_pose_set, random_pose_set_near, scale_with,
     to_goal,
 };
-use crate::trial::{Known, SCALE_ERROR, Trial, core_set, scaled, size};
+use crate::trial::{PriorKnowledge, SCALE_ERROR, Trial, core_set, scaled, size};
 use posegate::contain::{decide_with_margin, examine};
 
 /// One random set per this number has its margin compared with s*.
 const RATIO_EVERY: usize = 20;
 
-/// Decides on three pose-sets: a random one, the same scaled to the border of what the table
-/// accepts, and scaled to the border of the true set, from below and from above. Fewer if there is no such
+/// Decides on three pose-sets: a random one, the same scaled to the border of acceptance by the
+/// table, and scaled to the border of the true set, from below and from above. Fewer if there is no such
 /// border, or if `most` is less.
 pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     let world = &trial.stage.world;
@@ -22,11 +22,11 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
         random_pose_set_near(rng, world, estimate).pose_set
     };
     let margins = core_set(estimate, &random).map_or([0.0; 2], |set| {
-        let [found, told] = [
+        let [found, reported] = [
             examine(&trial.table, &set).margin,
             decide_with_margin(&trial.table, &set).1,
         ];
-        [found, told].map(|margin| f64::from(margin.q16()) / 65536.0)
+        [found, reported].map(|margin| f64::from(margin.q16()) / 65536.0)
     });
     let [margin, _] = margins;
     let exact = scale_with(world, estimate, &random, Effort::Full, SCALE_ERROR);
@@ -67,7 +67,7 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     for (by, near) in scales.into_iter().take(most) {
         let set = scaled(&random, by);
         let inside = by <= exact;
-        trial.case(estimate, &set, Known { inside, near });
+        trial.case(estimate, &set, PriorKnowledge { inside, near });
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a campaign counts, and the line that it prints.
+//! The counts of a campaign, and the line that it prints.
 
 #[derive(Default)]
 pub struct Tally {
@@ -92,7 +92,7 @@ impl Tally {
     }
 
     /// Returns `true` if the campaign has enough permits and enough cases near a border to be meaningful.
-    pub fn is_telling(&self) -> bool {
+    pub fn is_meaningful(&self) -> bool {
         let share = self.permits as f64 / self.cases as f64;
         let telling = (0.3..=0.7).contains(&share)
             && 2 * self.near_border >= self.cases

@@ -24,9 +24,9 @@ pub struct Trial<'a> {
     pub tally: Tally,
 }
 
-/// What is known beforehand about a case.
+/// Prior knowledge about a case.
 #[derive(Clone, Copy)]
-pub struct Known {
+pub struct PriorKnowledge {
     /// The set lies in the success set, by a scale or a border that the oracle found.
     pub inside: bool,
     /// A border is within one cell.
@@ -35,7 +35,7 @@ pub struct Known {
 
 impl Trial<'_> {
     /// Decides on a case and counts it.
-    pub fn case(&mut self, estimate: Pose, set: &PoseSet, known: Known) {
+    pub fn case(&mut self, estimate: Pose, set: &PoseSet, known: PriorKnowledge) {
         self.tally.cases += 1;
         self.tally.near_border += usize::from(known.near);
         let turning = matches!(self.stage.success.shape, Shape::Visibility(_)) && yaw(set) > 0.05;

@@ -14,7 +14,7 @@ fn fault(lens: Lens, change: impl Fn(&mut Calibration)) -> LensError {
 }
 
 #[test]
-fn folds_within_the_image_are_refused_with_their_numbers() {
+fn folds_in_the_image_are_refused_with_their_radius() {
     // r - r^3 / 3 is largest at 1, where it is 2/3: 410 px * 2/3 along a row.
     let folding = Lens::PlumbBob([-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0]);
     let error = fault(folding, |c| c.focal_px = [410.0, 410.0]);
@@ -47,7 +47,7 @@ fn folds_within_the_image_are_refused_with_their_numbers() {
 }
 
 #[test]
-fn impossible_numbers_are_refused() {
+fn invalid_numbers_are_refused() {
     let of = |change: &dyn Fn(&mut Calibration)| fault(Lens::Pinhole, change).to_string();
     assert_eq!(of(&|c| c.focal_px[0] = 0.0), "fx is 0");
     assert_eq!(of(&|c| c.axis_px[1] = f64::INFINITY), "cy is inf");
@@ -80,7 +80,7 @@ fn impossible_numbers_are_refused() {
 
 /// A pinhole without a border is unchanged; with a border its four planes have moved.
 #[test]
-fn pinholes_stay_pinholes() {
+fn pinhole_window_is_its_image() {
     let plain = CertifiedCamera::of(&calibration(Lens::Pinhole)).unwrap();
     let camera = Camera::pinhole([640.0, 480.0], [410.0, 412.0], [325.5, 236.25]);
     assert_eq!((plain.camera, plain.kept), (camera, 1.0));

@@ -13,19 +13,19 @@ pub struct Case {
     pub movement: Growth,
 }
 
-/// How a source reports its belief.
+/// The form in which a source reports its estimate.
 #[derive(Clone, Copy, Debug)]
-pub struct Drawn {
+pub struct ReportForm {
     trust: Trust,
     /// 0: radians, 1: with turns, 2: roll, pitch and yaw, 3: a quaternion of a level robot, 4: a tilted one.
     heading: usize,
     tilt: [f64; 2],
     length: f64,
-    /// What a movement adds, as shares of the set's size and of its turn.
+    /// Growth by a movement, as shares of the set's size and of its turn.
     moved: [f64; 2],
 }
 
-impl Drawn {
+impl ReportForm {
     /// Headings in radians, without inflation.
     pub fn honest() -> Self {
         Self {
@@ -88,7 +88,7 @@ fn quaternion([roll, pitch]: [f64; 2], yaw: f64) -> [f64; 4] {
     [turn.i, turn.j, turn.k, turn.w]
 }
 
-pub fn drawn(rng: &mut Rng) -> Drawn {
+pub fn drawn(rng: &mut Rng) -> ReportForm {
     let inflation = if rng.chance(0.5) {
         Inflation::NONE
     } else {
@@ -100,7 +100,7 @@ pub fn drawn(rng: &mut Rng) -> Drawn {
         1 => CrossTerms::AllUnknown(share),
         _ => CrossTerms::Filled,
     };
-    Drawn {
+    ReportForm {
         trust: Trust {
             inflation,
             cross_terms,

@@ -138,7 +138,7 @@ fn record(random: &mut Random) -> SightRecord {
 
 /// Nothing overflows: at the ends of every range the answer and the distance are those of plain numbers.
 #[test]
-fn ends_of_ranges_are_right() {
+fn answers_are_correct_at_ends_of_ranges() {
     let mut random = Random(3);
     let (mut near, mut far, mut visible) = (0, 0, 0);
     let reach = f64::from(1 << 27);
@@ -203,9 +203,9 @@ fn ends_of_ranges_are_right() {
     );
 }
 
-/// A camera in the tag's middle sees nothing, and there is no division by zero.
+/// A camera in the tag's middle does not see the tag, and there is no division by zero.
 #[test]
-fn no_distance_is_no_angle() {
+fn zero_distance_gives_no_angle() {
     let mut random = Random(4);
     for _ in 0..1000 {
         let mut record = record(&mut random);
@@ -224,7 +224,7 @@ fn no_distance_is_no_angle() {
 }
 
 #[test]
-fn the_bytes_of_a_record_are_its_words() {
+fn record_bytes_equal_its_words() {
     let mut random = Random(5);
     let record = record(&mut random);
     let bytes = record.bytes();

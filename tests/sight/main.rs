@@ -106,10 +106,10 @@ fn telemetry(
         let (Some(found), Some(place)) = (found, place) else {
             continue;
         };
-        let mut side = |found: i32, desk: f64, focal: f64, centre: f64, across: f64| {
+        let mut side = |found: i32, definition: f64, focal: f64, centre: f64, across: f64| {
             let off = focal * across / z;
-            // The definition, written again.
-            assert!((centre + off - desk).abs() <= 1e-9 * (1.0 + off.abs()) / z);
+            // The definition, repeated here.
+            assert!((centre + off - definition).abs() <= 1e-9 * (1.0 + off.abs()) / z);
             if off.abs() < 1e6_f64.min(127.9 * focal) && z > 1e-3 {
                 let bound = 6e-6 * (focal + off.abs()) / z
                     + (1.0 + off.abs() / focal) * 2f64.powi(-14)
@@ -122,9 +122,9 @@ fn telemetry(
     }
 }
 
-/// Random cameras, tags and poses, none of them searched.
+/// Random cameras, tags and poses, without a search.
 #[test]
-fn random_sightings_are_true() {
+fn random_sightings_match_definition() {
     let mut random = Random(1);
     let mut answers: BTreeMap<String, usize> = BTreeMap::new();
     let mut worst = [0.0; 4];
@@ -175,7 +175,7 @@ fn random_sightings_are_true() {
 
 /// Poses on the border, found by a search, and some micrometres around it.
 #[test]
-fn no_answer_is_wrong_at_the_border() {
+fn answers_at_the_border_match_definition() {
     let mut random = Random(2);
     let (mut tried, mut unsure) = (0, 0);
     let mut borders: BTreeMap<String, usize> = BTreeMap::new();
@@ -250,10 +250,10 @@ fn border(success: &SuccessSet, inside: [f64; 3], random: &mut Random) -> Option
     Some(at(low))
 }
 
-/// Digests every bit of what is seen from four thousand poses, so that any change of a rounding is detected. The
+/// Digests every bit of the sightings from four thousand poses, so that any change of a rounding is detected. The
 /// emulated cores make the same digest (`examples/count_instructions.rs`).
 #[test]
-fn what_is_seen_is_pinned() {
+fn sighting_digest_is_unchanged() {
     let path = "examples/tables/see-t7.posegate";
     let bytes = std::fs::read(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
     let scene = Scene::of(&Table::parse(&bytes).unwrap()).unwrap();

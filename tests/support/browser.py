@@ -47,7 +47,7 @@ def opened(browser, seen, script=None, **options):
     page = context.new_page()
     page.on("request", lambda request: seen.append(request.url))
     page.on("pageerror", lambda error: seen.append(f"error: {error}"))
-    page.on("console", lambda told: told.type == "error" and seen.append(f"console: {told.text}"))
+    page.on("console", lambda message: message.type == "error" and seen.append(f"console: {message.text}"))
     if script:
         page.add_init_script(script)
     page.goto(pathlib.Path(PAGE).resolve().as_uri())
@@ -103,16 +103,16 @@ def by_keys(page, task):
     denied = verdict(page)
     line("by keys alone", denied, "verdict", "DENY", reached and moved and denied == "DENY")
     page.wait_for_timeout(900)
-    told = page.inner_text("#told")
-    line("the verdict is told to screen readers", told, "", "DENY, not_contained ...",
-         page.get_attribute("#told", "aria-live") == "polite" and told.startswith("DENY, not_contained"))
+    announced = page.inner_text("#told")
+    line("the verdict is announced to screen readers", announced, "", "DENY, not_contained ...",
+         page.get_attribute("#told", "aria-live") == "polite" and announced.startswith("DENY, not_contained"))
 
 
 def asked(page, rows):
     """Returns the last request to the core and its answer, as numbers for the command line."""
-    told = page.evaluate("[state.asked, state.verdict, state.verdict && core.reason(state.verdict.reason).name]")
-    pose, verdict, reason = told[0]["pose"], told[1], told[2]
-    c = told[0].get("covariance", [0.0] * 9)
+    state = page.evaluate("[state.asked, state.verdict, state.verdict && core.reason(state.verdict.reason).name]")
+    pose, verdict, reason = state[0]["pose"], state[1], state[2]
+    c = state[0].get("covariance", [0.0] * 9)
     rows.append({
         "t_s": len(rows), "x_m": pose[0], "y_m": pose[1], "yaw_rad": pose[2], "cov_xx": c[0], "cov_xy": c[1],
         "cov_xyaw": c[2], "cov_yy": c[4], "cov_yyaw": c[5], "cov_yawyaw": c[8],
@@ -121,7 +121,7 @@ def asked(page, rows):
 
 
 def same(verdict, reason, answer):
-    """Returns whether the command line agrees: verdict, reason, margin and worst pose to the last bit of the integers."""
+    """Returns True if the command line agrees: verdict, reason, margin and worst pose to the last bit of the integers."""
     there = answer["margin"]
     margin = None if there is None else round(there * 65536)
     worst, other = verdict["worst"], answer["worst_pose"]
@@ -131,11 +131,11 @@ def same(verdict, reason, answer):
         all(round(a * 1e6) == round(b * 1e6) for a, b in zip(worst[:2], other[:2]))
         and abs(math.remainder(worst[2] - other[2], math.tau)) < 2e-9
     )
-    told = None if verdict["permit"] else reason
-    return (answer["verdict"] == "permit") == verdict["permit"] and told == answer["reason"] and margin == verdict["marginQ16"] and near
+    expected = None if verdict["permit"] else reason
+    return (answer["verdict"] == "permit") == verdict["permit"] and expected == answer["reason"] and margin == verdict["marginQ16"] and near
 
 
-def as_the_command_line(page, task, wide):
+def equal_to_the_command_line(page, task, wide):
     """Random estimates give the same integers through the page's fields and through `posegate gate`."""
     table = pathlib.Path(FOLDER) / "table.posegate"
     subprocess.run([POSEGATE, "table", "build", SITE, "--task", task, "-o", table], check=True, capture_output=True)
@@ -143,7 +143,7 @@ def as_the_command_line(page, task, wide):
     for kind in ("gaussian", "bounded"):
         choose(page, task)
         page.select_option("#kind", kind)
-        rows, told = [], []
+        rows, decisions = [], []
         for _ in range(60):
             own = {
                 "x": chance.gauss(0, 0.4 * wide), "y": chance.gauss(0, 0.3 * wide), "yaw": chance.gauss(0, 1.5),
@@ -155,7 +155,7 @@ def as_the_command_line(page, task, wide):
                 own = {"x": own["x"], "y": own["y"], "yaw": own["yaw"], "sx": 0.2 * wide, "syaw": 0.5}
             for key, value in own.items():
                 page.fill(f"#{key}", str(round(value, 4)))
-            told.append(asked(page, rows))
+            decisions.append(asked(page, rows))
         path = pathlib.Path(FOLDER) / "estimates.csv"
         with open(path, "w", newline="") as out:
             writer = csv.DictWriter(out, rows[0])
@@ -166,8 +166,8 @@ def as_the_command_line(page, task, wide):
         done = subprocess.run(line_of, capture_output=True, text=True)
         answers = [json.loads(text) for text in done.stdout.splitlines()]
         answers = [answer for answer in answers if "verdict" in answer]
-        held = sum(same(*own, answer) for own, answer in zip(told, answers, strict=True))
-        permits = sum(verdict["permit"] for verdict, _ in told)
+        held = sum(same(*own, answer) for own, answer in zip(decisions, answers, strict=True))
+        permits = sum(verdict["permit"] for verdict, _ in decisions)
         line(f"{task}, {kind}: judged as the command line judges them, bit for bit", [held, permits], "of 60, permits", [60, "5 to 55"], held == 60 and 5 <= permits <= 55)
 
 
@@ -216,18 +216,18 @@ def names_with_spaces(page):
          [narrow, wide, lead] == ["DENY", "PERMIT", " lead"])
 
 
-def what_is_no_number(page, task):
+def invalid_numbers(page, task):
     """There is no verdict if a field is empty or out of its range, or after a fault."""
     choose(page, task)
     before = verdict(page)
-    told = []
+    answers = []
     for key, value in {"x": "", "yaw": "", "sy": "-0.001", "syaw": "0", "rxy": "1", "inflation": "0.5"}.items():
         good = page.input_value(f"#{key}")
         page.fill(f"#{key}", value)
-        told.append((verdict(page), page.get_attribute(f"#{key}", "aria-invalid"), "must be" in page.inner_text("#reason")))
+        answers.append((verdict(page), page.get_attribute(f"#{key}", "aria-invalid"), "must be" in page.inner_text("#reason")))
         page.fill(f"#{key}", good)
-    line("fields that are no number", len(set(told)), "kinds of answers", 1,
-         set(told) == {("–", "true", True)} and before == verdict(page) == "PERMIT")
+    line("fields with an invalid number", len(set(answers)), "kinds of answers", 1,
+         set(answers) == {("–", "true", True)} and before == verdict(page) == "PERMIT")
     page.evaluate("void (core.examine = () => { throw new Error('made up') })")
     page.fill("#x", "0.01")
     broken = [verdict(page), page.get_attribute("#panel", "data-verdict"), page.inner_text("#reason")]
@@ -237,7 +237,7 @@ def what_is_no_number(page, task):
          broken == ["–", "none", "no verdict: made up"] and verdict(page) == "PERMIT")
 
 
-def what_is_shown_is_judged(page, task):
+def shown_numbers_are_judged(page, task):
     """At the last permitted place, the numbers of the fields, typed again, get the same verdict."""
     choose(page, task)
     other = 0
@@ -253,7 +253,7 @@ def what_is_shown_is_judged(page, task):
     line("verdicts that change when what is shown is typed", other, "of 40", 0, other == 0)
 
 
-def gone_back(page, task):
+def back_and_forth(page, task):
     """After another page and back, fields and verdict are of one task."""
     choose(page, task)
     page.fill("#sx", "0.5")
@@ -270,14 +270,14 @@ def gone_back(page, task):
     line("gone back: fields and verdict are of one task", held, "", True, held)
 
 
-def headings_go_round(page):
+def headings_wrap(page):
     """S over an arc beyond 180 degrees: the section at -100 is that at 260; beyond the arc there is no section."""
     choose(page, "round")
-    told = []
+    sections = []
     for yaw in ("-100", "260", "-30"):
         page.fill("#yaw", yaw)
-        told.append([page.inner_text("#at").split(" the ")[0][:24], len(page.get_attribute("#set", "d")) > 0])
-    line("sections go round", told, "", None, told[0] == told[1] and told[0][1] and not told[2][1])
+        sections.append([page.inner_text("#at").split(" the ")[0][:24], len(page.get_attribute("#set", "d")) > 0])
+    line("sections wrap", sections, "", None, sections[0] == sections[1] and sections[0][1] and not sections[2][1])
 
 
 def timed(page, task):
@@ -379,13 +379,13 @@ def main():
         dragged(page, task)
         by_keys(page, task)
         for one, wide in site["compared"]:
-            as_the_command_line(page, one, wide)
+            equal_to_the_command_line(page, one, wide)
         names_with_spaces(page)
-        what_is_no_number(page, task)
-        what_is_shown_is_judged(page, task)
+        invalid_numbers(page, task)
+        shown_numbers_are_judged(page, task)
         inflated_outwards(page, task)
-        headings_go_round(page)
-        gone_back(page, task)
+        headings_wrap(page)
+        back_and_forth(page, task)
         timed(page, task)
         hall(browser)
         # The picture of the README.

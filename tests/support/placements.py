@@ -12,7 +12,7 @@ folder = pathlib.Path(sys.argv[1])
 missed = []
 
 
-def tell(name, value, unit, goal=None, holds=True):
+def report(name, value, unit, goal=None, holds=True):
     print(json.dumps({"name": name, "value": value, "unit": unit, "goal": goal}))
     if not holds:
         missed.append(name)
@@ -30,25 +30,25 @@ for sigma in ("0.1", "0.3"):
     best = read["scipy"]["mean"]
     runs = sorted(read["scipy"]["evaluations"])
     middle = statistics.median(runs)
-    tell(f"scipy, sigma {sigma}: best mean cost of {len(runs)} runs", best, "")
-    tell(f"scipy, sigma {sigma}: evaluations of the middle run", middle, "")
+    report(f"scipy, sigma {sigma}: best mean cost of {len(runs)} runs", best, "")
+    report(f"scipy, sigma {sigma}: evaluations of the middle run", middle, "")
     tenths = sorted(read[method]["mean"] / best for method in TENTHS)
     held = sum(ratio <= 1.001 for ratio in tenths)
-    tell(f"a tenth of the looks, sigma {sigma}: searches whose mean cost over SciPy's best is at most 1.001", held, "of 20", MOST, held >= MOST)
-    tell(f"a tenth of the looks, sigma {sigma}: the middle one's ratio", statistics.median(tenths), "", 1.001, statistics.median(tenths) <= 1.001)
-    tell(f"a tenth of the looks, sigma {sigma}: the worst one's ratio", tenths[-1], "", WORST, tenths[-1] <= WORST)
+    report(f"a tenth of the looks, sigma {sigma}: searches whose mean cost over SciPy's best is at most 1.001", held, "of 20", MOST, held >= MOST)
+    report(f"a tenth of the looks, sigma {sigma}: the middle one's ratio", statistics.median(tenths), "", 1.001, statistics.median(tenths) <= 1.001)
+    report(f"a tenth of the looks, sigma {sigma}: the worst one's ratio", tenths[-1], "", WORST, tenths[-1] <= WORST)
     share = max(read[method]["evaluations"] for method in TENTHS) / middle
-    tell(f"a tenth of the looks, sigma {sigma}: looks over those of a run", share, "", 0.1, share <= 0.1)
+    report(f"a tenth of the looks, sigma {sigma}: looks over those of a run", share, "", 0.1, share <= 0.1)
     for method in ("cmaes", "ga"):
         found = read[method]
         goal = None if method == "ga" else 1.001
         ratio = found["mean"] / best
-        tell(f"{method}, sigma {sigma}: mean cost over SciPy's best", ratio, "", goal, goal is None or ratio <= goal)
+        report(f"{method}, sigma {sigma}: mean cost over SciPy's best", ratio, "", goal, goal is None or ratio <= goal)
         # One search compared with one run of median length.
         share = found["evaluations"] / middle
-        tell(f"{method}, sigma {sigma}: evaluations over those of a run", share, "")
-        tell(f"{method}, sigma {sigma}: margin", found["margin"], "")
-        tell(f"{method}, sigma {sigma}: yaw off square", abs(found["tag_pose"]["yaw_deg"] - 180.0), "deg")
+        report(f"{method}, sigma {sigma}: evaluations over those of a run", share, "")
+        report(f"{method}, sigma {sigma}: margin", found["margin"], "")
+        report(f"{method}, sigma {sigma}: yaw off square", abs(found["tag_pose"]["yaw_deg"] - 180.0), "deg")
 if missed:
     print("beyond a goal: " + "; ".join(missed), file=sys.stderr)
     sys.exit(1)

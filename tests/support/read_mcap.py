@@ -8,7 +8,7 @@ from mcap.reader import make_reader
 path, rows_path, summary_path = sys.argv[1:]
 rows = [json.loads(line) for line in open(rows_path)]
 known = [row for row in rows if "truth" in row]
-told = json.load(open(summary_path))
+expected_summary = json.load(open(summary_path))
 counts = {}
 
 
@@ -40,7 +40,7 @@ with open(path, "rb") as stream:
             wrong += any(value[key] != row[key] for key in ["error_m", "error_yaw_rad", "nees"])
             wrong += any(value[key] != flag(row[key]) for key in ["in_success_set", "in_pose_set"])
         elif channel.topic == "/posegate/summary":
-            wrong += value != told
+            wrong += value != expected_summary
 verdicts = counts.get("/posegate/verdict", 0)
 print(json.dumps({"name": "verdicts that the package mcap reads", "value": verdicts, "unit": "messages", "goal": len(rows)}))
 print(json.dumps({"name": "of all messages, other than the rows", "value": wrong, "unit": "messages", "goal": 0}))

@@ -9,18 +9,18 @@ truth = replay.get("truth")
 if truth["estimates"]:
     print(json.dumps({"name": f"{name}: truth in the pose-sets", "value": truth["coverage"], "unit": "share", "goal": None}))
 for rule in ["gate", "interlock", "distance", "sigma", "ellipse", "ate"]:
-    told = replay["rules"][rule]
-    if told is None:
+    counts = replay["rules"][rule]
+    if counts is None:
         # The rule has no input: no covariance, or no truth.
         print(json.dumps({"name": f"{name}: permitted by {rule}", "value": None, "unit": "not judged", "goal": None}))
         continue
     line = {
         "name": f"{name}: permitted by {rule}",
-        "value": told["permits"],
+        "value": counts["permits"],
         "unit": f"of {replay['estimates']} estimates",
         "goal": None,
     }
     if truth["estimates"]:
-        line["false_permits"] = told["false_permits"]
-        line["false_denials"] = told["false_denials"]
+        line["false_permits"] = counts["false_permits"]
+        line["false_denials"] = counts["false_denials"]
     print(json.dumps(line))

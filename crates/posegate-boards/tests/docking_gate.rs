@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// The gate is closed for 500 ms after its start and after a denial; three consecutive permits arrive in that time. Reports
 /// end at 3000 ms, and a permit is held for 100 ms.
-const TOLD: &str = "\
+const EXPECTED: &str = "\
 500 ms: open
 1500 ms: closed, not_contained
 2050 ms: open
@@ -33,13 +33,17 @@ fn the_smallest_gate_opens_and_closes() {
         .arg(firmware::in_either("docking_gate"))
         .output()
         .expect("qemu-system-arm is missing: apt-get install -y qemu-system-arm");
-    assert_eq!(String::from_utf8_lossy(&output.stdout), TOLD, "{output:?}");
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        EXPECTED,
+        "{output:?}"
+    );
     assert!(output.status.success(), "{output:?}");
 }
 
-/// Users copy these examples, so neither names functions that are for recordings and benches only.
+/// Users copy these examples, so neither calls functions that are only for recordings and benches.
 #[test]
-fn the_smallest_gates_judge_nothing_by_itself() {
+fn smallest_gates_use_only_the_gate_api() {
     for (path, needs) in [
         (
             "examples/docking_gate.rs",

@@ -62,7 +62,7 @@ fn is_closed_for_good(controller: &mut Controller) {
 const TIMER_VECTOR: u32 = 0x3c;
 
 #[test]
-fn a_fault_closes_and_stops_the_heart() {
+fn fault_closes_interlock_and_stops_heartbeat() {
     let mut controller = open();
     // The next cycle jumps to an address without code.
     controller.board.write(TIMER_VECTOR, &[0; 4]);
@@ -71,7 +71,7 @@ fn a_fault_closes_and_stops_the_heart() {
 
 /// Only the watchdog's interrupt still runs.
 #[test]
-fn a_cycle_that_hangs_closes_and_stops_the_heart() {
+fn hung_cycle_closes_interlock_and_stops_heartbeat() {
     let mut controller = open();
     let vector = controller.board.read(TIMER_VECTOR, 4);
     let vector = u32::from_le_bytes(vector.try_into().unwrap());
@@ -87,7 +87,9 @@ const LATE_MS: u32 = 60;
 /// report, and no earlier permit drives the output high again. New reports then lead to a new permit.
 fn comes_late(watchdog_is_broken: bool) {
     let mut controller = open();
-    let before = controller.good_until("a permit that is weighed", |told| told.weighed.is_some());
+    let before = controller.good_until("a permit that is weighed", |telemetry| {
+        telemetry.weighed.is_some()
+    });
     assert!(before.permitted);
     controller.report(&controller.next_report());
     let high_for = controller.run_late_cycle(LATE_MS, watchdog_is_broken);
@@ -117,19 +119,19 @@ fn comes_late(watchdog_is_broken: bool) {
 
 /// The watchdog forces the output low before the late cycle begins.
 #[test]
-fn a_cycle_that_comes_late_opens_on_no_old_permit() {
+fn late_cycle_never_opens_on_old_permit() {
     comes_late(false);
 }
 
 /// The controller detects the late cycle by its own clock.
 #[test]
-fn a_cycle_that_comes_late_is_seen_without_the_watchdog() {
+fn late_cycle_is_detected_without_watchdog() {
     comes_late(true);
 }
 
 /// A bit of the table flips in flash while the gate is open. The scrub finds it within one round.
 #[test]
-fn a_flipped_bit_of_flash_closes_for_good() {
+fn flipped_flash_bit_latches_interlock_low() {
     let mut controller = open();
     controller.compare_no_more();
     let flash = controller.board.read(0, 0x2_0000);
@@ -137,10 +139,15 @@ fn a_flipped_bit_of_flash_closes_for_good() {
     let at = at.expect("the table is in flash") + 200;
     controller.board.write(at as u32, &[flash[at] ^ 4]);
     let latched = State::Latched(Reason::TableDamaged);
-    controller.good_until("the scrub has found it", |told| told.state == latched);
+    controller.good_until("the scrub has found it", |telemetry| {
+        telemetry.state == latched
+    });
     for _ in 0..50 {
-        let told = controller.good_until("a cycle more", |_| true);
-        assert_eq!((told.state, told.interlock_high), (latched, false));
+        let telemetry = controller.good_until("a cycle more", |_| true);
+        assert_eq!(
+            (telemetry.state, telemetry.interlock_high),
+            (latched, false)
+        );
     }
     // The controller still runs and reports the fault.
     assert!(beats(&mut controller, 60) > 2);

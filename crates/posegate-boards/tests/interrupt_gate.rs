@@ -1,9 +1,9 @@
-//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, with every fault of a serial line: garbage,
+//! The firmware of `examples/interrupt_gate.rs` in QEMU, in virtual time, with every fault of a serial line: random bytes,
 //! silence, floods, damaged frames and intact frames with wrong content. The interlock is high after three consecutive
 //! good reports, and at no other time. (Faults of the controller itself: `interrupt_faults.rs`.)
 //!
-//! The controller's report on each cycle is compared with the same gate on the host, which gets the reports in the
-//! sent bytes (`crates/posegate-testkit/src/controller.rs`), and with an oracle in plain floats. The fast suite uses
+//! The controller's report on each cycle is compared with the same gate on the host and with an oracle in plain
+//! floats. The host gate gets the reports in the sent bytes (`crates/posegate-testkit/src/controller.rs`). The fast suite uses
 //! smaller counts; `./ci.sh faults` sets them: `POSEGATE_GARBAGE_BYTES`, `POSEGATE_MUTANTS`,
 //! `POSEGATE_FLOOD_SECONDS`.
 
@@ -34,7 +34,7 @@ fn line(name: &str, value: impl core::fmt::Display, unit: &str, goal: &str) {
 }
 
 #[test]
-fn the_settings_are_the_firmwares() {
+fn host_settings_equal_firmware_settings() {
     let path =
         Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/interrupt_gate.rs");
     let source = std::fs::read_to_string(path).unwrap();
@@ -56,7 +56,7 @@ fn the_settings_are_the_firmwares() {
 }
 
 #[test]
-fn it_opens_after_three_good_reports() {
+fn interlock_opens_after_three_good_reports() {
     let mut controller = start();
     assert!(!controller.interlock_is_high());
     assert_eq!(controller.tally.high, 0);
@@ -64,9 +64,13 @@ fn it_opens_after_three_good_reports() {
     while !controller.last().permitted {
         let cycle = controller.last().cycle;
         controller.report(&controller.next_report());
-        let told = controller.until("the next cycle", |told| told.cycle != cycle);
-        assert!(told.weighed.is_some_and(|weighed| weighed.verdict.is_ok()));
-        states.push(told.state);
+        let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != cycle);
+        assert!(
+            telemetry
+                .weighed
+                .is_some_and(|weighed| weighed.verdict.is_ok())
+        );
+        states.push(telemetry.state);
     }
     let three = [State::Qualifying(1), State::Qualifying(2), State::Permitted];
     assert_eq!(states, three);
@@ -75,7 +79,7 @@ fn it_opens_after_three_good_reports() {
 
 /// The gate closes in the cycle that evaluates the bad report, with that report's reason.
 #[test]
-fn a_bad_report_closes_at_once() {
+fn bad_report_closes_interlock_at_once() {
     let mut controller = start();
     type Change = fn(&mut Report);
     let cases: [(Reason, Change); 9] = [
@@ -102,10 +106,10 @@ fn a_bad_report_closes_at_once() {
         let mut report = controller.next_report();
         change(&mut report);
         controller.report(&report);
-        let told = controller.until("the next cycle", |told| told.cycle != cycle);
-        assert_eq!(told.weighed.map(|w| w.verdict), Some(Err(reason)));
+        let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != cycle);
+        assert_eq!(telemetry.weighed.map(|w| w.verdict), Some(Err(reason)));
         assert_eq!(
-            (told.state, told.interlock_high),
+            (telemetry.state, telemetry.interlock_high),
             (State::Inhibited(reason), false)
         );
         assert!(!controller.interlock_is_high(), "{reason}");
@@ -139,8 +143,8 @@ fn odometry_keeps_the_gate_open_between_fixes() {
             controller.odometry(&Increment::new(ahead_um, 0, 0, [newest_ms, now_ms]).unwrap());
             newest_ms = now_ms;
             let last = controller.last().cycle;
-            let told = controller.until("the next cycle", |told| told.cycle != last);
-            open += u32::from(told.permitted);
+            let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != last);
+            open += u32::from(telemetry.permitted);
         }
         open
     };
@@ -154,8 +158,8 @@ fn odometry_keeps_the_gate_open_between_fixes() {
     let before_ms = now_ms.wrapping_sub(PERIOD_MS);
     controller.odometry(&Increment::new(300_000, 0, 0, [before_ms, now_ms]).unwrap());
     let last = controller.last().cycle;
-    let told = controller.until("the next cycle", |told| told.cycle != last);
-    assert_eq!(told.state, State::Inhibited(Reason::OdometryJump));
+    let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != last);
+    assert_eq!(telemetry.state, State::Inhibited(Reason::OdometryJump));
     assert!(!controller.interlock_is_high());
     // It opens again after a newer fix, and stays open without fixes until they are too old.
     assert!(drive(&mut controller, 160, true, 500) > 60);
@@ -167,14 +171,14 @@ fn odometry_keeps_the_gate_open_between_fixes() {
     assert!(drive(&mut controller, 160, true, 500) > 60);
     assert!(controller.last().permitted);
     let from_ms = controller.last().now_ms;
-    let told = controller.until("closed", |told| !told.permitted);
-    let after_ms = told.now_ms.wrapping_sub(from_ms);
+    let telemetry = controller.until("closed", |telemetry| !telemetry.permitted);
+    let after_ms = telemetry.now_ms.wrapping_sub(from_ms);
     assert!(after_ms <= PERMIT_HOLD_MS + PERIOD_MS, "{after_ms}");
 }
 
-/// A report with hypotheses over the line: one that is outside closes, and a lost one is noticed.
+/// A report with hypotheses over the line: a hypothesis outside closes, and a lost one is detected.
 #[test]
-fn each_hypothesis_on_the_line_counts() {
+fn each_received_hypothesis_counts() {
     let mut controller = start();
     let send = |controller: &mut Controller, places: &[f64], lose: Option<usize>| {
         let cycle = controller.open().cycle;
@@ -189,10 +193,13 @@ fn each_hypothesis_on_the_line_counts() {
         let counted = counted_report_body(places.len() as u8, &report).unwrap();
         controller.send(&encode(&counted));
         controller.skip();
-        let told = controller.until("the report", |told| {
-            told.cycle != cycle && (told.weighed.is_some() || !told.permitted)
+        let telemetry = controller.until("the report", |telemetry| {
+            telemetry.cycle != cycle && (telemetry.weighed.is_some() || !telemetry.permitted)
         });
-        (told.state, told.weighed.map(|weighed| weighed.verdict))
+        (
+            telemetry.state,
+            telemetry.weighed.map(|weighed| weighed.verdict),
+        )
     };
     let permitted = (State::Permitted, Some(Ok(())));
     assert_eq!(send(&mut controller, &[0.0, 0.005], None), permitted);
@@ -201,7 +208,7 @@ fn each_hypothesis_on_the_line_counts() {
         send(&mut controller, &[0.0, 0.075], None),
         (State::Inhibited(denied), Some(Err(denied)))
     );
-    // The lost one was the bad one: the report is refused, and the permit ends for lack of reports.
+    // The lost hypothesis was the bad one: the report is refused, and the permit ends for lack of reports.
     assert_eq!(
         send(&mut controller, &[0.075, 0.0], Some(1)),
         (State::Inhibited(Reason::Silent), None)
@@ -210,28 +217,28 @@ fn each_hypothesis_on_the_line_counts() {
 
 /// A permit ends with the first cycle after its hold time. Later reports must qualify again.
 #[test]
-fn silence_closes_and_reports_open_again() {
+fn silence_closes_interlock_until_new_permits() {
     let mut controller = start();
     for _ in 0..3 {
         let opened = controller.open();
-        let (mut before, mut told) = (opened, opened);
-        while told.permitted {
-            before = told;
-            told = controller.hear();
-            assert_eq!(told.weighed, None);
+        let (mut before, mut telemetry) = (opened, opened);
+        while telemetry.permitted {
+            before = telemetry;
+            telemetry = controller.hear();
+            assert_eq!(telemetry.weighed, None);
         }
-        assert_eq!(told.state, State::Inhibited(Reason::Silent));
-        assert!(!told.interlock_high && !controller.interlock_is_high());
+        assert_eq!(telemetry.state, State::Inhibited(Reason::Silent));
+        assert!(!telemetry.interlock_high && !controller.interlock_is_high());
         // By the controller's clock: the last cycle in which it was open, and the first in which it was not.
-        let open_for = |told: Telemetry| told.now_ms.wrapping_sub(opened.now_ms);
-        assert!(open_for(before) <= PERMIT_HOLD_MS && PERMIT_HOLD_MS < open_for(told));
+        let open_for = |telemetry: Telemetry| telemetry.now_ms.wrapping_sub(opened.now_ms);
+        assert!(open_for(before) <= PERMIT_HOLD_MS && PERMIT_HOLD_MS < open_for(telemetry));
     }
     assert_eq!(controller.tally.opened, 3);
 }
 
 /// A report cannot be younger than its first byte, however late its last byte arrives.
 #[test]
-fn a_stamp_from_after_the_first_byte_is_from_the_future() {
+fn stamp_after_first_byte_is_in_the_future() {
     let mut controller = start();
     controller.open();
     let report = Report {
@@ -240,59 +247,66 @@ fn a_stamp_from_after_the_first_byte_is_from_the_future() {
     };
     let frame = encode(&report_body(&report));
     controller.send(&frame[..1]);
-    controller.until("the stamp is past", |told| {
-        told.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
+    controller.until("the stamp is past", |telemetry| {
+        telemetry.now_ms.wrapping_sub(report.stamp_ms) < 1 << 31
     });
     controller.send(&frame[1..]);
-    let told = controller.hear();
-    let weighed = told.weighed.expect("a report");
+    let telemetry = controller.hear();
+    let weighed = telemetry.weighed.expect("a report");
     assert_eq!(weighed.verdict, Err(Reason::Stale));
-    assert_eq!(weighed.stamp_ms, told.now_ms.wrapping_add(1));
+    assert_eq!(weighed.stamp_ms, telemetry.now_ms.wrapping_add(1));
 }
 
 /// The speed and load of the host change neither the controller's messages nor their times.
 #[test]
-fn the_hosts_time_is_not_the_boards() {
+fn host_load_never_changes_controller_messages() {
     let run = |pause: Duration| {
         let mut controller = start();
         let mut chance = Chance(0x7133);
-        let mut told = Vec::new();
+        let mut telemetry = Vec::new();
         for _ in 0..60 {
             let good = controller.next_report();
-            let mut bytes = mutants::garbage(&mut chance, &good);
+            let mut bytes = mutants::random_bytes(&mut chance, &good);
             bytes.push(0);
             bytes.extend(mutants::frame(&good));
             bytes.truncate(bytes.len() - chance.below(2));
             controller.pour(&bytes);
             std::thread::sleep(pause);
-            told.push((controller.hear(), controller.board.stop()));
+            telemetry.push((controller.hear(), controller.board.stop()));
         }
-        told
+        telemetry
     };
     let slow = std::thread::spawn(move || run(Duration::from_millis(7)));
     let quick = run(Duration::ZERO);
-    assert!(quick.iter().any(|(told, _)| told.weighed.is_some()));
+    assert!(
+        quick
+            .iter()
+            .any(|(telemetry, _)| telemetry.weighed.is_some())
+    );
     assert_eq!(quick, slow.join().unwrap());
 }
 
 #[test]
-fn garbage_opens_nothing() {
+fn random_bytes_never_open_interlock() {
     let mut controller = start();
     let bytes = count("POSEGATE_GARBAGE_BYTES", 60_000);
     let mut chance = Chance(0x6a5b_a6e5);
     let mut sent = 0;
     while sent < bytes {
         let good = controller.next_report();
-        let garbage = mutants::garbage(&mut chance, &good);
-        sent += garbage.len();
-        controller.send(&garbage);
+        let bytes = mutants::random_bytes(&mut chance, &good);
+        sent += bytes.len();
+        controller.send(&bytes);
     }
     controller.until_quiet();
-    let told = controller.last();
-    assert_eq!(told.line.bytes as usize, sent);
+    let telemetry = controller.last();
+    assert_eq!(telemetry.line.bytes as usize, sent);
     assert_eq!((controller.tally.high, controller.tally.weighed), (0, 0));
-    assert!(told.line.refused as usize > bytes / 1000, "{told:?}");
-    // The garbage has no lasting effect.
+    assert!(
+        telemetry.line.refused as usize > bytes / 1000,
+        "{telemetry:?}"
+    );
+    // The random bytes have no lasting effect.
     controller.send(&[0]);
     controller.open();
     assert!(controller.interlock_is_high());
@@ -308,7 +322,7 @@ fn garbage_opens_nothing() {
 
 /// One mutant per cycle or more, before good reports, together with them and instead of them.
 #[test]
-fn no_mutant_is_permitted_wrongly() {
+fn mutated_frames_never_get_a_false_permit() {
     let mut controller = start();
     let mutants = count("POSEGATE_MUTANTS", 500);
     let mut chance = Chance(0x003a_7a47);
@@ -316,7 +330,7 @@ fn no_mutant_is_permitted_wrongly() {
     while sent < mutants {
         // Good reports until the gate is open, or, in some rounds, until it has counted one or two permits.
         let enough = [None, None, Some(1), Some(2)][rounds % 4];
-        controller.good_until("open, or on the way", |told| match told.state {
+        controller.good_until("open, or on the way", |telemetry| match telemetry.state {
             State::Permitted => true,
             State::Qualifying(count) => enough.is_some_and(|enough| count >= enough),
             _ => false,
@@ -393,13 +407,13 @@ fn no_mutant_is_permitted_wrongly() {
 fn step(controller: &mut Controller) {
     let cycle = controller.last().cycle;
     controller.report(&controller.next_report());
-    controller.until("the next cycle", |told| told.cycle != cycle);
+    controller.until("the next cycle", |telemetry| telemetry.cycle != cycle);
 }
 
 /// A flood of five times the line's speed: every cycle runs, and the heartbeat continues. Then more bytes than the queue
 /// holds: the lost bytes are counted, and the next cycles run.
 #[test]
-fn a_flood_stops_nothing() {
+fn flooded_line_never_stops_control_cycle() {
     const A_CYCLE: usize = 600;
     const BURST: usize = 2_000;
     let mut controller = start();
@@ -415,7 +429,7 @@ fn a_flood_stops_nothing() {
         while flood < A_CYCLE {
             let good = controller.next_report();
             let bytes = match chance.below(4) {
-                0 => mutants::garbage(&mut chance, &good),
+                0 => mutants::random_bytes(&mut chance, &good),
                 1 => mutants::lying(&mut chance, &good),
                 _ => mutants::frame(&good),
             };
@@ -423,7 +437,7 @@ fn a_flood_stops_nothing() {
             controller.pour(&bytes);
         }
         let cycle = controller.last().cycle;
-        controller.until("the next cycle", |told| told.cycle != cycle);
+        controller.until("the next cycle", |telemetry| telemetry.cycle != cycle);
         let heart_now = controller.board.stop().heartbeat_is_high();
         beats += u32::from(heart_now != heart);
         heart = heart_now;
@@ -450,13 +464,13 @@ fn a_flood_stops_nothing() {
     assert!(beats + 2 >= due / 5, "{beats}");
     assert!(last.line.lost == 0 && last.line.left_aside > 0, "{last:?}");
     controller.pour(&[0xff; BURST]);
-    let told = controller.until("the next cycle", |told| told.cycle != last.cycle);
-    assert!(told.line.lost as usize > BURST / 3, "{told:?}");
-    let told = controller.until("the one after", |next| next.cycle != told.cycle);
-    assert!(told.now_ms.wrapping_sub(last.now_ms) <= 3 * PERIOD_MS);
+    let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != last.cycle);
+    assert!(telemetry.line.lost as usize > BURST / 3, "{telemetry:?}");
+    let telemetry = controller.until("the one after", |next| next.cycle != telemetry.cycle);
+    assert!(telemetry.now_ms.wrapping_sub(last.now_ms) <= 3 * PERIOD_MS);
     controller.until_quiet();
     controller.send(&[0]);
-    controller.until("closed", |told| !told.permitted);
+    controller.until("closed", |telemetry| !telemetry.permitted);
     let opened = controller.tally.opened;
     controller.open();
     assert_eq!(controller.tally.opened, opened + 1);

@@ -232,7 +232,7 @@ unsafe fn convert<T: Plain>(
 /// Converts a ROS message to an estimate: its marginal over x, y and yaw.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_ros(
     message: *const posegate_ros_pose,
@@ -252,7 +252,7 @@ pub unsafe extern "C" fn posegate_belief_from_ros(
 /// Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
     message: *const posegate_mavlink_odometry,
@@ -275,7 +275,7 @@ pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
 /// `posegate_axes`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_mavlink_vision(
     message: *const posegate_mavlink_vision,
@@ -297,7 +297,7 @@ pub unsafe extern "C" fn posegate_belief_from_mavlink_vision(
 /// Converts nine numbers to an estimate.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_compact(
     message: *const posegate_compact,

@@ -1,4 +1,4 @@
-//! A report with its other hypotheses, and with what odometry leaves open beside it.
+//! A report with its other hypotheses, and with the bounded slip of its odometry.
 
 use super::memory::{Plain, read};
 use super::{posegate_belief, posegate_report, posegate_status, posegate_verdict};
@@ -9,11 +9,11 @@ use posegate::task::Risk;
 
 /// Largest number of hypotheses of one report, the report's own estimate included.
 pub const POSEGATE_MOST_HYPOTHESES: usize = MOST_HYPOTHESES;
-/// Largest number of hypotheses beside the report's own.
+/// Largest number of hypotheses in addition to the report's own.
 pub const POSEGATE_OTHERS: usize = 7;
 
-/// A report with what belongs to it. The robot is at one of the hypotheses, so a gate permits only if each is inside: the clusters of a
-/// particle filter, or the two poses from which a tag that is seen squarely looks the same.
+/// A report with its other hypotheses. The robot is at one of the hypotheses, so a gate permits only if each is inside. Examples: the
+/// clusters of a particle filter, or the two poses from which a tag that is seen head-on looks the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_evidence {
@@ -21,13 +21,13 @@ pub struct posegate_evidence {
     pub report: posegate_report,
     /// Hypotheses 1, 2 and so on, in the frame and with the stamp of the report.
     pub others: [posegate_belief; POSEGATE_OTHERS],
-    /// The number of the others: 0 if the report is alone.
+    /// The number of valid entries of `others`: from 0 to `POSEGATE_OTHERS`.
     pub other_count: u32,
-    /// What the robot can have moved beside the estimates until the stamp, in any direction, micrometres: the slip of its odometry.
+    /// Bound of the slip of the odometry until the stamp, in any direction, micrometres: added to every hypothesis.
     pub beside_um: u32,
-    /// The same for the heading, either way, unit 2^-24 turn.
+    /// The same bound for the heading, to either side, unit 2^-24 turn.
     pub beside_q24: u32,
-    /// The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of those that are left out.
+    /// The probability that the robot is at none of the hypotheses, unit 2^-32, rounded up: the weight of the omitted hypotheses.
     pub elsewhere_q32: u32,
     /// The time from the source's last fix until the stamp, milliseconds, rounded up, at least 1; 0 if it is not known. It chooses the
     /// factor of `posegate_source.ages`; without it the source's own inflation applies.
@@ -42,7 +42,7 @@ pub struct posegate_evidence {
 pub struct posegate_examined {
     /// The verdict, with margin and worst pose.
     pub verdict: posegate_verdict,
-    /// The number of the hypothesis that it is about: the first that is denied, else the one of least margin.
+    /// The number of the hypothesis of this verdict: the first denied hypothesis, else the one with the least margin.
     pub hypothesis: u32,
     /// Reserved: 0.
     pub reserved: u32,
@@ -96,7 +96,7 @@ pub(super) struct Read {
 }
 
 impl Read {
-    /// Reads evidence, part by part, so that no copy of all of it stands on the stack.
+    /// Reads evidence, part by part, so that the stack never holds a copy of the whole struct.
     ///
     /// # Safety
     /// As for [`read`].

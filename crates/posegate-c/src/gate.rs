@@ -26,8 +26,8 @@ pub const POSEGATE_GATE_POINTERS: usize = 24;
 /// Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.
 ///
 /// `posegate_gate_init` initialises it. Do not move it: a copy at another place is refused, and so is zeroed
-/// storage. A copy that is restored to the same place would not know of a fault that was latched since then. The
-/// counter that the caller provides detects this, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. No gate can
+/// storage. A copy that is restored to the same place does not contain a fault that was latched since then. The
+/// counter that the caller provides detects the copy, and the gate latches `POSEGATE_REASON_MEMORY_DAMAGED`. No gate can
 /// detect that the whole memory, including the counter, was restored: call `posegate_gate_init` after that. Only one
 /// context at a time may call its functions.
 #[repr(C)]
@@ -93,7 +93,7 @@ pub struct posegate_step {
     pub permission: posegate_permission,
     /// The state of the gate.
     pub state: posegate_state,
-    /// With a report: the `posegate_reason` why it does not permit by itself, or 0 if it does. Without a report: the
+    /// With a report: the `posegate_reason` why this report does not permit, or 0 if it does. Without a report: the
     /// reason why the gate is closed, or 0.
     pub reason: u32,
 }
@@ -108,7 +108,7 @@ pub enum posegate_advice_kind {
     Relocalise = 2,
     /// Improve the estimate by looking at a tag.
     LookAtTag = 3,
-    /// Bring the robot to where the task begins.
+    /// Bring the robot to the start of the task.
     Restage = 4,
     /// Manual repair or configuration is needed.
     Service = 5,
@@ -156,7 +156,7 @@ impl posegate_state {
             State::Qualifying(count) => (posegate_state_kind::Qualifying, 0, count),
             State::Permitted => (posegate_state_kind::Permitted, 0, 0),
             State::Latched(reason) => (posegate_state_kind::Latched, reason.code(), 0),
-            // A state that C does not know is reported as closed until a manual reset.
+            // A state without a number in C is reported as closed until a manual reset.
             _ => (posegate_state_kind::Latched, 0, 0),
         };
         Self {
@@ -216,7 +216,7 @@ impl posegate_advice {
 /// As for [`open`], for as long as `'a`; no other reference to the gate is in use; the caller's word can be written
 /// to.
 unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
-    // SAFETY: the caller's promise; what is sealed has been written. An address with a flipped bit is not
+    // SAFETY: the caller's promise; sealed storage has been written. An address with a flipped bit is not
     // dereferenced.
     unsafe {
         let held = open(storage)?;
@@ -320,8 +320,8 @@ unsafe fn fill(
     let (restart, look_at) = (given.restart()?, given.look_at());
     let permits = u16::try_from(given.permits_in_a_row);
     let permits_in_a_row = permits.map_err(|_| posegate_status::PermitsInARow)?;
-    // SAFETY: the caller's promise. What is borrowed has been written, is not written again while the gate is in
-    // use, and is not part of what `held` lends.
+    // SAFETY: the caller's promise. The borrowed settings have been written, are not written again while the gate is in
+    // use, and are not part of the reference that `held` returns.
     unsafe {
         (&raw mut (*held).task).write(task);
         (&raw mut (*held).sources).write(sources);
@@ -365,14 +365,14 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 /// A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
 /// that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
 /// borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
-/// word of the caller in which the gate counts its calls. Its first value may be any number. It must not be part of
-/// what the caller saves and restores, and nobody else may ever write to it, not even before another
+/// word of the caller in which the gate counts its calls. Its first value may be any number. The caller must not save
+/// and restore it, and no other code may ever write to it, not even before another
 /// `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
 ///
 /// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
 /// read, and the counter can be written, now and as long as the gate is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_init(
@@ -409,12 +409,12 @@ pub unsafe extern "C" fn posegate_gate_init(
 
 /// Evaluates a report at the controller's time `now_ms`.
 ///
-/// An invalid report (a null pointer, a number that is not in its enum) is an error, and closes the gate as a report
-/// of an unknown source does. If `step` is null or misaligned, the report is evaluated all the same: the gate must
+/// An invalid report (a null pointer, a number that is not in its enum) is an error. It closes the gate as a report
+/// of an unknown source does. If `step` is null or misaligned, the report is still evaluated: the gate must
 /// close even if the caller gets no answer.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_step(
     gate: *mut posegate_gate,
@@ -428,20 +428,21 @@ pub unsafe extern "C" fn posegate_gate_step(
         let report = read(report).and_then(|report| report.report());
         let written = write(step, posegate_step::DENIED);
         apart?;
-        let told = held(gate).map(|gate| gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT)));
+        let result =
+            held(gate).map(|gate| gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT)));
         written?;
-        write(step, posegate_step::of(told?))?;
+        write(step, posegate_step::of(result?))?;
         report.map(|_| ())
     })
 }
 
-/// As `posegate_gate_step`, for a report with several hypotheses, or one that a tracker has carried along odometry.
+/// As `posegate_gate_step`, for a report with several hypotheses, or a report that a tracker has carried along odometry.
 ///
-/// Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each closes
+/// Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each error closes
 /// the gate.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_step_on(
     gate: *mut posegate_gate,
@@ -455,12 +456,12 @@ pub unsafe extern "C" fn posegate_gate_step_on(
         let read = Read::from(evidence);
         let written = write(step, posegate_step::DENIED);
         apart?;
-        let told = held(gate).map(|gate| match &read {
+        let result = held(gate).map(|gate| match &read {
             Ok(read) => gate.step_on(now_ms, &read.evidence()),
             Err(_) => gate.step(now_ms, &NO_REPORT),
         });
         written?;
-        write(step, posegate_step::of(told?))?;
+        write(step, posegate_step::of(result?))?;
         read.map(|_| ())
     })
 }
@@ -469,7 +470,7 @@ pub unsafe extern "C" fn posegate_gate_step_on(
 /// reports stop. The time also advances if `step` is null or misaligned.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_tick(
     gate: *mut posegate_gate,
@@ -481,9 +482,9 @@ pub unsafe extern "C" fn posegate_gate_tick(
         let apart = separate(gate, step);
         let written = write(step, posegate_step::DENIED);
         apart?;
-        let told = held(gate).map(|gate| gate.tick(now_ms));
+        let result = held(gate).map(|gate| gate.tick(now_ms));
         written?;
-        write(step, posegate_step::of(told?))
+        write(step, posegate_step::of(result?))
     })
 }
 
@@ -493,13 +494,13 @@ pub unsafe extern "C" fn posegate_gate_tick(
 /// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_reset(
     gate: *mut posegate_gate,
     now_ms: u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let held = open(gate)?;
         let gate = self::held(gate)?;
@@ -520,7 +521,7 @@ pub unsafe extern "C" fn posegate_gate_reset(
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_inhibit(
     gate: *mut posegate_gate,
@@ -534,7 +535,7 @@ pub unsafe extern "C" fn posegate_gate_inhibit(
         let written = write(step, posegate_step::DENIED);
         apart?;
         let reason = u8::try_from(reason).ok().and_then(Reason::from_code);
-        let told = held(gate).map(|gate| match reason {
+        let result = held(gate).map(|gate| match reason {
             Some(reason) => gate.inhibit(now_ms, reason),
             None => {
                 gate.fault(Reason::MemoryDamaged);
@@ -542,7 +543,7 @@ pub unsafe extern "C" fn posegate_gate_inhibit(
             }
         });
         written?;
-        write(step, posegate_step::of(told?))?;
+        write(step, posegate_step::of(result?))?;
         reason.map(|_| ()).ok_or(posegate_status::BadValue)
     })
 }
@@ -554,7 +555,7 @@ pub unsafe extern "C" fn posegate_gate_inhibit(
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_fault(
     gate: *mut posegate_gate,
@@ -575,7 +576,7 @@ pub unsafe extern "C" fn posegate_gate_fault(
 /// is null.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_scrub(
     gate: *mut posegate_gate,
@@ -587,21 +588,21 @@ pub unsafe extern "C" fn posegate_gate_scrub(
         let apart = separate(gate, scrubbed);
         let written = write(scrubbed, 0);
         apart?;
-        let told = held(gate).map(|gate| gate.scrub(count));
+        let result = held(gate).map(|gate| gate.scrub(count));
         written?;
-        let told = match told? {
+        let result = match result? {
             ScrubProgress::UnderWay => posegate_scrubbed::UnderWay,
             ScrubProgress::Whole => posegate_scrubbed::Whole,
             ScrubProgress::Damaged => posegate_scrubbed::Damaged,
         };
-        write(scrubbed, told as u32)
+        write(scrubbed, result as u32)
     })
 }
 
 /// Writes the state of the gate.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_state(
     gate: *mut posegate_gate,
@@ -612,15 +613,15 @@ pub unsafe extern "C" fn posegate_gate_state(
         let apart = separate(gate, state);
         write(state, posegate_state::NOWHERE)?;
         apart?;
-        let told = held(gate)?.state();
-        write(state, posegate_state::of(told))
+        let result = held(gate)?.state();
+        write(state, posegate_state::of(result))
     })
 }
 
 /// Writes what to do if the gate is closed.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_advice(
     gate: *mut posegate_gate,
@@ -631,8 +632,8 @@ pub unsafe extern "C" fn posegate_gate_advice(
         let apart = separate(gate, advice);
         write(advice, posegate_advice::NONE)?;
         apart?;
-        let told = held(gate)?.advice();
-        write(advice, posegate_advice::of(told))
+        let result = held(gate)?.advice();
+        write(advice, posegate_advice::of(result))
     })
 }
 
@@ -640,7 +641,7 @@ pub unsafe extern "C" fn posegate_gate_advice(
 /// telemetry: the verdict does not change the gate's state.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_examine(
     gate: *mut posegate_gate,
@@ -659,11 +660,11 @@ pub unsafe extern "C" fn posegate_gate_examine(
     })
 }
 
-/// Writes the verdict on a report with several hypotheses, or one that a tracker has carried. The cost is that of
-/// `posegate_gate_examine` for each. For telemetry: the verdict does not change the gate's state.
+/// Writes the verdict on a report with several hypotheses, or a report that a tracker has carried. The cost is that of
+/// `posegate_gate_examine` for each hypothesis. For telemetry: the verdict does not change the gate's state.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_gate_examine_on(
     gate: *mut posegate_gate,
@@ -678,11 +679,11 @@ pub unsafe extern "C" fn posegate_gate_examine_on(
         apart?;
         let gate = held(gate)?;
         let (hypothesis, verdict) = gate.examine_on(&read?.evidence());
-        let told = posegate_examined {
+        let result = posegate_examined {
             verdict: posegate_verdict::of(verdict),
             hypothesis: u32::from(hypothesis),
             ..posegate_examined::DENIED
         };
-        write(examined, told)
+        write(examined, result)
     })
 }

@@ -14,7 +14,7 @@ pub const POSEGATE_JUDGE_WORDS: usize = 20;
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;
 
 /// For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait
-/// for permits in a row, has no second evaluation, checks no settings and keeps no state.
+/// for consecutive permits, has no second evaluation, checks no settings and keeps no state.
 ///
 /// Storage of a judge: a table and a maximum age, to evaluate estimates, each on its own.
 ///
@@ -94,7 +94,7 @@ pub(super) fn pose_set(
 /// still answer. The table is borrowed: it must not change while the judge is used.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
 /// read, now and as long as the judge is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_judge_init(
@@ -145,8 +145,8 @@ unsafe fn judged(
             return Err(posegate_status::BadValue);
         }
         let set = pose_set(&belief, radius);
-        let told = by(judge, estimate.now_ms, estimate.stamp_ms, set);
-        write(verdict, told)
+        let result = by(judge, estimate.now_ms, estimate.stamp_ms, set);
+        write(verdict, result)
     })
 }
 
@@ -158,7 +158,7 @@ unsafe fn judged(
 /// than the site, but not less strict.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_judge_permits(
     judge: *const posegate_judge,
@@ -185,7 +185,7 @@ pub unsafe extern "C" fn posegate_judge_permits(
 /// `posegate_judge_permits`.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_judge_examine(
     judge: *const posegate_judge,

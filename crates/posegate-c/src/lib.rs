@@ -12,8 +12,8 @@
 //!   an enum and impossible lengths are errors. Enums are passed as integers.
 //! - **Overlap**: every function reads all its inputs before it writes an output, so structs of numbers may share
 //!   memory, as in a union. Storage shares memory with nothing: `POSEGATE_STATUS_OVERLAP`.
-//! - **What cannot be checked** is the caller's promise. A pointer that is neither null nor misaligned points to what
-//!   its type says, for the given length. Storage is used by one context at a time. A table outlives the gate on it.
+//! - **What cannot be checked** is the caller's promise. A pointer that is neither null nor misaligned is valid for
+//!   its type and the given length. Storage is used by one context at a time. A table outlives the gate on it.
 //!
 //! This is the only library with unsafe code. Pointers are dereferenced only in `memory.rs`, and in the gate, whose
 //! settings are in the same storage.
@@ -42,7 +42,7 @@
         clippy::unwrap_used
     )
 )]
-// What only a gate uses.
+// Only a gate uses these.
 #![cfg_attr(target_arch = "wasm32", allow(dead_code))]
 // The names are those of the header.
 #![allow(non_camel_case_types)]

@@ -1,4 +1,4 @@
-//! Whether the errors that a source claims still hold: every accepted fix against its prediction.
+//! Compares every accepted fix with its prediction: are the errors that a source claims still valid?
 
 use super::evidence::Read;
 use super::memory::{Storage, close, open, read, separate, take, write};
@@ -28,9 +28,9 @@ unsafe impl Storage for posegate_monitor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_dependence {
-    /// Not at all: a tag that is seen, against a pose that odometry carried from an earlier tag.
+    /// Independent: a fix from a tag, and a pose that odometry carried from an earlier tag.
     Independent = 1,
-    /// In any way, as where a filter shares its past with the prediction. A wrong model is found later.
+    /// Unknown: a filter shares its past with the prediction, for example. A wrong model is detected later.
     Unknown = 2,
 }
 
@@ -38,12 +38,12 @@ pub enum posegate_dependence {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_model {
-    /// Nothing speaks against it.
+    /// No sign of a contradiction.
     Holds = 0,
-    /// Half of the evidence that contradicts it, in logarithms, is there: check camera and tags soon.
+    /// The logarithm of the evidence has reached half of the limit for a contradiction: check camera and tags soon.
     InDoubt = 1,
-    /// It is contradicted: keep the gate closed (`posegate_gate_inhibit` with `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until a
-    /// person has looked and `posegate_monitor_reset` was called.
+    /// It is contradicted: keep the gate closed (`posegate_gate_inhibit` with `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until
+    /// the cause was removed and `posegate_monitor_reset` was called.
     Contradicted = 2,
 }
 
@@ -58,13 +58,13 @@ fn model(standing: ModelStanding) -> u32 {
     model as u32
 }
 
-/// Initialises a monitor. Where the model holds, it contradicts it wrongly once in `fixes_between_false_alarms` fixes on average, or less
-/// often: at least 100. At 10 fixes a second a million is once in 28 hours, 100 million once in four months.
+/// Initialises a monitor. While the model is valid, a false alarm comes on average once in `fixes_between_false_alarms` fixes (at least
+/// 100), or less often. At 10 fixes per second, a million means once in 28 hours, 100 million once in four months.
 ///
-/// Errors: `POSEGATE_STATUS_BAD_VALUE` for fewer.
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if the number is below 100.
 ///
 /// # Safety
-/// The pointer is null, misaligned, or points to what its type says.
+/// The pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_init(
     monitor: *mut posegate_monitor,
@@ -81,13 +81,14 @@ pub unsafe extern "C" fn posegate_monitor_init(
 }
 
 /// Takes an accepted fix and its prediction for the same time. With a tracker call `posegate_tracker_tracked` before and after
-/// `posegate_tracker_fix`, for the same time: the evidence from before is the prediction, the report from after is the fix. `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
+/// `posegate_tracker_fix`, for the same time: the first evidence is the prediction, the second report is the fix.
+/// `dependence` is a `posegate_dependence`. Writes a `posegate_model`.
 ///
-/// Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if one of both has no valid covariance or the dependence is no such number. The
-/// fix then counts for nothing, and `POSEGATE_MODEL_CONTRADICTED` is written.
+/// Errors: those of a report, and `POSEGATE_STATUS_BAD_VALUE` if fix or prediction has no valid covariance, or if `dependence` is not in its enum. The
+/// fix is then ignored, and `POSEGATE_MODEL_CONTRADICTED` is written.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_fix(
     monitor: *mut posegate_monitor,
@@ -98,7 +99,7 @@ pub unsafe extern "C" fn posegate_monitor_fix(
 ) -> posegate_status {
     const INDEPENDENT: u32 = posegate_dependence::Independent as u32;
     const UNKNOWN: u32 = posegate_dependence::Unknown as u32;
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(monitor, fix)
             .and(separate(monitor, prediction))
@@ -124,13 +125,13 @@ pub unsafe extern "C" fn posegate_monitor_fix(
     })
 }
 
-/// Lets a monitor forget all fixes. Call it after a person has removed the cause.
+/// Discards all fixes of a monitor. A manual action: call it after the cause was removed.
 ///
 /// # Safety
-/// The pointer is null, misaligned, or points to what its type says.
+/// The pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_reset(monitor: *mut posegate_monitor) -> posegate_status {
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let monitor = &mut *open(monitor)?;
         monitor.reset();

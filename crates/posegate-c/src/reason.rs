@@ -63,7 +63,7 @@ pub extern "C" fn posegate_reason_meaning(reason: u32) -> *const c_char {
     text(&MEANINGS, reason)
 }
 
-/// Returns a sentence that says what a person must do. Empty for a number that is not a reason.
+/// Returns a sentence with the required manual action. Empty for a number that is not a reason.
 #[unsafe(no_mangle)]
 pub extern "C" fn posegate_reason_action(reason: u32) -> *const c_char {
     text(&ACTIONS, reason)

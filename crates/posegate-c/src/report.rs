@@ -59,7 +59,7 @@ pub(super) const NO_REPORT: Report = Report {
 /// Errors: `POSEGATE_STATUS_BAD_VALUE` if the name is not UTF-8.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the name can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the name can be
 /// read.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_frame_id(

@@ -26,7 +26,7 @@ pub enum posegate_cross_terms {
     AllUnknown = 3,
 }
 
-/// Whether a gate whose permit has ended needs a reset. 0 is not a value.
+/// The condition for a restart after a permit has ended. 0 is not a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_restart {
@@ -36,11 +36,11 @@ pub enum posegate_restart {
     OnReset = 2,
 }
 
-/// Whether the robot moves while an estimate is used, from its stamp until a permission on it ends. 0 is not a value.
+/// The movement of the robot while an estimate is used, from its stamp until its permission ends. 0 is not a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_motion {
-    /// It does not move: something else makes sure of it, for example brakes that the same output releases. Its speeds are ignored.
+    /// It does not move, because other means ensure it, such as brakes that the same output releases. Its speeds are ignored.
     StandsStill = 1,
     /// It moves within the speeds of the source.
     Moves = 2,
@@ -54,10 +54,10 @@ const _: () = assert!(POSEGATE_MOST_AGES == MOST_AGES);
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_age {
-    /// The largest time since the last fix, milliseconds, rounded down to 64 ms: at least 64, and more than that of the age before. 0 if
-    /// this age and those after it are not used.
+    /// The largest time since the last fix, milliseconds, rounded down to 64 ms: at least 64, and more than in the entry before. 0 if
+    /// this entry and those after it are not used.
     pub until_ms: u32,
-    /// The factor by which covariances are multiplied, unit 2^-16: at least 1, not less than that of the age before, not more than the
+    /// The factor by which covariances are multiplied, unit 2^-16: at least 1, not less than in the entry before, not more than the
     /// source's own. It is rounded up to 2^-6.
     pub inflation_q16: u32,
 }
@@ -78,8 +78,8 @@ pub struct posegate_source {
     pub motion: u32,
     /// Reserved: 0.
     pub reserved: u32,
-    /// The largest speed along the robot's axis, m/s, in either direction. Every movement counts that the robot can make, also beyond
-    /// what it is told.
+    /// The largest speed along the robot's axis, m/s, in either direction. Every possible movement counts, also without a
+    /// command.
     pub along_m_s: f64,
     /// The largest speed across the robot's axis, m/s.
     pub across_m_s: f64,
@@ -127,7 +127,7 @@ pub struct posegate_settings {
     /// The tag that the robot should look at to relocalise for this task, or `POSEGATE_NO_TAG`. Only the advice
     /// uses it.
     pub look_at_tag: u32,
-    /// The most runs of cells that a decision looks at (a row without a run counts as one), of a table that has cells; 0 stands for 1,000.
+    /// The largest number of runs of cells that a decision reads (a row without a run counts as one), for a table with cells; 0 means 1,000.
     /// A pose-set that needs more is denied: `POSEGATE_REASON_TOO_COSTLY`. A run takes at most 2,500 instructions on a Cortex-M4F.
     /// Facets are not affected.
     pub most_runs: u32,
@@ -174,12 +174,12 @@ impl posegate_settings {
 ///
 /// Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
 /// response longer, `maximum_age_ms` two. If the response time of your controller is longer than 20 ms, set `response_ms`, and add the
-/// difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to bear one, give twice
-/// the period. A robot that moves is granted what it can move in these times, so short ones give more room: odometry makes them short
-/// (`posegate_tracker`), and the period is then the odometry's.
+/// difference to `permit_hold_ms` and twice the difference to `maximum_age_ms`. One lost report closes the gate; to tolerate one, give twice
+/// the period. The movement that is possible in these times is added to every set, so short times leave more slack. Odometry makes them
+/// short (`posegate_tracker`), and the period is then the odometry's.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_settings_for_source(
     period_ms: u32,

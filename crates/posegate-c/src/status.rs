@@ -27,7 +27,7 @@ pub enum posegate_status {
     TableInvalid = -6,
     /// The controller computes wrong answers on the built-in table.
     SelfTestFailed = -7,
-    /// The gate's copy of its settings has changed: the gate is latched, and only `init` helps.
+    /// The gate's copy of its settings has changed: the gate is latched until `posegate_gate_init`.
     MemoryDamaged = -8,
     /// Storage (a gate, a judge, a receiver) shares bytes with another argument of the call, or a gate's counter with
     /// its table. The storage is no longer initialised.
@@ -56,7 +56,7 @@ pub enum posegate_status {
     Restart = -20,
     /// `response_ms` is 0, or not less than `maximum_age_ms`.
     ResponseTime = -21,
-    /// `motion` is not a `posegate_motion`; or a source moves and all its speeds are zero, or one is below zero, not a number, or beyond
+    /// `motion` is not a `posegate_motion`; or a source moves and all its speeds are zero, or a speed is below zero, not a number, or above
     /// 1,000 m/s or 24 rad/s.
     Motion = -22,
     /// `report_period_ms` is not from 1 to 2^31 - 1.
@@ -69,7 +69,7 @@ pub enum posegate_status {
     /// An error of the odometry is below zero, not a number or too large, or a time of a tracker is not from 1 to 2^31 - 1.
     Odometry = -26,
     /// The `ages` of a source do not rise by 64 ms, are below 64 ms or above 4194 s; or their factors fall, are not from 1 to 1023, or are,
-    /// rounded up to 2^-6, larger than the source's own inflation; or one follows an unused one.
+    /// rounded up to 2^-6, larger than the source's own inflation; or a used entry follows an unused one.
     Aging = -27,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
@@ -111,7 +111,7 @@ impl From<InvalidParameter> for posegate_status {
             InvalidParameter::ReportPeriod => Self::ReportPeriod,
             InvalidParameter::PermitHoldTooShort { .. } => Self::PermitHoldTooShort,
             InvalidParameter::MaximumAgeTooShort { .. } => Self::MaximumAgeTooShort,
-            // No other parameter exists today: `no_setting_switches_a_check_off` in `tests/c_boundary.rs` tests all.
+            // No other parameter exists today: `no_setting_disables_a_check` in `tests/c_boundary.rs` tests all.
             _ => Self::BadValue,
         }
     }

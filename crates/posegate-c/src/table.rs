@@ -49,7 +49,7 @@ fn text<const N: usize>(from: &str) -> [c_char; N] {
 /// Errors: `POSEGATE_STATUS_TABLE_INVALID` if the bytes are not a table.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
 /// read.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_table_check(
@@ -78,7 +78,7 @@ pub unsafe extern "C" fn posegate_table_check(
 /// it.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes can be read.
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes can be read.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_checksum(
     so_far: u32,

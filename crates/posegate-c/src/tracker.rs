@@ -10,11 +10,11 @@ use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettin
 
 /// Words of a `posegate_tracker`.
 pub const POSEGATE_TRACKER_WORDS: usize = 192;
-/// Increments that a tracker keeps for fixes that come late.
+/// Number of increments that a tracker keeps for late fixes.
 pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
 
-/// Storage of a tracker, which carries the newest fix of a slow source along the odometry, so that a gate can evaluate a report for
-/// the present in every control cycle.
+/// Storage of a tracker, which carries the newest fix of a slow source along the odometry. So a gate can evaluate a
+/// report for now in every control cycle.
 ///
 /// `posegate_tracker_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
 #[repr(C)]
@@ -29,68 +29,68 @@ unsafe impl Storage for posegate_tracker {
     const MARK: u32 = 0x7472_6163;
 }
 
-/// How far an odometry errs. Deviations grow with the root of the way, as the sum of many small independent errors does. Slip is a
-/// bound: a share of every movement that may be wrong in the worst direction. No value may be below zero.
+/// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
+/// a bound: the share of every movement that may be wrong in the worst direction. No value may be below zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_odometry_errors {
-    /// Deviation of the place on each axis, metres per root of a metre driven.
+    /// Standard deviation of the position on each axis, metres per root of a metre driven.
     pub m_per_sqrt_m: f64,
-    /// Deviation of the heading, radians per root of a radian turned.
+    /// Standard deviation of the heading, radians per root of a radian turned.
     pub rad_per_sqrt_rad: f64,
-    /// Deviation of the heading, radians per root of a metre driven.
+    /// Standard deviation of the heading, radians per root of a metre driven.
     pub rad_per_sqrt_m: f64,
-    /// Deviation of the place on each axis, metres per root of a second.
+    /// Standard deviation of the position on each axis, metres per root of a second.
     pub m_per_sqrt_s: f64,
-    /// Deviation of the heading, radians per root of a second.
+    /// Standard deviation of the heading, radians per root of a second.
     pub rad_per_sqrt_s: f64,
-    /// The share of a way that may be wrong, in any direction.
+    /// The share of a driven length that may be wrong, in any direction.
     pub slip: f64,
-    /// The share of a turn that may be wrong, either way.
+    /// The share of a turn that may be wrong, in either direction.
     pub turn_slip: f64,
-    /// The turn that may be wrong beside that, radians per metre driven.
+    /// The additional turn that may be wrong, radians per metre driven.
     pub turn_slip_per_m: f64,
 }
 
-/// What a tracker needs to know.
+/// The settings of a tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_tracker_settings {
     /// The errors of the odometry.
     pub errors: posegate_odometry_errors,
-    /// The source of the fixes: how far its covariances are trusted, and how fast the robot moves at most (a larger increment is a
+    /// The source of the fixes: the trust in its covariances, and the largest speeds of the robot (a larger increment is a
     /// jump). The tracker applies the trust, so the gate's source of the carried reports has inflation 1 and all terms filled. Its
     /// frame is not used.
     pub source: posegate_source,
     /// The longest time between two increments, and from the newest to now, milliseconds: from 1 to 2^31 - 1.
     pub maximum_gap_ms: u32,
-    /// The oldest fix that is carried, milliseconds: from 1 to 2^31 - 1. Its growth limits its use long before that.
+    /// The oldest fix that is carried, milliseconds: from 1 to 2^31 - 1. The growth of its set usually ends its use much earlier.
     pub maximum_fix_age_ms: u32,
 }
 
-/// A movement of the odometry since the increment before, in the robot's axes at its start.
+/// A movement of the odometry since the previous increment, in the robot's axes at its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_increment {
-    /// Ahead, metres: at most 4 either way.
+    /// Ahead, metres: from -4 to 4.
     pub ahead_m: f64,
     /// To the left, metres.
     pub left_m: f64,
     /// Counter-clockwise, radians: less than half a turn.
     pub turn_rad: f64,
-    /// The time at its beginning, milliseconds of the controller's clock: the end of the one before. Otherwise one was lost.
+    /// The time at its beginning, milliseconds of the controller's clock. If it is not the end of the previous increment, one was lost.
     pub begins_ms: u32,
-    /// The time at its end.
+    /// The time at its end, by the same clock.
     pub stamp_ms: u32,
 }
 
-/// The report for now, or why there is none.
+/// The report for now, or the reason why there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_tracked {
-    /// For `posegate_gate_step_on`. Without a report it is of no form and closes a gate.
+    /// For `posegate_gate_step_on`. Without a report it is invalid and closes a gate.
     pub evidence: posegate_evidence,
-    /// 0, or the `posegate_reason` for which there is no report.
+    /// 0, or the `posegate_reason` why there is no report.
     pub reason: u32,
     /// Reserved: 0.
     pub reserved: u32,
@@ -148,12 +148,12 @@ fn code(outcome: Result<(), Reason>) -> u32 {
     outcome.map_or_else(|reason| u32::from(reason.code()), |()| 0)
 }
 
-/// Initialises storage for a tracker without odometry and without a fix, whose reports are for a gate on this table.
+/// Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
 ///
 /// Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the table can be read.
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be read.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_init(
     tracker: *mut posegate_tracker,
@@ -194,15 +194,15 @@ pub unsafe extern "C" fn posegate_tracker_init(
     })
 }
 
-/// Takes an increment of the odometry. Writes 0, or the `posegate_reason` for which the way is broken:
-/// `POSEGATE_REASON_ODOMETRY_GAP`, `_JUMP` or `_BACKWARDS`. The tracker then begins again and waits for a newer fix; close the gate
+/// Takes an increment of the odometry. Writes 0, or the `posegate_reason` that breaks the path:
+/// `POSEGATE_REASON_ODOMETRY_GAP`, `_JUMP` or `_BACKWARDS`. The tracker then restarts and waits for a newer fix; close the gate
 /// with the reason (`posegate_gate_inhibit`).
 ///
-/// Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the increment is not finite or too large. The way is then broken too, as by a
-/// jump.
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the increment is not finite or too large. This also breaks the path, as a jump
+/// does.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_odometry(
     tracker: *mut posegate_tracker,
@@ -210,7 +210,7 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     reason: *mut u32,
 ) -> posegate_status {
     const JUMP: u32 = Reason::OdometryJump.code() as u32;
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, increment).and(separate(tracker, reason));
         let given = read(increment);
@@ -238,21 +238,21 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     })
 }
 
-/// Takes a fix, also one that comes late: it is carried along the increments since its stamp. All fixes come from one source, each with
-/// another sequence number. Writes 0, or the `posegate_reason` for which it is not used. After `POSEGATE_REASON_SEQUENCE_STUCK`,
-/// `_SOURCE_CHANGED` and `_FRAME_MISMATCH` nothing is carried until the next fix; otherwise what was carried before.
+/// Takes a fix, also a late one: it is carried along the increments since its stamp. All fixes come from one source, each with
+/// another sequence number. Writes 0, or the `posegate_reason` why the fix is not used. After `POSEGATE_REASON_SEQUENCE_STUCK`,
+/// `_SOURCE_CHANGED` and `_FRAME_MISMATCH` nothing is carried until the next fix; otherwise the previous fix remains in use.
 ///
 /// Errors: those of a report. Nothing is carried until the next fix.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_fix(
     tracker: *mut posegate_tracker,
     report: *const posegate_report,
     reason: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, report).and(separate(tracker, reason));
         let report = read(report).and_then(|report| report.report());
@@ -271,11 +271,11 @@ pub unsafe extern "C" fn posegate_tracker_fix(
     })
 }
 
-/// Writes the report for now: the newest fix at the place of the newest odometry. Without one, a permit ends by itself in
+/// Writes the report for now: the newest fix, carried to the newest odometry. Without a report, a permit ends by itself in
 /// `posegate_gate_tick`; `posegate_gate_inhibit` with the reason ends it at once.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_tracker_tracked(
     tracker: *mut posegate_tracker,
@@ -294,7 +294,7 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
             reserved: 0,
         },
     };
-    // SAFETY: the caller's promise; what is sealed has been written.
+    // SAFETY: the caller's promise; sealed storage has been written.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, tracked);
         write(tracked, of(&Err(Reason::Silent)))?;

@@ -163,7 +163,7 @@ impl posegate_reply {
         const CONTENT: i32 = posegate_status::WireContent as i32;
         const TABLE: i32 = posegate_status::WireTable as i32;
         let verdict = match self.status {
-            NONE => Ok(self.verdict.told()?),
+            NONE => Ok(self.verdict.decode()?),
             FRAME => Err(WireError::Frame),
             CHECKSUM => Err(WireError::Checksum),
             CONTENT => Err(WireError::Content),
@@ -184,7 +184,7 @@ impl posegate_reply {
 
 impl posegate_verdict {
     /// Returns the verdict, or `None` if the numbers contradict each other.
-    fn told(&self) -> Option<Verdict> {
+    fn decode(&self) -> Option<Verdict> {
         let flag = |flag: u8| match flag {
             0 => Some(false),
             1 => Some(true),
@@ -214,7 +214,7 @@ impl posegate_verdict {
 /// Initialises storage for an empty receiver.
 ///
 /// # Safety
-/// The pointer is null, misaligned, or points to what its type says.
+/// The pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_receiver_init(
     receiver: *mut posegate_receiver,
@@ -231,7 +231,7 @@ pub unsafe extern "C" fn posegate_receiver_init(
 /// or a `POSEGATE_STATUS_WIRE_` error is returned.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_receiver_push(
     receiver: *mut posegate_receiver,
@@ -259,7 +259,7 @@ pub unsafe extern "C" fn posegate_receiver_push(
 /// Errors: `POSEGATE_STATUS_WIRE_CONTENT` if the body is not a request.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; `length` bytes of the body can be
+/// Each pointer is null, misaligned, or valid for its type; `length` bytes of the body can be
 /// read.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_request_decode(
@@ -283,7 +283,7 @@ pub unsafe extern "C" fn posegate_request_decode(
 /// request has a smaller radius than the table was made for.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says; there are `count` judges.
+/// Each pointer is null, misaligned, or valid for its type; there are `count` judges.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_request_judge(
     request: *const posegate_request,
@@ -310,15 +310,15 @@ pub unsafe extern "C" fn posegate_request_judge(
             table: 0,
             ..request
         };
-        let told = asked.evaluate(core::slice::from_ref(judge))?;
-        write(verdict, posegate_verdict::of(told))
+        let result = asked.evaluate(core::slice::from_ref(judge))?;
+        write(verdict, posegate_verdict::of(result))
     })
 }
 
 /// Encodes the body of a reply.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_reply_encode(
     reply: *const posegate_reply,
@@ -339,7 +339,7 @@ pub unsafe extern "C" fn posegate_reply_encode(
 /// Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message.
 ///
 /// # Safety
-/// Each pointer is null, misaligned, or points to what its type says.
+/// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_frame_encode(
     body: *const posegate_message,

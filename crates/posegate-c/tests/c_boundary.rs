@@ -278,44 +278,44 @@ fn open_gate() -> *mut posegate_gate {
     let gate = gate();
     for sequence in 0..=4 {
         let now = sequence * 25;
-        let (status, told) = step(gate, now, &good(sequence, now));
+        let (status, output) = step(gate, now, &good(sequence, now));
         assert_eq!(status, posegate_status::Ok);
-        assert_eq!(is_permit(&told), sequence >= 2, "{told:?}");
+        assert_eq!(is_permit(&output), sequence >= 2, "{output:?}");
     }
     gate
 }
 
 #[test]
-fn a_gate_opens_and_closes() {
+fn gate_opens_and_closes() {
     let gate = open_gate();
-    let (status, told) = step(gate, 110, &good(5, 110));
+    let (status, output) = step(gate, 110, &good(5, 110));
     assert_eq!(
-        (status, is_permit(&told), told.reason),
+        (status, is_permit(&output), output.reason),
         (posegate_status::Ok, true, 0)
     );
-    let mut told = open_step();
+    let mut output = open_step();
     // SAFETY: all point to values of their types.
-    let status = unsafe { posegate_gate_tick(gate, 211, &mut told) };
-    assert_eq!((status, is_permit(&told)), (posegate_status::Ok, false));
-    assert_eq!(told.reason, u32::from(Reason::Silent.code()));
-    assert_eq!(told.state.kind, posegate_state_kind::Inhibited as u32);
-    assert_eq!(told.state.reason, u32::from(Reason::Silent.code()));
+    let status = unsafe { posegate_gate_tick(gate, 211, &mut output) };
+    assert_eq!((status, is_permit(&output)), (posegate_status::Ok, false));
+    assert_eq!(output.reason, u32::from(Reason::Silent.code()));
+    assert_eq!(output.state.kind, posegate_state_kind::Inhibited as u32);
+    assert_eq!(output.state.reason, u32::from(Reason::Silent.code()));
 }
 
 /// A call without a place for the answer returns an error, and its input still counts: a denial closes, an
 /// invalid report closes, and time passes.
 #[test]
-fn what_cannot_be_told_still_closes() {
+fn gate_closes_even_if_output_cannot_be_written() {
     let outside = posegate_report {
         belief: belief(1.0, posegate_spread::Gaussian, [1e-4, 1e-4, 1e-4]),
         ..good(5, 110)
     };
     let is_open = |gate, now_ms| {
-        let mut told = open_step();
+        let mut output = open_step();
         // SAFETY: valid pointers.
-        let status = unsafe { posegate_gate_tick(gate, now_ms, &mut told) };
+        let status = unsafe { posegate_gate_tick(gate, now_ms, &mut output) };
         assert_eq!(status, posegate_status::Ok);
-        is_permit(&told)
+        is_permit(&output)
     };
     for (nowhere, expected) in [
         (core::ptr::null_mut(), posegate_status::Null),
@@ -384,21 +384,21 @@ fn bad_pointers_are_errors() {
             (misaligned(), MISALIGNED),
             (zeroed(), NOT_INITIALISED),
         ] {
-            let (status, told) = step(bad, 0, &report);
+            let (status, output) = step(bad, 0, &report);
             is(status, expected);
-            assert!(!is_permit(&told) && told.state.kind == 0);
-            let mut told = open_step();
-            is(posegate_gate_tick(bad, 0, &mut told), expected);
-            assert!(!is_permit(&told) && told.state.kind == 0);
-            let mut told = open_step();
-            is(posegate_gate_inhibit(bad, 0, 33, &mut told), expected);
-            assert!(!is_permit(&told) && told.state.kind == 0);
+            assert!(!is_permit(&output) && output.state.kind == 0);
+            let mut output = open_step();
+            is(posegate_gate_tick(bad, 0, &mut output), expected);
+            assert!(!is_permit(&output) && output.state.kind == 0);
+            let mut output = open_step();
+            is(posegate_gate_inhibit(bad, 0, 33, &mut output), expected);
+            assert!(!is_permit(&output) && output.state.kind == 0);
             is(posegate_gate_reset(bad, 0), expected);
             is(posegate_gate_fault(bad, 33), expected);
             let mut word = 2;
             is(posegate_gate_scrub(bad, 1, &mut word), expected);
             assert_eq!(word, 0);
-            let mut state = told.state;
+            let mut state = output.state;
             state.kind = posegate_state_kind::Permitted as u32;
             is(posegate_gate_state(bad, &mut state), expected);
             assert_eq!(state.kind, 0);
@@ -428,9 +428,9 @@ fn bad_pointers_are_errors() {
         // Inputs.
         let gate = open_gate();
         for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            let (status, told) = step(gate, 100, bad);
+            let (status, output) = step(gate, 100, bad);
             is(status, expected);
-            assert!(!is_permit(&told));
+            assert!(!is_permit(&output));
             let mut verdict = open_verdict();
             is(posegate_gate_examine(gate, bad, &mut verdict), expected);
             assert_eq!(verdict.verdict, POSEGATE_DENY);
@@ -586,7 +586,7 @@ unsafe fn bad_pointers_of_the_rest(is: &mut dyn FnMut(posegate_status, posegate_
 
 /// Lengths that no memory has.
 #[test]
-fn impossible_lengths_are_errors() {
+fn invalid_lengths_are_errors() {
     const BAD: posegate_status = posegate_status::BadLength;
     let bytes = DOCK.as_ptr();
     // SAFETY: no byte of such lengths is read.
@@ -625,9 +625,9 @@ fn moved_and_overwritten_storage_is_refused() {
         );
         for bit in 0..64 {
             (*gate).words[0] ^= 1 << bit;
-            let (status, told) = step(gate, 100, &good(5, 100));
+            let (status, output) = step(gate, 100, &good(5, 100));
             assert_eq!(status, posegate_status::NotInitialised);
-            assert!(!is_permit(&told));
+            assert!(!is_permit(&output));
             (*gate).words[0] ^= 1 << bit;
         }
         // A judge's storage is not a gate.
@@ -642,7 +642,7 @@ fn moved_and_overwritten_storage_is_refused() {
 
 /// An invalid report closes an open gate, and the gate can qualify again.
 #[test]
-fn what_is_no_report_closes_the_gate() {
+fn invalid_report_closes_the_gate() {
     let mut bad = [good(5, 100); 4];
     bad[0].belief.heading_kind = 0;
     bad[1].belief.heading_kind = 4;
@@ -650,15 +650,15 @@ fn what_is_no_report_closes_the_gate() {
     bad[3].belief.spread_kind = u32::MAX;
     for report in bad {
         let gate = open_gate();
-        let (status, told) = step(gate, 100, &report);
+        let (status, output) = step(gate, 100, &report);
         assert_eq!(status, posegate_status::BadValue);
-        assert!(!is_permit(&told));
-        let mut told = open_step();
+        assert!(!is_permit(&output));
+        let mut output = open_step();
         // SAFETY: valid pointers.
-        let status = unsafe { posegate_gate_tick(gate, 101, &mut told) };
+        let status = unsafe { posegate_gate_tick(gate, 101, &mut output) };
         assert_eq!(status, posegate_status::Ok);
-        assert!(!is_permit(&told));
-        assert_eq!(told.state.kind, posegate_state_kind::Inhibited as u32);
+        assert!(!is_permit(&output));
+        assert_eq!(output.state.kind, posegate_state_kind::Inhibited as u32);
     }
     for source in [2, 3, 4, 255, 256, u32::MAX] {
         let gate = open_gate();
@@ -666,11 +666,11 @@ fn what_is_no_report_closes_the_gate() {
             source,
             ..good(5, 100)
         };
-        let (status, told) = step(gate, 100, &report);
+        let (status, output) = step(gate, 100, &report);
         assert_eq!(status, posegate_status::Ok);
-        assert!(!is_permit(&told));
+        assert!(!is_permit(&output));
         assert_eq!(
-            told.reason,
+            output.reason,
             u32::from(Reason::SourceUnknown.code()),
             "{source}"
         );
@@ -679,7 +679,7 @@ fn what_is_no_report_closes_the_gate() {
 
 /// Each setting that would switch off a check has its own error, and leaves no gate.
 #[test]
-fn no_setting_switches_a_check_off() {
+fn no_setting_disables_a_check() {
     type Change = fn(&mut posegate_settings);
     let wrong: [(Change, posegate_status); 40] = [
         (|s| s.report_period_ms = 0, posegate_status::ReportPeriod),
@@ -788,7 +788,7 @@ fn no_setting_switches_a_check_off() {
 
 /// With a damaged table, or a table of another task or site, the gate reports the reason.
 #[test]
-fn a_gate_without_its_table_says_why() {
+fn gate_without_its_table_latches_with_reason() {
     let mut damaged = DOCK.to_vec();
     damaged[200] ^= 1;
     let mut other_site = settings();
@@ -806,17 +806,17 @@ fn a_gate_without_its_table_says_why() {
             let status =
                 posegate_gate_init(gate, table.as_ptr(), table.len(), &settings, counter(), 0);
             assert_eq!(status, posegate_status::Ok);
-            let (_, told) = step(gate, 0, &good(0, 0));
-            assert!(!is_permit(&told));
-            assert_eq!(told.state.kind, posegate_state_kind::Latched as u32);
-            assert_eq!(told.reason, u32::from(reason.code()));
+            let (_, output) = step(gate, 0, &good(0, 0));
+            assert!(!is_permit(&output));
+            assert_eq!(output.state.kind, posegate_state_kind::Latched as u32);
+            assert_eq!(output.reason, u32::from(reason.code()));
         }
     }
 }
 
 #[test]
 fn faults_are_latched_until_the_reset() {
-    for (told, expected) in [
+    for (reported, expected) in [
         (33, Reason::InterlockFault),
         (30, Reason::CodeDamaged),
         (0, Reason::MemoryDamaged),
@@ -825,8 +825,8 @@ fn faults_are_latched_until_the_reset() {
         let gate = open_gate();
         // SAFETY: valid pointers.
         unsafe {
-            let status = posegate_gate_fault(gate, told);
-            assert_eq!(status == posegate_status::Ok, (1..=35).contains(&told));
+            let status = posegate_gate_fault(gate, reported);
+            assert_eq!(status == posegate_status::Ok, (1..=35).contains(&reported));
             let mut state = open_step().state;
             assert_eq!(posegate_gate_state(gate, &mut state), posegate_status::Ok);
             assert_eq!(state.kind, posegate_state_kind::Latched as u32);
@@ -839,8 +839,8 @@ fn faults_are_latched_until_the_reset() {
             assert_eq!(posegate_gate_reset(gate, 200), posegate_status::Ok);
             for sequence in 0..=2 {
                 let now = 240 + sequence;
-                let (_, told) = step(gate, now, &good(sequence, now));
-                assert_eq!(is_permit(&told), sequence == 2, "{told:?}");
+                let (_, output) = step(gate, now, &good(sequence, now));
+                assert_eq!(is_permit(&output), sequence == 2, "{output:?}");
             }
         }
     }
@@ -859,10 +859,13 @@ fn an_inhibited_gate_qualifies_again() {
         let gate = open_gate();
         // SAFETY: valid pointers; a step is optional.
         unsafe {
-            let mut told = open_step();
-            assert_eq!(posegate_gate_inhibit(gate, 100, reason, &mut told), status);
-            assert!(!is_permit(&told));
-            assert_eq!(told.state.kind, kind as u32, "{reason}");
+            let mut output = open_step();
+            assert_eq!(
+                posegate_gate_inhibit(gate, 100, reason, &mut output),
+                status
+            );
+            assert!(!is_permit(&output));
+            assert_eq!(output.state.kind, kind as u32, "{reason}");
             let gate = open_gate();
             let none = posegate_gate_inhibit(gate, 100, reason, core::ptr::null_mut());
             assert_eq!(none, posegate_status::Null);
@@ -874,18 +877,18 @@ fn an_inhibited_gate_qualifies_again() {
     let gate = open_gate();
     // SAFETY: valid pointers.
     unsafe {
-        let mut told = open_step();
+        let mut output = open_step();
         let late = u32::from(Reason::CycleLate.code());
         assert_eq!(
-            posegate_gate_inhibit(gate, 100, late, &mut told),
+            posegate_gate_inhibit(gate, 100, late, &mut output),
             posegate_status::Ok
         );
-        assert_eq!(told.state.reason, late);
+        assert_eq!(output.state.reason, late);
     }
     for sequence in 5..=7 {
         let now = 120 + 20 * sequence;
-        let (_, told) = step(gate, now, &good(sequence, now));
-        assert_eq!(is_permit(&told), sequence == 7, "{told:?}");
+        let (_, output) = step(gate, now, &good(sequence, now));
+        assert_eq!(is_permit(&output), sequence == 7, "{output:?}");
     }
 }
 
@@ -929,7 +932,7 @@ fn a_reset_takes_no_damaged_settings() {
 
 /// A scrub reports its rounds, and latches the gate if the bytes do not match their checksum.
 #[test]
-fn a_scrub_tells_what_it_finds() {
+fn scrub_reports_its_result() {
     let mut damaged = DOCK.to_vec();
     damaged[200] ^= 1;
     let length = damaged.len();
@@ -938,22 +941,22 @@ fn a_scrub_tells_what_it_finds() {
         (damaged.as_slice(), posegate_scrubbed::Damaged),
     ] {
         let gate = zeroed();
-        let mut told = 0;
+        let mut output = 0;
         // SAFETY: valid pointers.
         unsafe {
             let status =
                 posegate_gate_init(gate, table.as_ptr(), length, &settings(), counter(), 0);
             assert_eq!(status, posegate_status::Ok);
-            let status = posegate_gate_scrub(gate, 100, &mut told);
+            let status = posegate_gate_scrub(gate, 100, &mut output);
             assert_eq!(status, posegate_status::Ok);
-            assert_eq!(told, posegate_scrubbed::UnderWay as u32);
-            let status = posegate_gate_scrub(gate, length, &mut told);
-            assert_eq!((status, told), (posegate_status::Ok, found as u32));
+            assert_eq!(output, posegate_scrubbed::UnderWay as u32);
+            let status = posegate_gate_scrub(gate, length, &mut output);
+            assert_eq!((status, output), (posegate_status::Ok, found as u32));
             // Without a place for the answer the round continues.
             let status = posegate_gate_scrub(gate, 100, core::ptr::null_mut());
             assert_eq!(status, posegate_status::Null);
-            let status = posegate_gate_scrub(gate, length - 104, &mut told);
-            assert_eq!((status, told), (posegate_status::Ok, found as u32));
+            let status = posegate_gate_scrub(gate, length - 104, &mut output);
+            assert_eq!((status, output), (posegate_status::Ok, found as u32));
         }
     }
 }
@@ -1076,29 +1079,37 @@ fn in_c(belief: &PoseEstimate) -> posegate_belief {
     }
 }
 
-fn assert_same(told: &posegate_verdict, verdict: &Verdict, place: &str) {
+fn assert_same(output: &posegate_verdict, verdict: &Verdict, place: &str) {
     match verdict {
         Verdict::Permit { margin } => {
-            assert_eq!((told.verdict, told.reason), (POSEGATE_PERMIT, 0), "{place}");
-            assert_eq!((told.has_margin, told.has_worst_pose), (1, 0), "{place}");
-            assert_eq!(told.margin_q16, margin.q16(), "{place}");
+            assert_eq!(
+                (output.verdict, output.reason),
+                (POSEGATE_PERMIT, 0),
+                "{place}"
+            );
+            assert_eq!(
+                (output.has_margin, output.has_worst_pose),
+                (1, 0),
+                "{place}"
+            );
+            assert_eq!(output.margin_q16, margin.q16(), "{place}");
         }
         Verdict::Deny {
             reason,
             margin,
             worst_pose,
         } => {
-            assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
-            assert_eq!(told.reason, u32::from(reason.code()), "{place}");
+            assert_eq!(output.verdict, POSEGATE_DENY, "{place}");
+            assert_eq!(output.reason, u32::from(reason.code()), "{place}");
             let has = (margin.is_some(), worst_pose.is_some());
             assert_eq!(
-                (told.has_margin == 1, told.has_worst_pose == 1),
+                (output.has_margin == 1, output.has_worst_pose == 1),
                 has,
                 "{place}"
             );
-            assert_eq!(told.margin_q16, margin.map_or(0, |m| m.q16()), "{place}");
+            assert_eq!(output.margin_q16, margin.map_or(0, |m| m.q16()), "{place}");
             let pose = worst_pose.unwrap_or_default();
-            let found = &told.worst_pose;
+            let found = &output.worst_pose;
             assert_eq!(
                 (found.x_um, found.y_um, found.yaw_turn_q32),
                 (pose.x_um, pose.y_um, pose.yaw.0),
@@ -1110,7 +1121,7 @@ fn assert_same(told: &posegate_verdict, verdict: &Verdict, place: &str) {
 
 /// A gate in C and a gate in Rust with the same reports, ticks and faults agree at every step.
 #[test]
-fn the_gate_is_that_of_rust() {
+fn c_gate_equals_rust_gate() {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let (in_c, mut in_rust) = (gate(), Gate::new(DOCK, settings_of_rust(), 0).unwrap());
     let (mut now, mut sequence) = (0u32, 0u32);
@@ -1119,10 +1130,10 @@ fn the_gate_is_that_of_rust() {
         now = now.wrapping_add(random.below(30));
         // Rounds with good reports, so that the gate opens, and other rounds.
         let calm = round / 16 % 2 == 0;
-        let mut told = open_step();
+        let mut output = open_step();
         let (expected, place) = if random.below(6) == 0 {
             // SAFETY: valid pointers.
-            let status = unsafe { posegate_gate_tick(in_c, now, &mut told) };
+            let status = unsafe { posegate_gate_tick(in_c, now, &mut output) };
             assert_eq!(status, posegate_status::Ok);
             (in_rust.tick(now), format!("tick {round} at {now}"))
         } else {
@@ -1172,7 +1183,7 @@ fn the_gate_is_that_of_rust() {
             }
             let (status, step) = step(in_c, now, &given);
             assert_eq!(status, posegate_status::Ok);
-            told = step;
+            output = step;
             (
                 in_rust.step(now, &report),
                 format!("{round} at {now}: {report:?}"),
@@ -1185,8 +1196,12 @@ fn the_gate_is_that_of_rust() {
             flow: [low, high],
             made_ms: [a, b, c, d],
         };
-        assert_eq!(told.permission, permission, "{place}");
-        assert_eq!(is_permit(&told), expected.permission.is_permit(), "{place}");
+        assert_eq!(output.permission, permission, "{place}");
+        assert_eq!(
+            is_permit(&output),
+            expected.permission.is_permit(),
+            "{place}"
+        );
         let (kind, reason, count) = match expected.state {
             State::Inhibited(reason) => (1, reason.code(), 0),
             State::Qualifying(count) => (2, 0, count),
@@ -1199,10 +1214,10 @@ fn the_gate_is_that_of_rust() {
             reason: u32::from(reason),
             permits: u32::from(count),
         };
-        assert_eq!(told.state, state, "{place}");
+        assert_eq!(output.state, state, "{place}");
         let reason = expected.verdict.map_or_else(Reason::code, |()| 0);
-        assert_eq!(told.reason, u32::from(reason), "{place}");
-        if is_permit(&told) {
+        assert_eq!(output.reason, u32::from(reason), "{place}");
+        if is_permit(&output) {
             permits += 1;
         } else {
             denials += 1;
@@ -1218,7 +1233,7 @@ fn the_gate_is_that_of_rust() {
 
 /// A judge in C and one in Rust agree on the same estimates.
 #[test]
-fn the_judge_is_that_of_rust() {
+fn c_judge_equals_rust_evaluator() {
     let mut random = Random(0x2545_f491_4f6c_dd1d);
     let (in_c, in_rust) = (judge(DOCK), Evaluator::new(DOCK, 200).unwrap());
     let (mut permits, mut denials, mut refused) = (0, 0, 0);
@@ -1254,28 +1269,40 @@ fn the_judge_is_that_of_rust() {
         };
         let asked = estimate(&self::in_c(&belief), now, stamp, radius);
         let place = format!("{round}: {belief:?} {now} {stamp} {radius}");
-        let mut told = open_verdict();
+        let mut output = open_verdict();
         // SAFETY: valid pointers.
-        let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
+        let status = unsafe { posegate_judge_permits(in_c, &asked, &mut output) };
         if radius > 0 && radius < site && matches!(belief.spread, Some(Uncertainty::Gaussian(_))) {
             // Less strict than the site.
             assert_eq!(status, posegate_status::BadValue, "{place}");
-            assert_eq!(told.verdict, POSEGATE_DENY, "{place}");
+            assert_eq!(output.verdict, POSEGATE_DENY, "{place}");
             refused += 1;
             continue;
         }
         assert_eq!(status, posegate_status::Ok, "{place}");
         let expected = in_rust.permits(now, stamp, set);
-        assert_eq!(told.verdict == POSEGATE_PERMIT, expected.is_ok(), "{place}");
-        assert_eq!(told.verdict == POSEGATE_DENY, expected.is_err(), "{place}");
+        assert_eq!(
+            output.verdict == POSEGATE_PERMIT,
+            expected.is_ok(),
+            "{place}"
+        );
+        assert_eq!(
+            output.verdict == POSEGATE_DENY,
+            expected.is_err(),
+            "{place}"
+        );
         let reason = expected.map_or_else(Reason::code, |()| 0);
-        assert_eq!(told.reason, u32::from(reason), "{place}");
-        assert_eq!((told.has_margin, told.has_worst_pose), (0, 0), "{place}");
+        assert_eq!(output.reason, u32::from(reason), "{place}");
+        assert_eq!(
+            (output.has_margin, output.has_worst_pose),
+            (0, 0),
+            "{place}"
+        );
         if round % 7 == 0 {
             // SAFETY: valid pointers.
-            let status = unsafe { posegate_judge_examine(in_c, &asked, &mut told) };
+            let status = unsafe { posegate_judge_examine(in_c, &asked, &mut output) };
             assert_eq!(status, posegate_status::Ok, "{place}");
-            assert_same(&told, &in_rust.evaluate(now, stamp, set), &place);
+            assert_same(&output, &in_rust.evaluate(now, stamp, set), &place);
         }
         if expected.is_ok() {
             permits += 1;
@@ -1292,19 +1319,19 @@ fn the_judge_is_that_of_rust() {
     // A radius that switches off the check, and one just below the site's.
     let below = in_rust.radius_squared().q16() - 1;
     for radius in [1, 65_535, below, 1 << 24, u32::MAX] {
-        let mut told = open_verdict();
+        let mut output = open_verdict();
         let asked = estimate(&good(0, 0).belief, 0, 0, radius);
         // SAFETY: valid pointers.
-        let status = unsafe { posegate_judge_permits(in_c, &asked, &mut told) };
+        let status = unsafe { posegate_judge_permits(in_c, &asked, &mut output) };
         assert_eq!(
-            (status, told.verdict),
+            (status, output.verdict),
             (posegate_status::BadValue, POSEGATE_DENY)
         );
     }
 }
 
 #[test]
-fn messages_become_the_beliefs_of_rust() {
+fn c_messages_become_same_estimates_as_in_rust() {
     let mut random = Random(0x1234_5678_9abc_def1);
     for _ in 0..ROUNDS.min(500) {
         let mut made = leaked(in_c(&random.belief()));
@@ -1314,16 +1341,17 @@ fn messages_become_the_beliefs_of_rust() {
         let pose_covariance = core::array::from_fn(|_| float());
         let angles = [float(), float(), float()];
         // SAFETY: valid pointers.
-        let told = |expected: PoseEstimate, status: posegate_status, made: *mut posegate_belief| unsafe {
-            assert_eq!(status, posegate_status::Ok);
-            let (got, expected) = (&*made, in_c(&expected));
-            assert_eq!((got.x_m, got.y_m), (expected.x_m, expected.y_m));
-            assert_eq!(got.heading_kind, expected.heading_kind);
-            assert_eq!(got.spread_kind, expected.spread_kind);
-            assert_eq!(got.spread, expected.spread);
-            let used = [1, 3, 4][got.heading_kind as usize - 1];
-            assert_eq!(got.heading[..used], expected.heading[..used]);
-        };
+        let check =
+            |expected: PoseEstimate, status: posegate_status, made: *mut posegate_belief| unsafe {
+                assert_eq!(status, posegate_status::Ok);
+                let (got, expected) = (&*made, in_c(&expected));
+                assert_eq!((got.x_m, got.y_m), (expected.x_m, expected.y_m));
+                assert_eq!(got.heading_kind, expected.heading_kind);
+                assert_eq!(got.spread_kind, expected.spread_kind);
+                assert_eq!(got.spread, expected.spread);
+                let used = [1, 3, 4][got.heading_kind as usize - 1];
+                assert_eq!(got.heading[..used], expected.heading[..used]);
+            };
         for (axes, side) in [(1, mavlink::Axes::Up), (2, mavlink::Axes::Down)] {
             let message = posegate_mavlink_odometry {
                 position,
@@ -1337,7 +1365,7 @@ fn messages_become_the_beliefs_of_rust() {
                 q,
                 pose_covariance,
             };
-            told(odometry.belief(side), status, made);
+            check(odometry.belief(side), status, made);
             let message = posegate_mavlink_vision {
                 position,
                 angles,
@@ -1350,7 +1378,7 @@ fn messages_become_the_beliefs_of_rust() {
                 angles,
                 covariance: pose_covariance,
             };
-            told(vision.belief(side), status, made);
+            check(vision.belief(side), status, made);
         }
         let numbers: [f32; 9] = core::array::from_fn(|_| float());
         let [x_m, y_m, yaw_rad, xx, xy, x_yaw, yy, y_yaw, yaw_yaw] = numbers;
@@ -1367,7 +1395,7 @@ fn messages_become_the_beliefs_of_rust() {
         };
         // SAFETY: valid pointers.
         let status = unsafe { posegate_belief_from_compact(&compact, made) };
-        told(PoseEstimate::compact(numbers), status, made);
+        check(PoseEstimate::compact(numbers), status, made);
         let message = posegate_ros_pose {
             position: position.map(f64::from),
             orientation: q.map(f64::from),
@@ -1380,7 +1408,7 @@ fn messages_become_the_beliefs_of_rust() {
             orientation: message.orientation,
             covariance: message.covariance,
         };
-        told(PoseEstimate::from(&same), status, made);
+        check(PoseEstimate::from(&same), status, made);
         // Invalid axes give no belief that a gate would accept.
         for axes in [0, 3, u32::MAX] {
             made = leaked(in_c(&PoseEstimate::compact(numbers)));
@@ -1428,7 +1456,7 @@ fn request() -> posegate_request {
 
 /// Frames, good and damaged, are decoded and encoded as by `posegate::wire`.
 #[test]
-fn the_wire_is_that_of_rust() {
+fn c_wire_bytes_equal_rust_bytes() {
     let mut random = Random(77);
     let receiver = zeroed();
     let judges = leaked([[0u64; size_of::<posegate_judge>() / 8]; 2]).cast::<posegate_judge>();
@@ -1537,19 +1565,19 @@ unsafe fn answer(
             Reply::refused(error)
         }
     };
-    let mut told = message(&[]);
+    let mut output = message(&[]);
     // SAFETY: valid pointers.
     unsafe {
         assert_eq!(
-            posegate_reply_encode(&reply, &mut told),
+            posegate_reply_encode(&reply, &mut output),
             posegate_status::Ok
         );
-        assert_eq!(told.bytes[..usize::from(told.length)], expected.body());
-        let pointer = &raw mut told;
+        assert_eq!(output.bytes[..usize::from(output.length)], expected.body());
+        let pointer = &raw mut output;
         assert_eq!(posegate_frame_encode(pointer, pointer), posegate_status::Ok);
     }
     assert_eq!(
-        told.bytes[..usize::from(told.length)],
+        output.bytes[..usize::from(output.length)],
         encode(&expected.body())
     );
     status == posegate_status::Ok
@@ -1625,7 +1653,7 @@ fn contradictions_are_refused() {
 }
 
 #[test]
-fn reasons_have_the_texts_of_the_crate() {
+fn c_reasons_have_texts_of_rust_crate() {
     // SAFETY: a static text that ends with a zero.
     let text = |text| unsafe { CStr::from_ptr(text) }.to_str().unwrap();
     for reason in Reason::ALL {
@@ -1643,7 +1671,7 @@ fn reasons_have_the_texts_of_the_crate() {
 }
 
 #[test]
-fn tables_frames_and_checksums_are_told() {
+fn table_info_frames_and_checksums_equal_rust() {
     let info = zeroed::<posegate_table_info>();
     let table = Table::parse(DOCK).unwrap();
     // SAFETY: valid pointers.

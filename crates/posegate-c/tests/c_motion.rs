@@ -1,4 +1,4 @@
-//! A robot that moves, in C: hypotheses, the tracker and fitting settings do what they do in Rust, and no wrong argument opens a gate.
+//! A robot that moves, in C: hypotheses, tracker and fitting settings act as in Rust, and no wrong argument opens a gate.
 
 use posegate::gate::{Evidence, Gate, Reason, Settings, Source, Verdict};
 use posegate::motion::MotionBounds;
@@ -197,16 +197,16 @@ fn step_on(
     }
 }
 
-/// A drive with odometry at 50 Hz, fixes that come late, and a gate at every increment: each answer of C is that of Rust.
+/// A drive with odometry at 50 Hz, late fixes, and a gate at every increment: each answer in C equals that in Rust.
 #[test]
-fn a_tracker_in_c_is_that_in_rust() {
+fn c_tracker_equals_rust_tracker() {
     let (gate_c, mut gate) = (gate_of_c(SEE_T7), gate_of_rust(SEE_T7));
     let (tracker_c, mut tracker) = (tracker_of_c(), tracker_of_rust());
     let mut seen = BTreeSet::new();
     let (mut opened, mut sequence, mut newest) = (0, 0, 0);
     for cycle in 1..2_000u32 {
         let now = 20 * cycle;
-        // A stop of the odometry, and a jump, each once in a while.
+        // Now and then the odometry stops or jumps.
         let ahead =
             if cycle % 701 == 0 { 0.2 } else { 0.004 } * f64::from(cycle % 40) / 40.0 - 0.002;
         let turn = 0.001 * (f64::from(cycle % 13) - 6.0);
@@ -312,9 +312,9 @@ fn a_tracker_in_c_is_that_in_rust() {
     }
 }
 
-/// Inflations by age: each answer of C is that of Rust, at every age. A time that is not stated has the source's own inflation.
+/// Inflations by age: each answer in C equals that in Rust, at every age. Without a stated age the source's own inflation applies.
 #[test]
-fn inflations_by_age_in_c_are_those_in_rust() {
+fn c_inflation_by_age_equals_rust() {
     let table = Table::parse(SEE_T7).unwrap();
     let steps = [(512, 1 << 16), (4992, 9 << 16), (59_968, 100 << 16)];
     let mut of_c = settings_of_c(&table);
@@ -373,9 +373,9 @@ fn inflations_by_age_in_c_are_those_in_rust() {
     assert!(!permits.contains(&(0, true)) && !permits.contains(&(u32::MAX, true)));
 }
 
-/// Each hypothesis must be inside, the slip counts, and more than seven others are an error.
+/// Each hypothesis must be inside, the slip counts, and more than seven other hypotheses are an error.
 #[test]
-fn hypotheses_in_c_are_those_in_rust() {
+fn c_hypotheses_equal_rust() {
     let good = belief_of_c(0.0, 0.0, 0.0);
     let beyond = belief_of_c(1.9, 1.5, 0.0);
     for (others, beside_um, reason) in [
@@ -405,7 +405,7 @@ fn hypotheses_in_c_are_those_in_rust() {
             stamp_ms: 100,
             belief: belief(0.0, 0.0, 0.0),
         };
-        let told = gate.step_on(
+        let answer = gate.step_on(
             110,
             &Evidence {
                 report: &report,
@@ -415,14 +415,14 @@ fn hypotheses_in_c_are_those_in_rust() {
                 elsewhere: Risk::NONE,
             },
         );
-        assert_eq!(told.verdict.err(), reason, "{} {beside_um}", others.len());
+        assert_eq!(answer.verdict.err(), reason, "{} {beside_um}", others.len());
         assert_eq!(
             step.reason,
             reason.map_or(0, |reason| u32::from(reason.code()))
         );
     }
     let mut evidence = evidence_of_c(report_of_c(1, 100, good), &[good; 7]);
-    // What is left out: a thousandth is made up for, a fiftieth is more than the confidence of 0.99 leaves open.
+    // Probability outside of the hypotheses: 0.001 is compensated; 0.02 exceeds the 0.01 that a confidence of 0.99 leaves.
     for (elsewhere_q32, reason) in [
         (u32::MAX / 1000, 0),
         (u32::MAX / 50, u32::from(Reason::ElsewhereTooLikely.code())),
@@ -442,7 +442,7 @@ fn hypotheses_in_c_are_those_in_rust() {
     evidence.other_count = 3;
     evidence.others[2].heading_kind = 9;
     assert_eq!(step_on(gate, 110, &evidence).0, posegate_status::BadValue);
-    // What is beyond the count is not read.
+    // Entries beyond the count are not read.
     evidence.other_count = 2;
     assert_eq!(step_on(gate, 110, &evidence).0, posegate_status::Ok);
 }
@@ -512,7 +512,7 @@ fn bad_pointers_are_errors_and_close() {
 }
 
 #[test]
-fn odometry_that_is_no_number_ends_the_way() {
+fn invalid_odometry_ends_the_path() {
     let tracker = tracker_of_c();
     let mut reason = 0;
     let increment = |stamp_ms: u32, ahead_m| posegate_increment {
@@ -553,7 +553,7 @@ fn odometry_that_is_no_number_ends_the_way() {
 
 /// Zeroed and wrong settings of a tracker are refused.
 #[test]
-fn no_setting_of_a_tracker_is_missing() {
+fn zeroed_and_wrong_tracker_settings_are_refused() {
     type Change = fn(&mut posegate_tracker_settings);
     let wrong: [(Change, posegate_status); 9] = [
         (
@@ -595,9 +595,9 @@ fn no_setting_of_a_tracker_is_missing() {
     }
 }
 
-/// The times are those of Rust, and zeroed times do not make a gate.
+/// The times equal those of Rust, and zeroed times make no gate.
 #[test]
-fn fitting_settings_are_those_of_rust() {
+fn c_settings_check_equals_rust() {
     for (period_ms, jitter_ms) in [(20, 10), (500, 100), (0, 0), (u32::MAX, 7)] {
         let times = Settings::for_source(period_ms, jitter_ms);
         let found = zeroed::<posegate_settings>();
@@ -632,9 +632,9 @@ fn fitting_settings_are_those_of_rust() {
     }
 }
 
-/// A monitor in C says what the one in Rust says, fix by fix, refuses what is none, and stays contradicted until its reset.
+/// A monitor in C equals one in Rust after each fix, refuses invalid innovations, and stays contradicted until its reset.
 #[test]
-fn a_monitor_says_what_that_of_rust_says() {
+fn c_monitor_equals_rust_monitor() {
     use posegate::gate::{Innovation, ModelStanding, Monitor};
     // SAFETY: storage and values of their types, which stay where they are.
     unsafe {

@@ -414,7 +414,7 @@ fn functions() -> Vec<Function> {
         assert_eq!(status, posegate_status::Ok);
         decoded.assume_init()
     };
-    let told = posegate_reply {
+    let reply = posegate_reply {
         sequence: 7,
         status: 0,
         // SAFETY: numbers.
@@ -658,7 +658,7 @@ fn functions() -> Vec<Function> {
     );
     function!(
         posegate_reply_encode,
-        [input(told), output::<posegate_message>()],
+        [input(reply), output::<posegate_message>()],
         |p| p[0].cast(),
         p[1].cast()
     );
@@ -679,9 +679,9 @@ fn places(arguments: &[Argument], pair: Option<(usize, usize, isize)>) -> Vec<*m
         .collect();
     if let Some((first, second, offset)) = pair {
         // Space before and after.
-        let room = arguments[first].bytes.len() + 2 * arguments[second].bytes.len() + 64;
+        let size = arguments[first].bytes.len() + 2 * arguments[second].bytes.len() + 64;
         let before = arguments[second].bytes.len().next_multiple_of(16) + 16;
-        places[first] = memory(room + before).wrapping_add(before);
+        places[first] = memory(size + before).wrapping_add(before);
         places[second] = places[first].wrapping_offset(offset);
     }
     places
@@ -721,7 +721,7 @@ fn outputs(function: &Function, places: &[*mut u8]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn arguments_that_share_memory_are_read_first_or_refused() {
+fn overlapping_arguments_are_read_first_or_refused() {
     let (mut same, mut refused) = (0, 0);
     for function in functions() {
         let arguments = &function.arguments;
@@ -750,13 +750,13 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
                         .map(|(argument, place)| read(*place, argument.bytes.len()))
                         .collect();
                     let status = (function.call)(&places);
-                    let told = outputs(&function, &places);
+                    let written = outputs(&function, &places);
                     // A gate borrows its table, and writes its counter as long as it is used.
                     let borrowed =
                         function.name == "posegate_gate_init" && (first, second) == (1, 3);
                     if with_storage || borrowed {
                         assert_eq!(status, posegate_status::Overlap, "{what}");
-                        assert_eq!(told, denied, "{what}");
+                        assert_eq!(written, denied, "{what}");
                         for (k, argument) in arguments.iter().enumerate() {
                             if argument.is_storage() && (k == first || k == second) {
                                 let other = if k == first { second } else { first };
@@ -778,7 +778,7 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
                         refused += 1;
                     } else {
                         let expected = apart(&function, &given, true);
-                        assert_eq!((status, told), expected, "{what}");
+                        assert_eq!((status, written), expected, "{what}");
                         same += 1;
                     }
                 }
@@ -791,7 +791,7 @@ fn arguments_that_share_memory_are_read_first_or_refused() {
 /// A union of the report and the step, as in a controller with little memory: the denial that is written
 /// first must not be evaluated as the report.
 #[test]
-fn a_report_in_the_memory_of_its_answer_is_judged_as_it_was() {
+fn report_overlapping_its_answer_is_read_before_the_write() {
     let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
     let counter = memory(4).cast();
     let union = memory(size_of::<posegate_report>());
@@ -820,7 +820,7 @@ fn a_report_in_the_memory_of_its_answer_is_judged_as_it_was() {
 
 /// Settings that share memory with the counter or the table are used as given: the gate opens as usual.
 #[test]
-fn settings_that_share_memory_with_the_counter_are_read_first() {
+fn settings_overlapping_the_counter_are_read_first() {
     for offset in (0..size_of::<posegate_settings>()).step_by(4) {
         let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
         let shared = memory(size_of::<posegate_settings>());
@@ -864,7 +864,7 @@ fn an_output_in_the_counter_latches_the_gate() {
 
 /// An address of the counter with a flipped bit is not dereferenced.
 #[test]
-fn a_damaged_address_of_the_counter_latches_the_gate() {
+fn corrupted_counter_address_latches_the_gate() {
     let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
     let counter = set_up_gate(gate);
     let whole = read(gate.cast(), size_of::<posegate_gate>());
@@ -889,7 +889,7 @@ fn a_damaged_address_of_the_counter_latches_the_gate() {
 
 /// The tests above cover all functions of the header with two or more pointers.
 #[test]
-fn every_function_with_two_pointers_is_tried() {
+fn every_function_with_two_pointers_is_tested() {
     let header = include_str!("../../../include/posegate.h");
     let (_, declared) = header.split_once("extern \"C\" {").unwrap();
     let mut tried: BTreeSet<_> = functions().iter().map(|f| f.name.to_owned()).collect();
@@ -914,7 +914,7 @@ fn every_function_with_two_pointers_is_tried() {
 
 /// A saved gate that is restored after a fault does not contain the fault, but its counter shows it.
 #[test]
-fn a_gate_that_is_put_back_is_refused() {
+fn restored_gate_copy_is_refused() {
     let gate = memory(size_of::<posegate_gate>()).cast::<posegate_gate>();
     set_up(Kind::Gate, gate.cast());
     let step = memory(size_of::<posegate_step>()).cast::<posegate_step>();

@@ -1,4 +1,4 @@
-//! `include/posegate.h` is what `posegate-c` says, and its reasons are those of `posegate::gate::Reason`.
+//! `include/posegate.h` equals what cbindgen generates from `posegate-c`, and its reasons equal `posegate::gate::Reason`.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate-peers --test c_header` rewrites it.
 
@@ -11,9 +11,9 @@ fn at_root(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
 }
 
-/// The header as cbindgen makes it of the sources: the crate with its files, and the reasons. (Their
-/// list, a constant of Rust, it would write as a macro that names nothing.)
-fn made() -> String {
+/// Returns the header that cbindgen generates from the crate and the reasons, without the macro for the Rust constant
+/// `Reason::ALL`, which has no meaning in C.
+fn generated() -> String {
     let config = cbindgen::Config::from_file(at_root("cbindgen.toml")).expect("cbindgen.toml");
     let bindings = cbindgen::Builder::new()
         .with_config(config)
@@ -31,34 +31,34 @@ fn made() -> String {
     paragraphs.join("\n\n").lines().map(as_c).collect()
 }
 
-/// A line with what cbindgen leaves out: numbers are unsigned, as the fields are that they are for.
+/// Returns a line with the suffix U that cbindgen omits: numbers are unsigned, as are their fields.
 fn as_c(line: &str) -> String {
     let is_number = line.starts_with("#define ") && line.ends_with(|c: char| c.is_ascii_digit());
     let suffix = if is_number { "U" } else { "" };
     format!("{line}{suffix}\n")
 }
 
-/// The committed header; rewritten first where that is asked for.
+/// Returns the committed header. With `POSEGATE_BLESS=1` it is first replaced by the generated one.
 fn committed() -> String {
     if std::env::var_os("POSEGATE_BLESS").is_some_and(|value| value == "1") {
-        std::fs::write(at_root(HEADER), made()).expect("the header is written");
+        std::fs::write(at_root(HEADER), generated()).expect("the header is written");
     }
     std::fs::read_to_string(at_root(HEADER)).unwrap_or_else(|error| panic!("{HEADER}: {error}"))
 }
 
 #[test]
-fn the_header_is_that_of_the_sources() {
+fn header_equals_cbindgen_output() {
     assert!(
-        committed() == made(),
+        committed() == generated(),
         "{HEADER} differs: POSEGATE_BLESS=1 cargo test -p posegate-peers --test c_header"
     );
 }
 
-/// Every reason with its number, and no other.
+/// The header has every reason with its number, and no other reason.
 #[test]
-fn the_reasons_are_the_crates() {
+fn header_reasons_equal_crate_reasons() {
     let header = committed();
-    let told: Vec<(&str, u8)> = header
+    let found: Vec<(&str, u8)> = header
         .lines()
         .filter_map(|line| line.trim().strip_prefix("POSEGATE_REASON_"))
         .map(|line| {
@@ -75,13 +75,13 @@ fn the_reasons_are_the_crates() {
         .zip(Reason::ALL)
         .map(|(name, reason)| (name.as_str(), reason.code()))
         .collect();
-    assert_eq!(told, expected);
+    assert_eq!(found, expected);
 }
 
-/// What MISRA C:2012 asks of a header and a compiler does not: no function-like macro (directive 4.9), no
-/// integer whose size is the compiler's (directive 4.6).
+/// Two rules of MISRA C:2012 that a compiler does not check: no function-like macro (directive 4.9), and no integer type
+/// whose size depends on the compiler (directive 4.6).
 #[test]
-fn the_header_is_plain() {
+fn header_has_only_plain_c() {
     let header = committed();
     let code: String = without_comments(&header);
     for line in code.lines() {
@@ -92,7 +92,7 @@ fn the_header_is_plain() {
             let used = line
                 .split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
                 .any(|word| word == kind);
-            // An enum's own type is fixed beside it.
+            // The fields that hold an enum have a type of fixed size.
             let declares = line.starts_with("enum ") || line.starts_with("typedef enum ");
             assert!(!used || declares, "{kind}: {line}");
         }

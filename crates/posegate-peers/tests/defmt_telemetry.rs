@@ -1,6 +1,6 @@
-//! The firmware of `examples/defmt_telemetry.rs` in QEMU: what it logs over semihosting is decoded here,
-//! with the names that its ELF file holds, and compared with `tests/data/defmt.txt` word for word. And a
-//! look at the source: every public type of the core can be logged.
+//! The firmware of `examples/defmt_telemetry.rs` in QEMU logs over semihosting. The log is decoded with the strings of its
+//! ELF file and must equal `tests/data/defmt.txt`. A second test checks the source: every public type of the core
+//! can be logged.
 //!
 //! `POSEGATE_BLESS=1 cargo test -p posegate-peers --test defmt_telemetry` rewrites the text.
 
@@ -16,7 +16,7 @@ fn at_root(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
 }
 
-/// The bytes that a firmware logs until it ends.
+/// Returns the bytes that a firmware logs until it ends.
 fn logged(elf: &Path) -> Vec<u8> {
     let output = Command::new("qemu-system-arm")
         .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
@@ -30,7 +30,7 @@ fn logged(elf: &Path) -> Vec<u8> {
     output.stdout
 }
 
-/// What they say: a line each, with time and level.
+/// Returns the log as text, one line per message, with time and level.
 fn decoded(elf: &Path, bytes: &[u8]) -> String {
     let elf = std::fs::read(elf).expect("the firmware");
     let table = Table::parse(&elf)
@@ -53,7 +53,7 @@ fn decoded(elf: &Path, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn what_a_controller_logs_is_read_on_the_host() {
+fn controller_log_is_decoded_on_host() {
     let elf = firmware::build_with("defmt_telemetry", "firmware,defmt");
     let bytes = logged(&elf);
     let text = decoded(&elf, &bytes);
@@ -64,16 +64,16 @@ fn what_a_controller_logs_is_read_on_the_host() {
     let expected = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{EXPECTED}: {e}"));
     assert!(
         text == expected,
-        "POSEGATE_BLESS=1 writes {EXPECTED} anew:\n{text}"
+        "POSEGATE_BLESS=1 rewrites {EXPECTED}:\n{text}"
     );
-    // Words stay in the ELF file.
+    // The strings stay in the ELF file.
     assert!(
         bytes.len() * 3 < text.len(),
         "{} {}",
         bytes.len(),
         text.len()
     );
-    // What it must speak of, whatever the words.
+    // The log must contain these, whatever the format.
     for word in [
         "Report {",
         "PoseEstimate {",
@@ -99,27 +99,27 @@ fn what_a_controller_logs_is_read_on_the_host() {
     }
 }
 
-/// A public type of a core module, and where it is.
+/// A public type of a core module, and its module.
 struct Type {
     name: String,
     place: String,
     can_be_logged: bool,
 }
 
-/// The core modules of `src/lib.rs`.
-fn core_rooms() -> Vec<String> {
+/// Returns the core modules of `src/lib.rs`.
+fn core_modules() -> Vec<String> {
     let text = std::fs::read_to_string(at_root("src/lib.rs")).unwrap();
     let (core, _) = text.split_once("std line").unwrap();
-    let rooms = core
+    let modules = core
         .lines()
         .filter_map(|line| line.strip_prefix("pub mod "));
-    rooms
-        .map(|room| room.trim_end_matches(';').to_owned())
+    modules
+        .map(|module| module.trim_end_matches(';').to_owned())
         .collect()
 }
 
-/// The types of a file that can be named from outside: all of a public module's, and of a private one what
-/// its parent publishes. `published` is the parent's text, or nothing where the module is public.
+/// Returns the types of a file that other crates can name: all types of a public module, and the re-exported ones of a
+/// private module. `published` is the parent's text, or `None` if the module is public.
 fn types(place: &str, text: &str, published: Option<&str>) -> Vec<Type> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let lines: Vec<&str> = code.lines().collect();
@@ -161,33 +161,33 @@ fn types(place: &str, text: &str, published: Option<&str>) -> Vec<Type> {
     types
 }
 
-/// Every public type of the core.
+/// Returns every public type of the core.
 fn public_types() -> Vec<Type> {
     let mut found = Vec::new();
-    for room in core_rooms() {
-        let file = at_root(&format!("src/{room}.rs"));
-        let folder = at_root(&format!("src/{room}"));
+    for module in core_modules() {
+        let file = at_root(&format!("src/{module}.rs"));
+        let folder = at_root(&format!("src/{module}"));
         let head = if file.is_file() {
             file
         } else {
             folder.join("mod.rs")
         };
         let head_text = std::fs::read_to_string(&head).unwrap();
-        found.extend(types(&room, &head_text, None));
+        found.extend(types(&module, &head_text, None));
         let Ok(entries) = std::fs::read_dir(&folder) else {
             continue;
         };
         for entry in entries {
             let path = entry.unwrap().path();
-            let module = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            let child = path.file_stem().unwrap().to_str().unwrap().to_owned();
             let is_source = path.extension().is_some_and(|e| e == "rs");
-            if !is_source || module == "mod" || module == "tests" {
+            if !is_source || child == "mod" || child == "tests" {
                 continue;
             }
             let text = std::fs::read_to_string(&path).unwrap();
-            let is_public = head_text.contains(&format!("pub mod {module};"));
+            let is_public = head_text.contains(&format!("pub mod {child};"));
             let published = (!is_public).then_some(head_text.as_str());
-            found.extend(types(&format!("{room}::{module}"), &text, published));
+            found.extend(types(&format!("{module}::{child}"), &text, published));
         }
     }
     found
@@ -217,7 +217,7 @@ fn every_public_type_of_the_core_can_be_logged() {
 }
 
 #[test]
-fn a_type_that_cannot_be_logged_is_seen() {
+fn type_without_defmt_format_is_detected() {
     let parent = "mod a;\npub use self::a::{Seen, Both};\n";
     let text = "
 #[derive(Debug)]
@@ -233,22 +233,22 @@ pub struct Hidden;
 #[cfg(test)]
 pub struct Test;
 ";
-    let told = |text: &str, published| -> Vec<(String, bool)> {
+    let names = |text: &str, published| -> Vec<(String, bool)> {
         let found = types("", text, published).into_iter();
         found.map(|t| (t.name, t.can_be_logged)).collect()
     };
     let pair = |name: &str, logged| (name.to_owned(), logged);
     let through = [pair("Seen", true), pair("Both", false)];
-    assert_eq!(told(text, Some(parent)), through);
+    assert_eq!(names(text, Some(parent)), through);
     let all = [
         pair("Seen", true),
         pair("Both", false),
         pair("Hidden", false),
     ];
-    assert_eq!(told(text, None), all);
+    assert_eq!(names(text, None), all);
     let by_hand = text.replace(
         "pub struct Hidden",
         "impl defmt::Format for Both<'_> {}\npub struct Hidden",
     );
-    assert_eq!(told(&by_hand, Some(parent))[1], pair("Both", true));
+    assert_eq!(names(&by_hand, Some(parent))[1], pair("Both", true));
 }

@@ -1,4 +1,4 @@
-//! The crate `mcap` reads what `posegate replay --mcap` writes, and `posegate replay` reads what the crate writes.
+//! The crate `mcap` reads files of `posegate replay --mcap`, and `posegate replay` reads files of the crate.
 
 use mcap::records::MessageHeader;
 use mcap::{MessageStream, WriteOptions};
@@ -10,7 +10,7 @@ use std::io::Cursor;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// A drive to the dock: estimates and true poses.
+/// Returns a recording of a drive to the dock: estimates and true poses.
 fn drive(compression: Option<Compression>, count: u32) -> Vec<u8> {
     let mut bag = Bag::new(compression, true);
     for k in 0..count {
@@ -27,7 +27,7 @@ fn drive(compression: Option<Compression>, count: u32) -> Vec<u8> {
     bag.finish()
 }
 
-/// Runs `posegate replay` in a folder on `drive.mcap` and returns its summary, without what tells of the file's layout.
+/// Runs `posegate replay` in a folder on `drive.mcap` and returns its summary, without the fields about the file's layout.
 fn replay(folder: &Path, bag: &[u8], more: &[&str]) -> Value {
     std::fs::write(folder.join("drive.mcap"), bag).unwrap();
     let output = Command::new(program())
@@ -49,7 +49,7 @@ fn replay(folder: &Path, bag: &[u8], more: &[&str]) -> Value {
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
-    // 1: a permit that is false by the true poses.
+    // Exit code 1: a permit that is false by the true poses.
     assert!(matches!(output.status.code(), Some(0 | 1)), "{said}");
     let mut summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     let recording = summary["recording"].as_object_mut().unwrap();
@@ -59,7 +59,7 @@ fn replay(folder: &Path, bag: &[u8], more: &[&str]) -> Value {
     summary
 }
 
-/// The messages of a file, written again by the crate.
+/// Returns the messages of a file, rewritten by the crate.
 fn rewritten(bag: &[u8], options: WriteOptions) -> Vec<u8> {
     let mut writer = options
         .profile("ros2")
@@ -94,7 +94,7 @@ fn rewritten(bag: &[u8], options: WriteOptions) -> Vec<u8> {
 }
 
 #[test]
-fn files_of_the_crate_are_read_as_those_of_the_testkit() {
+fn crate_and_testkit_files_give_equal_replays() {
     let folder = tempfile::tempdir().unwrap();
     let own = drive(None, 200);
     let expected = replay(folder.path(), &own, &[]);
@@ -126,7 +126,7 @@ fn files_of_the_crate_are_read_as_those_of_the_testkit() {
 }
 
 #[test]
-fn a_replays_channels_are_read_by_the_crate() {
+fn replay_channels_are_read_by_mcap_crate() {
     let folder = tempfile::tempdir().unwrap();
     // More than a chunk of 1 MiB.
     let count = 4000;

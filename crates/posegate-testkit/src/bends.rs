@@ -1,4 +1,4 @@
-//! Tells which ellipsoids the third step of the facet test decides. Repeats the steps before it in floating
+//! Finds the ellipsoids that the third step of the facet test decides. Repeats the steps before it in floating
 //! point, from the description of a set in a frame in `src/contain/frame.rs`.
 
 use core::f64::consts::TAU;
@@ -8,7 +8,7 @@ use posegate::wire::{Request, Uncertainty};
 /// The slack of a facet for an ellipsoid, metres.
 struct Left {
     /// Slack along the normal, less the reach to first order.
-    room: f64,
+    slack: f64,
     /// A lower bound of what the second step subtracts for the bend.
     bend: f64,
 }
@@ -43,7 +43,7 @@ pub fn decided(table: &Table<'_>, request: &Request, permitted: bool) -> bool {
             .map(|(frame, facet)| set.left(&frame, facet))
             .collect()
     };
-    let bent = |left: &Left| left.room < left.bend - rounding;
+    let bent = |left: &Left| left.slack < left.bend - rounding;
     if permitted {
         // No piece contains the set by the first two steps.
         return set
@@ -55,7 +55,9 @@ pub fn decided(table: &Table<'_>, request: &Request, permitted: bool) -> bool {
     let enough = roundings + set.rest();
     set.facets.pieces().any(|piece| {
         let left = left(&piece);
-        set.is_in_arc(&piece) && left.iter().any(bent) && left.iter().all(|left| left.room > enough)
+        set.is_in_arc(&piece)
+            && left.iter().any(bent)
+            && left.iter().all(|left| left.slack > enough)
     })
 }
 
@@ -90,7 +92,7 @@ impl<'a> Set<'a> {
         let one = f64::from(1 << NORMAL_BITS);
         let a = [facet.x, facet.y].map(|v| f64::from(v) / one);
         let point = [frame.x, frame.y].map(|v| f64::from(v) * self.unit);
-        // P of the estimate, what the yaw does to it, and the normal in world axes.
+        // P of the estimate, its change by the yaw, and the normal in world axes.
         let (seen, lever, normal, bend) = match frame.axes {
             Axes::World => {
                 let [x, y] = turned(self.yaw, point);
@@ -108,12 +110,12 @@ impl<'a> Set<'a> {
             .map(|(i, j)| g[i] * self.shape[i][j] * g[j])
             .sum();
         Left {
-            room: f64::from(facet.b) * self.unit - dot(a, seen) - square.sqrt(),
+            slack: f64::from(facet.b) * self.unit - dot(a, seen) - square.sqrt(),
             bend,
         }
     }
 
-    /// No less than what is left beyond first order and the bend.
+    /// Returns an upper bound of the terms beyond first order and the bend.
     fn rest(&self) -> f64 {
         let metres = |length: u16| f64::from(length) * self.unit;
         let (arm, farthest) = (metres(self.facets.arm()), metres(self.facets.farthest()));
@@ -125,9 +127,9 @@ impl<'a> Set<'a> {
     fn is_in_arc(&self, piece: &Piece<'_>) -> bool {
         let radians = |units: u32| f64::from(units) / 4_294_967_296.0 * TAU;
         let above = (self.above_goal - radians(piece.from)).rem_euclid(TAU);
-        let room = above.min(radians(piece.width) - above);
+        let slack = above.min(radians(piece.width) - above);
         // The steps apply to at most half a radian.
-        self.turn < 0.499 && (piece.is_whole_circle() || self.turn < room - 1e-4)
+        self.turn < 0.499 && (piece.is_whole_circle() || self.turn < slack - 1e-4)
     }
 }
 

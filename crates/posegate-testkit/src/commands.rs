@@ -91,7 +91,7 @@ pub const LINES: [(&str, &str); 35] = [
     ("man", "man -o {output}"),
 ];
 
-/// Returns the exit code of a leaf's lines. `place` searches where no place sees the tag, because that is quick.
+/// Returns the exit code of a leaf's lines. `place` searches a region where no place sees the tag, because that is quick.
 pub fn code_of(leaf: &str) -> i32 {
     i32::from(leaf == "place")
 }

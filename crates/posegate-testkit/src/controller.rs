@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 
 pub const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 const MAP: FrameId = FrameId::of("map");
-/// The firmware's settings; the test `the_settings_are_the_firmwares` compares them with its source.
+/// The firmware's settings; the test `host_settings_equal_firmware_settings` compares them with its source.
 pub const PERMIT_HOLD_MS: u32 = 100;
 pub const MAXIMUM_AGE_MS: u32 = 200;
 pub const RESPONSE_MS: u32 = WATCHDOG_MS + PERIOD_MS;
@@ -99,7 +99,7 @@ impl Chance {
     }
 }
 
-/// Counts of what a controller did.
+/// Counts of a controller's actions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Messages in which the interlock was high.
@@ -138,8 +138,8 @@ pub struct Controller {
     tracker: Tracker<64>,
     /// The last time that the controller reported before the current frame began.
     begun_ms: Option<u32>,
-    /// The messages that the controller must find in the sent bytes, each with the last time that it had reported before.
-    on_the_way: VecDeque<(Sent, u32)>,
+    /// The messages that the controller must find in the sent bytes, each with the last time reported before it.
+    in_transit: VecDeque<(Sent, u32)>,
     /// Bytes to put on the line before the next cycle.
     to_send: Vec<u8>,
     sent: u32,
@@ -147,7 +147,7 @@ pub struct Controller {
     late: bool,
     past: VecDeque<Past>,
     last: Option<Telemetry>,
-    /// `false` once bytes were lost: the host then does not know what the controller has read.
+    /// `false` once bytes were lost: the host then does not know which bytes the controller has read.
     compared: bool,
     next_sequence: u32,
 }
@@ -178,7 +178,7 @@ impl Controller {
             collector: HypothesisCollector::new(),
             tracker: tracker(),
             begun_ms: None,
-            on_the_way: VecDeque::new(),
+            in_transit: VecDeque::new(),
             to_send: Vec::new(),
             sent: 0,
             late: false,
@@ -188,8 +188,8 @@ impl Controller {
             next_sequence: 0,
         };
         assert_eq!(controller.board.run(&[]).at, At::Cycle);
-        controller.until("the hold time is over", |told| {
-            told.now_ms.wrapping_sub(CLOCK_STARTS_AT) > 300
+        controller.until("the hold time is over", |telemetry| {
+            telemetry.now_ms.wrapping_sub(CLOCK_STARTS_AT) > 300
         });
         controller
     }
@@ -219,9 +219,11 @@ impl Controller {
     pub fn pour(&mut self, bytes: &[u8]) {
         self.to_send.extend(bytes);
         self.sent = self.sent.wrapping_add(bytes.len() as u32);
-        let told_ms = self.last.map_or(CLOCK_STARTS_AT, |told| told.now_ms);
+        let reported_ms = self
+            .last
+            .map_or(CLOCK_STARTS_AT, |telemetry| telemetry.now_ms);
         for byte in bytes {
-            let begun_ms = *self.begun_ms.get_or_insert(told_ms);
+            let begun_ms = *self.begun_ms.get_or_insert(reported_ms);
             if *byte == 0 {
                 self.begun_ms = None;
             }
@@ -235,14 +237,14 @@ impl Controller {
                     _ => continue,
                 },
             };
-            self.on_the_way.push_back((sent, begun_ms));
+            self.in_transit.push_back((sent, begun_ms));
         }
     }
 
     /// Ends the comparison, because bytes may be lost from here on.
     pub fn compare_no_more(&mut self) {
         self.compared = false;
-        self.on_the_way.clear();
+        self.in_transit.clear();
         self.past.clear();
     }
 
@@ -279,23 +281,23 @@ impl Controller {
         self.send(&encode(&increment_body(increment)));
     }
 
-    /// Gives the host's tracker the odometry and the fixes that are next. Returns why one of them broke the way.
+    /// Gives the host's tracker the odometry and the fixes that are next. Returns the reason if one of them broke the path.
     fn follow(&mut self) -> Option<Reason> {
         loop {
-            match self.on_the_way.front() {
+            match self.in_transit.front() {
                 Some((Sent::Odometry(_), _)) => {}
                 Some((Sent::Report(report, _), _)) if report.source == CARRIED => {}
                 _ => return None,
             }
-            match self.on_the_way.pop_front() {
+            match self.in_transit.pop_front() {
                 Some((Sent::Odometry(increment), _)) => {
                     if let Err(reason) = self.tracker.odometry(increment) {
                         return Some(reason);
                     }
                 }
-                Some((Sent::Report(fix, others), told_ms)) => {
+                Some((Sent::Report(fix, others), reported_ms)) => {
                     // Tests send no fix whose stamp is between the last report's time and its own arrival.
-                    let is_future = told_ms.wrapping_sub(fix.stamp_ms) >= 1 << 31;
+                    let is_future = reported_ms.wrapping_sub(fix.stamp_ms) >= 1 << 31;
                     if is_future || !others.is_empty() {
                         self.tracker.drop_fix();
                     } else {
@@ -307,12 +309,12 @@ impl Controller {
         }
     }
 
-    /// Returns the next report that is evaluated as it comes.
+    /// Returns the next report that is evaluated at its arrival.
     fn next_sent(&mut self) -> (Report, Vec<PoseEstimate>, u32) {
         let broken = self.follow();
         assert_eq!(broken, None);
-        match self.on_the_way.pop_front() {
-            Some((Sent::Report(report, others), told_ms)) => (report, others, told_ms),
+        match self.in_transit.pop_front() {
+            Some((Sent::Report(report, others), reported_ms)) => (report, others, reported_ms),
             _ => panic!("no report was sent"),
         }
     }
@@ -355,64 +357,78 @@ impl Controller {
                 None => assert_eq!(self.run_cycle().at, At::Cycle, "the watchdog has come"),
             }
         };
-        let told = Telemetry::from_body(&body).unwrap_or_else(|| panic!("no telemetry: {body:?}"));
+        let telemetry =
+            Telemetry::from_body(&body).unwrap_or_else(|| panic!("no telemetry: {body:?}"));
         if let Some(last) = self.last {
             assert_eq!(
-                told.number,
+                telemetry.number,
                 last.number.wrapping_add(1),
                 "a message is missing"
             );
-            let cycles = told.cycle.wrapping_sub(last.cycle);
+            let cycles = telemetry.cycle.wrapping_sub(last.cycle);
             assert!(cycles <= 1, "{cycles} cycles without a message");
-            assert!(cycles == 1 || told.now_ms == last.now_ms, "{told:?}");
-            let passed = told.now_ms.wrapping_sub(last.now_ms);
+            assert!(
+                cycles == 1 || telemetry.now_ms == last.now_ms,
+                "{telemetry:?}"
+            );
+            let passed = telemetry.now_ms.wrapping_sub(last.now_ms);
             assert!(
                 passed < 1 << 31,
-                "the clock went backwards: {last:?} {told:?}"
+                "the clock went backwards: {last:?} {telemetry:?}"
             );
         }
-        assert_eq!(told.permitted, told.state == State::Permitted, "{told:?}");
-        assert_eq!(told.permitted, told.interlock_high, "{told:?}");
-        assert_eq!(told.fault, None, "{told:?}");
+        assert_eq!(
+            telemetry.permitted,
+            telemetry.state == State::Permitted,
+            "{telemetry:?}"
+        );
+        assert_eq!(
+            telemetry.permitted, telemetry.interlock_high,
+            "{telemetry:?}"
+        );
+        assert_eq!(telemetry.fault, None, "{telemetry:?}");
         if self.compared {
-            self.compare(&told);
+            self.compare(&telemetry);
         }
         let was_open = self.last.is_some_and(|last| last.permitted);
-        self.tally.opened += usize::from(told.permitted && !was_open);
-        self.last = Some(told);
-        told
+        self.tally.opened += usize::from(telemetry.permitted && !was_open);
+        self.last = Some(telemetry);
+        telemetry
     }
 
-    fn compare(&mut self, told: &Telemetry) {
-        assert_eq!(told.line.lost, 0, "{told:?}");
+    fn compare(&mut self, telemetry: &Telemetry) {
+        assert_eq!(telemetry.line.lost, 0, "{telemetry:?}");
         let before = self.last.map_or(0, |last| last.line.left_aside);
-        for _ in before..told.line.left_aside {
+        for _ in before..telemetry.line.left_aside {
             self.next_sent();
         }
-        let expected = match told.weighed {
+        let expected = match telemetry.weighed {
             None if std::mem::take(&mut self.late) => {
-                self.gate.inhibit(told.now_ms, Reason::InterlockFault)
+                self.gate.inhibit(telemetry.now_ms, Reason::InterlockFault)
             }
             None => match self.follow() {
-                Some(reason) => self.gate.inhibit(told.now_ms, reason),
-                None => self.gate.tick(told.now_ms),
+                Some(reason) => self.gate.inhibit(telemetry.now_ms, reason),
+                None => self.gate.tick(telemetry.now_ms),
             },
             Some(weighed) if weighed.source == CARRIED => {
                 assert_eq!(self.follow(), None);
-                let tracked = self.tracker.tracked(told.now_ms).expect("a carried fix");
+                let tracked = self
+                    .tracker
+                    .tracked(telemetry.now_ms)
+                    .expect("a carried fix");
                 assert_eq!(
                     (weighed.sequence, weighed.stamp_ms),
                     (tracked.report.sequence, tracked.report.stamp_ms)
                 );
-                let step = self.gate.step_on(told.now_ms, &tracked.evidence());
-                assert_eq!(weighed.verdict, step.verdict, "{told:?} {tracked:?}");
+                let step = self.gate.step_on(telemetry.now_ms, &tracked.evidence());
+                assert_eq!(weighed.verdict, step.verdict, "{telemetry:?} {tracked:?}");
                 self.tally.weighed += 1;
                 self.tally.permitting += usize::from(weighed.verdict.is_ok());
-                self.remember(&tracked.report, told.now_ms);
+                self.remember(&tracked.report, telemetry.now_ms);
                 step
             }
             Some(weighed) => {
-                let (mut sent, others, told_ms) = self.next_sent();
+                let (mut sent, others, reported_ms) = self.next_sent();
                 assert_eq!(
                     (weighed.source, weighed.sequence),
                     (sent.source, sent.sequence)
@@ -421,11 +437,15 @@ impl Controller {
                 // the clock's range), as one from the future. Each byte arrives between its sending and its
                 // evaluation.
                 if weighed.stamp_ms != sent.stamp_ms {
-                    assert_eq!(weighed.stamp_ms, told.now_ms.wrapping_add(1), "{told:?}");
-                    let later = sent.stamp_ms.wrapping_sub(told_ms);
-                    let under_way = told.now_ms.wrapping_sub(told_ms);
+                    assert_eq!(
+                        weighed.stamp_ms,
+                        telemetry.now_ms.wrapping_add(1),
+                        "{telemetry:?}"
+                    );
+                    let later = sent.stamp_ms.wrapping_sub(reported_ms);
+                    let under_way = telemetry.now_ms.wrapping_sub(reported_ms);
                     let range = 1..=(1 << 31) + under_way;
-                    assert!(range.contains(&later), "{told:?} {sent:?}");
+                    assert!(range.contains(&later), "{telemetry:?} {sent:?}");
                     sent.stamp_ms = weighed.stamp_ms;
                 }
                 let evidence = Evidence {
@@ -435,22 +455,22 @@ impl Controller {
                     since_fix_ms: None,
                     elsewhere: Risk::NONE,
                 };
-                let step = self.gate.step_on(told.now_ms, &evidence);
-                assert_eq!(weighed.verdict, step.verdict, "{told:?} {sent:?}");
+                let step = self.gate.step_on(telemetry.now_ms, &evidence);
+                assert_eq!(weighed.verdict, step.verdict, "{telemetry:?} {sent:?}");
                 self.tally.weighed += 1;
                 self.tally.permitting += usize::from(weighed.verdict.is_ok());
-                self.remember(&sent, told.now_ms);
+                self.remember(&sent, telemetry.now_ms);
                 step
             }
         };
         assert_eq!(
-            (told.state, told.permitted),
+            (telemetry.state, telemetry.permitted),
             (expected.state, expected.permission.is_permit()),
-            "{told:?}"
+            "{telemetry:?}"
         );
-        if told.interlock_high {
+        if telemetry.interlock_high {
             self.tally.high += 1;
-            let rightly = self.may_be_open(told.now_ms);
+            let rightly = self.may_be_open(telemetry.now_ms);
             self.tally.wrongly += usize::from(!rightly);
         }
     }
@@ -500,9 +520,9 @@ impl Controller {
     /// If the condition is not met within a minute of the board's time.
     pub fn until(&mut self, what: &str, so: impl Fn(&Telemetry) -> bool) -> Telemetry {
         for _ in 0..PATIENCE {
-            let told = self.hear();
-            if so(&told) {
-                return told;
+            let telemetry = self.hear();
+            if so(&telemetry) {
+                return telemetry;
             }
         }
         panic!("not within {PATIENCE} messages: {what}; {:?}", self.last)
@@ -514,7 +534,9 @@ impl Controller {
             self.hear();
         }
         let cycle = self.last().cycle;
-        self.until("two cycles more", |told| told.cycle.wrapping_sub(cycle) > 1);
+        self.until("two cycles more", |telemetry| {
+            telemetry.cycle.wrapping_sub(cycle) > 1
+        });
     }
 
     /// Sends good reports, one per cycle, until the condition `so` is met.
@@ -525,9 +547,9 @@ impl Controller {
         for _ in 0..PATIENCE {
             let cycle = self.last().cycle;
             self.report(&self.next_report());
-            let told = self.until("the next cycle", |told| told.cycle != cycle);
-            if so(&told) {
-                return told;
+            let telemetry = self.until("the next cycle", |telemetry| telemetry.cycle != cycle);
+            if so(&telemetry) {
+                return telemetry;
             }
         }
         panic!("not within {PATIENCE} reports: {what}; {:?}", self.last)
@@ -535,6 +557,6 @@ impl Controller {
 
     /// Sends good reports until the interlock is open.
     pub fn open(&mut self) -> Telemetry {
-        self.good_until("open", |told| told.permitted)
+        self.good_until("open", |telemetry| telemetry.permitted)
     }
 }

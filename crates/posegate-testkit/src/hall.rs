@@ -1,4 +1,4 @@
-//! A robot in a hall with straight walls: its table of facets, and a judge of pose-sets in plain floats, which shares no code with the
+//! A robot in a hall with straight walls: its table of facets, and a test of pose-sets in plain floats, which shares no code with the
 //! core.
 
 use crate::oracle::Rng;
@@ -93,8 +93,8 @@ impl Believed {
         })
     }
 
-    /// Returns how far the farthest pose of the set is from a wall's border after a movement, metres: below zero it is beyond it. `length`
-    /// is the largest way, `swing` the largest turn either way.
+    /// Returns the least distance of the robot's corners from a wall over the set after a movement, metres; negative beyond a wall.
+    /// `length` is the longest movement in metres, `swing` the largest turn to either side in radians.
     #[must_use]
     pub fn room(&self, length: f64, swing: f64) -> f64 {
         let mut least = f64::INFINITY;
@@ -117,7 +117,7 @@ impl Believed {
         least
     }
 
-    /// Moves the estimate along a direction to where the room is as wanted, if there is such a place.
+    /// Moves the estimate along a direction until the distance is `room`. `None` if there is no such place.
     #[must_use]
     pub fn placed(mut self, direction: f64, room: f64, length: f64, swing: f64) -> Option<Self> {
         let at = |set: &mut Self, way: f64| {

@@ -1,4 +1,4 @@
-//! Poses around a scene and a digest of what is seen from them, which must be the same on every core.
+//! Poses around a scene and a digest of their sightings, which must be the same on every core.
 #![allow(dead_code)] // Firmware includes this file by path, and uses a part.
 
 use posegate::num::BinaryAngle;
@@ -7,10 +7,10 @@ use posegate::sight::{Sighting, TagVisibility};
 
 /// Number of poses.
 pub const LOOKS: u32 = 4_000;
-/// The digest of what is seen from them in the scene of `examples/tables/see-t7.posegate`.
+/// The digest of their sightings in the scene of `examples/tables/see-t7.posegate`.
 pub const SEE_T7: u32 = 0xffc6_7be1;
 
-/// Poses within 5 m of the origin of the world, one after another.
+/// An iterator over poses within 5 m of the origin of the world.
 pub struct Looks(u32);
 
 impl Looks {

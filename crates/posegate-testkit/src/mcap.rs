@@ -58,7 +58,7 @@ pub struct Layout {
     pub compression: Option<Compression>,
     /// A chunk ends after this many bytes of records.
     pub chunk_size: usize,
-    /// Whether to write message indexes, chunk indexes and a summary.
+    /// `true` to write message indexes, chunk indexes and a summary.
     pub index: bool,
 }
 

@@ -138,7 +138,7 @@ pub fn lying(chance: &mut Chance, good: &Report) -> Vec<u8> {
 }
 
 /// Returns random bytes, of one of several kinds.
-pub fn garbage(chance: &mut Chance, good: &Report) -> Vec<u8> {
+pub fn random_bytes(chance: &mut Chance, good: &Report) -> Vec<u8> {
     let length = 1 + chance.below(400);
     let mut bytes: Vec<u8> = (0..length).map(|_| chance.next() as u8).collect();
     match chance.below(5) {

@@ -63,14 +63,14 @@ fn boxed(half: f64, degrees: f64) -> String {
     )
 }
 
-/// Returns the set in which the robot's footprint is between rails, with `room` metres of clearance on each side.
-fn between_rails(room: f64) -> String {
+/// Returns the set in which the robot's footprint is between rails, with `slack` metres of clearance on each side.
+fn between_rails(slack: f64) -> String {
     let corners = |x: f64, y: f64| {
         format!("[[{x:?}, {y:?}], [-{x:?}, {y:?}], [-{x:?}, -{y:?}], [{x:?}, -{y:?}]]")
     };
     format!(
         "{{ shape = \"footprint\", footprint = {}, region = {} }}",
         corners(0.4, 0.3),
-        corners(0.4 + room, 0.3 + room)
+        corners(0.4 + slack, 0.3 + slack)
     )
 }

@@ -62,7 +62,7 @@ pub struct Stepped {
     line: UnixStream,
     receiver: Receiver,
     frames: VecDeque<Frame>,
-    /// Bytes in all that the board was told to wait for.
+    /// Total number of bytes that the board must wait for.
     delivered: u32,
     stop: Stop,
     // Contains the socket; removed last.
@@ -176,7 +176,7 @@ impl Stepped {
         self.write(at as u32, &NOP);
     }
 
-    /// Returns the present stop.
+    /// Returns the current stop.
     pub const fn stop(&self) -> Stop {
         self.stop
     }

@@ -84,7 +84,7 @@ pub fn turning() -> Vec<u8> {
 }
 
 /// Returns a table of facets in several pieces, of which one has an arc of its own: a robot passes the corner of an L of two regions,
-/// or stands in a bay beside it.
+/// or is in a bay next to it.
 pub fn corner() -> Vec<u8> {
     let rectangle =
         |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];

@@ -128,7 +128,7 @@ void rules() {
   require(!watch.permit().permitted, "a repeated heartbeat permits");
 }
 
-/// A source that says what the test wants.
+/// A source whose permit the test sets.
 struct Switch : PermitSource {
   bool is_on = false;
   bool throws = false;
@@ -140,7 +140,7 @@ struct Switch : PermitSource {
   }
 };
 
-/// Stands for Nav2's action of this name: runs until it is told to end, and counts.
+/// Replaces Nav2's action of this name: runs until the test ends it, and counts its calls.
 class Action : public BT::StatefulActionNode {
  public:
   using BT::StatefulActionNode::StatefulActionNode;

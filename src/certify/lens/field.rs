@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_end_where_the_derivative_does() {
+    fn field_ends_where_derivative_reaches_zero() {
         // 1 + 3 k1 r^2 = 0 at k1 = -1/3.
         let field = Lens::PlumbBob([-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0])
             .field()
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_fields_end_where_nobody_looks() {
+    fn wide_fields_end_at_farthest_angle() {
         for lens in [
             Lens::PlumbBob([0.1, 0.0, 0.0, 0.0, 0.0]),
             Lens::Equidistant([0.0; 4]),
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_that_are_none_are_refused() {
+    fn invalid_fields_are_refused() {
         let error = Lens::Equidistant([0.0, f64::NAN, 0.0, 0.0]).field();
         assert!(
             error

@@ -19,12 +19,12 @@ const WORTH: f64 = 2e-4;
 const MOST_CUTS: usize = 12;
 
 impl Outline {
-    /// Returns its solid angle.
+    /// Returns the outline's solid angle.
     pub fn solid_angle(&self) -> f64 {
         solid_angle(&self.border)
     }
 
-    /// Returns a convex polygon within it, counter-clockwise, of at most [`Window::MOST`] corners.
+    /// Returns a convex polygon within the outline, counter-clockwise, of at most [`Window::MOST`] corners.
     pub fn inner(&self) -> Vec<Point> {
         // A hull of few corners makes the rotation search fast.
         let hull = reduced(hull(&self.border), 0.01 * WORTH, usize::MAX);
@@ -50,7 +50,7 @@ impl Outline {
             .map(|at| Cut::along(polygon[at], polygon[(at + 1) % polygon.len()]))
             .map(|edge| (edge, edge.depth(self.centre)))
             .collect();
-        // How far a point is along the way from the centre to the edge behind it, as a share.
+        // The position of a point between the centre and the edge behind it, as a share.
         let share = |point: &Point| {
             let shares = edges
                 .iter()
@@ -114,12 +114,12 @@ impl Cut {
         }
     }
 
-    /// Returns how far within it a point is.
+    /// Returns how far a point is within the half-plane.
     fn depth(&self, point: Point) -> f64 {
         self.most - dot(self.normal, point)
     }
 
-    /// Rotates it by an angle, so that it still cuts off all of these points.
+    /// Rotates the half-plane by an angle, so that it still cuts off all of these points.
     fn turned(&self, angle: f64, points: &[Point]) -> Self {
         let (cos, sin) = (libm::cos(angle), libm::sin(angle));
         let [x, y] = self.normal;

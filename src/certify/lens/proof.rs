@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rectangle_is_proven_until_it_touches() {
+    fn rectangle_is_proven_until_it_touches_the_border() {
         let (region, [x, y]) = region();
         assert!(region.holds(&rectangle([x - 1e-9, y - 1e-9])));
         for off in [[1e-9, -1e-9], [-1e-9, 1e-9], [0.1, -0.1]] {

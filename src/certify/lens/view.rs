@@ -47,7 +47,7 @@ pub struct Calibration {
     pub lens: Lens,
     /// The image that is read.
     pub image: Image,
-    /// The part of it that is read; `None` for all.
+    /// The part of the image that is read; `None` for all.
     pub roi: Option<Roi>,
     /// Number of columns and rows that are combined into one, at least 1.
     pub binning: [u32; 2],
@@ -64,7 +64,7 @@ pub struct CertifiedCamera {
     /// Radius of the normalised points on which the lens is proven to be one-to-one; infinite for a pinhole.
     pub field: f64,
     /// The window's solid angle over that of everything that is seen (in the field, and visible from the middle
-    /// of the image). The rest is what no convex polygon can contain. A measure in plain floats: within 1e-3.
+    /// of the image). No convex polygon can contain the rest. A measure in plain floats: within 1e-3.
     pub kept: f64,
 }
 
@@ -83,7 +83,7 @@ impl CertifiedCamera {
     /// Takes some milliseconds.
     ///
     /// # Errors
-    /// [`LensError`] if a number is out of range, the lens folds within the image, or nothing is left to see.
+    /// [`LensError`] if a number is out of range, the lens folds within the image, or no visible point remains.
     pub fn of(calibration: &Calibration) -> Result<Self, LensError> {
         check(calibration)?;
         let raw = Part::of(calibration)?;

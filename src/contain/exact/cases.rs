@@ -142,7 +142,7 @@ impl Case {
         f64::from(yaw) / 16_777_216.0 * TAU
     }
 
-    /// Returns the same with what a movement adds to it.
+    /// Returns the case grown by a movement.
     pub(in crate::contain) fn whole_turn(&self) -> f64 {
         match self.extent {
             Extent::Grown { by, .. } => self.turn() + f64::from(by.yaw_q24()) / 16_777_216.0 * TAU,

@@ -102,7 +102,7 @@ pub(in crate::contain) fn movement_of(sweep: &Sweep) -> [f64; 2] {
     ]
 }
 
-/// A facet where u is given, by the definition in floats: `n . P - b` at the middle of the section, and the normal in world axes.
+/// Returns a facet at a given u, by the definition in floats: `n . P - b` at the middle of the section, and the normal in world axes.
 pub(in crate::contain) fn middle(
     sweep: &Sweep,
     facet: Facet,
@@ -113,7 +113,7 @@ pub(in crate::contain) fn middle(
     middle_turned(sweep, facet, axes, point, u, 0.0)
 }
 
-/// The same after a turn by `swing`, rad.
+/// As above, after a turn by `swing`, rad.
 pub(in crate::contain) fn middle_turned(
     sweep: &Sweep,
     facet: Facet,
@@ -153,7 +153,7 @@ pub(in crate::contain) fn middle_turned(
     (at_middle, normal)
 }
 
-/// How far a section reaches from its middle along a normal, where u is given.
+/// Returns the reach of a section from its middle along a normal, at a given u.
 pub(in crate::contain) fn across(sweep: &Sweep, normal: [f64; 2], u: f64) -> f64 {
     let [_, second, third] = sweep.columns.map(|column| column.map(f64::from));
     let dot = |a: [f64; 2]| a[0] * normal[0] + a[1] * normal[1];
@@ -165,7 +165,7 @@ pub(in crate::contain) fn across(sweep: &Sweep, normal: [f64; 2], u: f64) -> f64
     }
 }
 
-/// `n . P - b` at its largest where u is given, fine units.
+/// Returns the largest `n . P - b` at a given u, fine units.
 fn truth(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], u: f64) -> f64 {
     let [length, turn] = movement_of(sweep);
     let at = |swing: f64| {
@@ -175,7 +175,7 @@ fn truth(sweep: &Sweep, facet: Facet, axes: Axes, point: [i32; 2], u: f64) -> f6
     largest_turned(at, turn)
 }
 
-/// The largest value of a function over turns up to `turn` either way, as far as it is found.
+/// Returns the largest value found of a function over turns up to `turn` to either side.
 pub(in crate::contain) fn largest_turned(at: impl Fn(f64) -> f64, turn: f64) -> f64 {
     if turn == 0.0 {
         return at(0.0);
@@ -184,13 +184,13 @@ pub(in crate::contain) fn largest_turned(at: impl Fn(f64) -> f64, turn: f64) -> 
     shares.map(at).fold(f64::MIN, f64::max)
 }
 
-/// The largest of it for u in an interval: a lower bound within a fine unit of lengths up to 2^24.
+/// Returns the largest value for u in an interval: a lower bound within a fine unit of lengths up to 2^24.
 fn largest(case: &(Sweep, Facet, Axes, [i32; 2]), low: f64, high: f64) -> f64 {
     let (sweep, facet, axes, point) = case;
     largest_of(|u| truth(sweep, *facet, *axes, *point, u), low, high)
 }
 
-/// The largest value of a function on an interval, as far as it is found.
+/// Returns the largest value found of a function on an interval.
 pub(in crate::contain) fn largest_of(at: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let (mut best, mut value) = (low, f64::MIN);
     let mut step = (high - low) / 64.0;
@@ -212,7 +212,7 @@ pub(in crate::contain) fn largest_of(at: impl Fn(f64) -> f64, low: f64, high: f6
     value
 }
 
-/// The least b, fine units, at which a slab is inside.
+/// Returns the least b, fine units, at which a slab is inside.
 pub(in crate::contain) fn threshold(
     section: Section,
     sweep: &Sweep,
@@ -287,7 +287,7 @@ fn no_bound_of_a_slab_is_below_the_truth() {
 fn what_holds_is_inside_and_what_is_well_inside_holds() {
     let mut random = Random(11);
     let (mut accepted, mut missed, mut slabs_used) = (0u32, 0u32, 0u64);
-    // How much of the reach is given away: for turns of the movement up to 0.03 rad, up to 0.2 rad, and more.
+    // The lost share of the reach: for turns of the movement up to 0.03 rad, up to 0.2 rad, and more.
     let mut grown = [Vec::new(), Vec::new(), Vec::new()];
     for number in 0..crate::test_iterations(20_000, 20) {
         let mut case = case(&mut random);
@@ -298,7 +298,7 @@ fn what_holds_is_inside_and_what_is_well_inside_holds() {
         let most = largest(&case, -1.0, 1.0)
             .max(largest(&case, -1.0, 0.0))
             .max(largest(&case, 0.0, 1.0));
-        // The reach: how far the largest is above the estimate's own.
+        // The reach: the largest value minus the estimate's own.
         let reach = most - largest(&case, 0.0, 1e-9);
         let b = most / 16_384.0;
         if !(b.abs() < 32_000.0) {
@@ -376,7 +376,7 @@ fn what_holds_is_inside_and_what_is_well_inside_holds() {
     }
 }
 
-/// The cheapest test grants nothing that is not so, and all that is far away.
+/// The cheapest test accepts no set that is outside, and every set that is far inside.
 #[test]
 fn what_holds_broadly_is_inside() {
     let mut random = Random(17);
@@ -454,7 +454,7 @@ fn no_bound_of_a_width_is_below_the_truth() {
         for step in -200..=200 {
             let y = f64::from(step) / 200.0;
             let t = w * y;
-            // What kappa rounds is paid by the slack.
+            // The slack covers the rounding of kappa.
             assert!((t.sin() - kappa * t).abs() <= rest + 2e-8, "S: {w} {y}");
             assert!(
                 (y * t.cos() - y * (1.0 - shortening)).abs() <= shortening_rest,
@@ -467,7 +467,7 @@ fn no_bound_of_a_width_is_below_the_truth() {
             assert!(t.sin().powi(2) <= sine_square && cos <= t.cos(), "{w} {y}");
         }
         assert!(versine <= 1.0 - w.cos(), "{w}");
-        // No bound is more than twice what it has to be.
+        // No bound is more than twice the required value.
         let most = |f: &dyn Fn(f64) -> f64| {
             let at = (-200..=200).map(|step| f(f64::from(step) / 200.0).abs());
             at.fold(0.0, f64::max)

@@ -7,7 +7,7 @@ pub(super) const LARGEST: f64 = 16_384.0;
 
 /// The leading 33 bits of a quarter turn: its product with a number of quarter turns is exact.
 const QUARTER_HIGH: f64 = f64::from_bits(FRAC_PI_2.to_bits() & !0xf_ffff);
-/// The rest of a quarter turn: what the bits above leave of the float, and what the float leaves of pi / 2.
+/// The rest of a quarter turn: the float minus the bits above, and pi / 2 minus the float.
 const QUARTER_LOW: f64 = FRAC_PI_2 - QUARTER_HIGH + 6.123_233_995_736_766e-17;
 /// Adding this rounds a float below 2^51 to a whole number, in its low bits.
 const TO_WHOLE: f64 = 6_755_399_441_055_744.0;

@@ -4,11 +4,11 @@ use super::spread::{Point, Spread};
 use crate::contain::Cause;
 use crate::table::{Cells, Grid, Table};
 
-/// More than what the integer code rounds of a length in the goal frame, micrometres.
+/// Upper bound of the integer code's rounding of a length in the goal frame, micrometres.
 const LENGTH_SLACK: f64 = 4.0;
-/// More than what it rounds of a heading, 2^-32 turn.
+/// Upper bound of the integer code's rounding of a heading, 2^-32 turn.
 const YAW_SLACK: f64 = 1_024.0;
-/// A pose is in no cell if none is as near as this, micrometres. The integer code widens a row by 6, and the estimate is within 3.
+/// A pose is in no cell if no cell is within this distance, micrometres. The integer code widens a row by 6, and the estimate is within 3.
 const FREE: f64 = 12.0;
 /// The same in yaw, 2^-32 turn.
 const FREE_YAW: u32 = 2_048;

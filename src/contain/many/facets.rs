@@ -8,16 +8,16 @@ use crate::table::{Axes, Facets};
 use std::vec::Vec;
 
 /// Units of the extent that the integer code can round against acceptance at one facet: 8 of its own slack, 3 for the rest and
-/// the bend, 4.4 that the columns, the normal and the lever are off, 1.7 for squares of numbers that are rounded up, 1 for the
+/// the bend, 4.4 for the errors of the columns, the normal and the lever, 1.7 for squares of numbers that are rounded up, 1 for the
 /// slack of the estimate, rounded down. Together 18.1.
 const ROUNDED: f64 = 24.0;
 /// The largest turn at which the integer code evaluates facets to first order, radians; less than its half.
 const MOST_TURN: f64 = 0.4999;
-/// More than what turns and their powers are rounded up: 2 of 2^-15.
+/// Upper bound of the rounding of turns and their powers: 2 of 2^-15.
 const TURN_ROUNDED: f64 = 2.0 / 32_768.0;
 /// A normal is at most this long.
 const NORMAL: f64 = 1.0 + 1.0 / 128.0;
-/// Slack of an arc, 2^-32 turn: 3 of the integer code, and what the headings here are off.
+/// Slack of an arc, 2^-32 turn: 3 of the integer code, and the errors of the headings here.
 const ARC_SLACK: u32 = 8;
 
 /// A facet layout, lengths in micrometres.
@@ -54,9 +54,9 @@ struct Frame {
 struct Facet {
     x: f64,
     y: f64,
-    /// The bound less all that the estimate's rounding can take.
+    /// The bound minus the largest effect of the estimate's rounding.
     inner: f64,
-    /// The bound and more than the table pays for.
+    /// The bound plus more than the table's clearance.
     outer: f64,
 }
 
@@ -78,9 +78,9 @@ pub(super) struct Failing {
     is_estimate_beyond: bool,
 }
 
-/// A set with what all frames of a layout share.
+/// A set with the terms that all frames of a layout share.
 struct Terms {
-    /// What the integer code can round at a facet, micrometres.
+    /// The largest rounding of the integer code at a facet, micrometres.
     rounded: f64,
     rest_arm: f64,
     rest_robot: f64,
@@ -167,7 +167,7 @@ impl Layout {
         Err(found)
     }
 
-    /// Returns the terms of a set, or `None` if it is one that the integer code evaluates in another way.
+    /// Returns the terms of a set, or `None` if the integer code evaluates the set in another way.
     #[inline(always)]
     fn terms(&self, spread: &Spread) -> Option<Terms> {
         let at = &spread.estimate;

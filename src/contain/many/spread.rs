@@ -1,4 +1,4 @@
-//! A Gaussian pose-set in floats: the given set, and bounds of the set of integers that takes its place in a decision.
+//! A Gaussian pose-set in floats: the given set, and bounds of the set of integers that a decision uses instead.
 //!
 //! Lengths are in micrometres, headings in radians. The set of integers is `{ F u : |u| <= 1 }` with `F F' = T + R`, where T is
 //! `r2 P` and R has no negative direction. So R is at most three times its own diagonal, in every direction. The diagonal

@@ -54,7 +54,7 @@ const TABLES: [(&str, &[u8]); 12] = [
     ("self-test", include_bytes!("../../gate/self_test.posegate")),
 ];
 
-/// Numbers of a set, each as a share of what the table is wide.
+/// Numbers of a set, each as a share of the table's width.
 #[derive(Clone, Debug)]
 struct Shares {
     /// x and y from the middle of the cells, yaw from the middle of the arc.
@@ -74,9 +74,9 @@ fn shares() -> impl Strategy<Value = Shares> {
         prop_oneof![4 => -2.0f64..-0.3, 1 => -4.5f64..0.5, 1 => Just(-core::f64::consts::LOG10_2)];
     let reaches = prop_oneof![
         3 => proptest::array::uniform3(reach),
-        // Small in the plane and wide in yaw: what is beyond first order counts.
+        // Small in the plane and wide in yaw: terms beyond first order count.
         1 => (-3.6f64..-2.0, -3.6f64..-2.0, -1.2f64..-0.2).prop_map(|(x, y, yaw)| [x, y, yaw]),
-        // Small on all axes: what the estimate is rounded counts.
+        // Small on all axes: the rounding of the estimate counts.
         1 => proptest::array::uniform3(-4.2f64..-2.8),
     ];
     let correlation = (
@@ -185,7 +185,7 @@ fn scaled(covariance: [[f64; 3]; 3], by: f64) -> [[f64; 3]; 3] {
     covariance.map(|row| row.map(|entry| entry * by * by))
 }
 
-/// Compares the filter with the integer code on one set; returns what the filter is certain of.
+/// Compares the filter with the integer code on one set; returns the decision of which the filter is certain.
 fn compared(
     name: &str,
     filter: &Filter<'_>,
@@ -324,7 +324,7 @@ fn bounds_contain_the_factor() {
         let Extent::Gaussian(factor) = set.extent() else {
             panic!("not an ellipsoid");
         };
-        // Directions that weigh a length like the heading that is as wide.
+        // Directions in which lengths and headings have equal weight.
         let scale = [spread.given.xx, spread.given.yy, spread.given.tt].map(f64::sqrt);
         let along = [x / scale[0], y / scale[1], t / scale[2]];
         let turn = f64::from(factor.yaw_q24()) * core::f64::consts::TAU / 16_777_216.0;
@@ -401,7 +401,7 @@ fn answers_are_in_the_order_of_the_sets() {
     assert_eq!(found[2], Ok(Decision::Outside(Cause::OffTable)));
 }
 
-/// The filter decides most sets: else it is of no use.
+/// The filter decides most sets; otherwise it would be useless.
 #[test]
 fn most_sets_are_certain() {
     for (name, bytes) in TABLES {

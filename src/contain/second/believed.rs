@@ -21,9 +21,9 @@ pub(super) struct Question<'a> {
     pub belief: &'a PoseEstimate,
     pub trust: Trust,
     pub radius_q16: u32,
-    /// How far the robot may have moved, micrometres.
+    /// The largest movement of the robot, micrometres.
     pub moved_um: u32,
-    /// How far it may have turned either way, 2^-32 turn: at most one turn.
+    /// The largest turn of the robot to either side, 2^-32 turn: at most one turn.
     pub swing: i64,
 }
 

@@ -3,10 +3,11 @@
 //! Given the yaw, a point's position has the mean `m + C_pt t / C_tt` and the covariance
 //! `C_pp - C_pt C_tp / C_tt`, and the set's section there is that ellipse times `1 - t^2 / C_tt`. A set that is
 //! inside a facet has all its sections inside, so this denies nothing that the first evaluation permits. Between the
-//! headings it is silent: a spot check, like that of cells.
+//! headings nothing is checked: a spot check, like that of cells.
 //!
-//! What it allows, beyond the tolerances of [`super`]: 2^-11 of the extent, for quotients and a normal that is
-//! turned and rounded; 18 of the units in which the longest extent, or L times the turn, has at least 2^13; and of what the yaw moves the share that roundings have of `C_tt`.
+//! Tolerances in addition to those of [`super`]: 2^-11 of the extent, for quotients and a normal that is
+//! turned and rounded; 18 of the units in which the longest extent, or L times the turn, has at least 2^13; and,
+//! of the effect of the yaw, the share of the roundings in `C_tt`.
 
 use super::bits::{quotient, wide};
 use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot};
@@ -14,17 +15,17 @@ use super::turn::cosine_and_sine;
 
 /// Headings on either side of the estimate's.
 const SIDE: i32 = 8;
-/// Below this variance of the yaw, times L squared, the set is thinner in yaw than 2^-10 of its extent, and roundings leave nothing of
-/// what it says. Then the whole ellipsoid is compared at the estimate's heading, with all that a turn can do as a tolerance.
+/// Below this variance of the yaw, times L squared, the set is thinner in yaw than 2^-10 of its extent, and roundings exceed
+/// it. Then the whole ellipsoid is compared at the estimate's heading, with the largest effect of a turn as a tolerance.
 const THIN: i32 = 1 << 6;
-/// What roundings of C can take off the variance of the yaw, and a little.
+/// Most by which roundings of C can lower the variance of the yaw, and a little more.
 const LOST: u64 = 16;
 
 impl Body {
     /// Returns `true` if the sections of the set at seventeen headings are within a facet.
     #[inline(never)]
     pub(super) fn sections_hold(&self, facet: &Facet, axes: u8, point: [i32; 2]) -> bool {
-        // Below 2^32: of a set that turns farther, any heading may stand for another.
+        // Below 2^32: in a set that turns farther, headings repeat.
         let turn = self.reach.isqrt() as i64;
         // Twice to where the section before reaches farthest: to first order the touching point.
         let mut e = 0;
@@ -45,7 +46,7 @@ impl Body {
         })
     }
 
-    /// Where the yaw is the share e, unit 2^-15, of its extent: `None` if the section is beyond the facet, else the share at which the
+    /// Checks the section at the share e, unit 2^-15, of the yaw's extent: `None` if it is beyond the facet, else the share at which the
     /// set would reach farthest if the point moved as it does here. The robot has turned by `swing`, 2^-32 turn, after that.
     fn section_holds(
         &self,
@@ -133,7 +134,7 @@ impl Body {
             let shift = along.wrapping_mul(i64::from(e)) >> 15;
             let rest = square.wrapping_sub(along.wrapping_mul(along)).max(0);
             let open = (1i64 << 30).wrapping_sub(i64::from(e).wrapping_mul(i64::from(e)));
-            // The lever counts as well: what the point moves by over the yaw's extent.
+            // The lever counts as well: the movement of the point over the yaw's extent.
             let moved = self.moved(normal, lever, axes);
             let both = along.wrapping_add(moved);
             let length = rest
@@ -155,7 +156,7 @@ impl Body {
         holds.then_some(next)
     }
 
-    /// What the yaw's extent moves the point along the normal, in the units of a scaled length.
+    /// Returns the movement of the point along the normal over the yaw's extent, in the units of a scaled length.
     fn moved(&self, normal: [i32; 2], [lx, ly]: [i32; 2], axes: u8) -> i64 {
         let ahead = if axes == 0 {
             [ly.wrapping_neg(), lx]

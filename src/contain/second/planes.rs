@@ -24,7 +24,7 @@ const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 9);
 const WEIGHT_MICRO: (i32, i32) = (0x7a12_0000, -11);
 /// (2^32 / (2 pi))^2 with its top bit at bit 30, rounded down.
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
-/// Square of half a radian and 2^-11 of it, (2^-32 turn)^2: beyond it P is not linear in the yaw, and only sections tell.
+/// Square of half a radian and 2^-11 of it, (2^-32 turn)^2: beyond it P is not linear in the yaw, and only sections decide.
 const LARGEST_TURN: u64 = 116_929_449_004_694_807;
 /// Pi, unit 2^-30.
 const PI_Q30: u64 = 3_373_259_426;
@@ -130,9 +130,9 @@ pub(super) struct Body {
     pub(super) reach: u64,
     /// The same of an ellipsoid that has moved.
     whole_reach: u64,
-    /// How far an ellipsoid has moved, 2^-14 length units, down.
+    /// The largest movement of an ellipsoid, 2^-14 length units, down.
     pub(super) moved: i64,
-    /// How far it has turned either way, 2^-32 turn.
+    /// The largest turn of the movement to either side, 2^-32 turn.
     pub(super) swing: i64,
     pub(super) is_cylinder: bool,
     /// The amount added to every s, 2^-28 length units.
@@ -226,7 +226,7 @@ impl Body {
         Some(())
     }
 
-    /// Takes over what a movement adds to an ellipsoid.
+    /// Applies the growth of an ellipsoid by a movement.
     #[inline(never)]
     fn move_by(&mut self, question: &Question<'_>, unit: u32) {
         self.whole_reach = self.reach;

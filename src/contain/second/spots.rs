@@ -3,7 +3,7 @@
 //! The estimate and the outermost poses of the set in 26 directions (24 for a cylinder) must lie in covered
 //! cells, or each in some piece. This confirms what the first evaluation has proven; it proves nothing itself. A pose
 //! is moved towards the estimate by more than its own rounding, so it belongs to the set. The first
-//! evaluation has checked it with 6 um and 2^-24 turn to spare.
+//! evaluation has checked it with a slack of 6 um and 2^-24 turn.
 //!
 //! Each variable of the covariance is scaled by a power of two, so that its diagonal lies in
 //! `[2^28, 2^30)`. The directions are those of the scaled variables and do not depend on units.
@@ -71,7 +71,7 @@ pub(super) fn hold(table: &[u8], grid: &[u8], question: &Question<'_>) -> Option
     outermost_hold(question, &|offset| cells.covers(offset))
 }
 
-/// Whether a pose of the set is in what is asked for: its offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
+/// Returns `true` if a pose of the set is found: its offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
 type Lookup<'a> = &'a dyn Fn([i64; 3]) -> Option<bool>;
 
 /// Returns `true` if the estimate and every outermost pose of the set is found.

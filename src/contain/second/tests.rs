@@ -160,7 +160,7 @@ fn what_is_no_belief_is_not_inside() {
     }
 }
 
-/// A hundredfold covariance leaves a tenth of the room, whatever causes it.
+/// A hundredfold covariance reduces the allowed size to a tenth, for every cause.
 #[test]
 fn trust_counts() {
     for table in [SEE_T7, SEE_T7_GRID] {
@@ -213,7 +213,7 @@ fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
     }
 }
 
-/// Returns the least slack of a facet beyond what it needs, metres, from the parsed table in floats; and
+/// Returns the least slack of a facet beyond the required slack, metres, from the parsed table in floats; and
 /// the same with the tolerance of the module head.
 fn by_floats(table: &Table<'_>, [x, y, yaw]: [f64; 3], covariance: [[f64; 3]; 3]) -> [f64; 2] {
     let layout = table.facets().unwrap();

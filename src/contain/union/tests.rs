@@ -22,7 +22,7 @@ fn with_facets(random: &mut Random, count: usize) -> (Sweep, Vec<Bound>) {
     (sweep, bounds.collect())
 }
 
-/// The largest value of a weighed sum of facets on an interval of u, fine units.
+/// Returns the largest value of a weighted sum of facets on an interval of u, fine units.
 fn truth(sweep: &Sweep, parts: &[(Bound, f64)], low: f64, high: f64) -> f64 {
     let [length, turn] = movement_of(sweep);
     let at = |u: f64, swing: f64| {
@@ -38,8 +38,8 @@ fn truth(sweep: &Sweep, parts: &[(Bound, f64)], low: f64, high: f64) -> f64 {
     largest_of(|u| largest_turned(|swing| at(u, swing), turn), low, high)
 }
 
-/// No weight makes a slab say more than is true of the weighed sum. Rounding the weights themselves is no error: a sum with the rounded
-/// weight is compared with the same.
+/// For no weight a slab's bound is below the true weighted sum. Rounding the weights themselves is not an error: both sides use the
+/// rounded weight.
 #[test]
 fn no_bound_of_a_weighed_sum_is_below_the_truth() {
     let mut random = Random(23);
@@ -88,8 +88,8 @@ fn no_bound_of_a_weighed_sum_is_below_the_truth() {
     std::println!("least to spare: {least_spare:.1} fine units");
 }
 
-/// At a single heading the weight is the best: where a point of the section beyond the other facet is farthest beyond the first, found
-/// by going around the section, the sum says so to within a hundredth of the section.
+/// At a single heading the weight is the best: the sum agrees, to within a hundredth of the section, with the point of the section
+/// beyond the other facet that is farthest beyond the first. That point is found by sampling around the section.
 #[test]
 fn the_weight_is_close_to_the_best() {
     let mut random = Random(29);
@@ -122,7 +122,7 @@ fn the_weight_is_close_to_the_best() {
             left: section.left + by as i64,
             ..section
         };
-        // Both facets with the middle of the section within by as much as wanted.
+        // Both facets have the wanted slack at the middle of the section.
         let first = raise(bounds[0].section(&sweep, e), a);
         let second = raise(bounds[1].section(&sweep, e), b + cut);
         let root = if sweep.radius.is_some() {
@@ -158,7 +158,7 @@ fn the_weight_is_close_to_the_best() {
     assert!(at(0.9) < 0.01, "{}", at(0.9));
 }
 
-/// A layout of two to four random pieces about the goal, some with an arc of their own.
+/// Returns a layout of two to four random pieces about the goal, some with their own arc.
 fn layout(random: &mut Random, size: f64) -> Vec<u8> {
     let pieces = random.within(2.0, 5.0) as usize;
     let (mut heads, mut frames, mut facets) = (Vec::new(), Vec::new(), Vec::new());
@@ -222,7 +222,7 @@ fn layout(random: &mut Random, size: f64) -> Vec<u8> {
     bytes
 }
 
-/// What a pose leaves in the best piece, length units: the least of its facets, each with its clearance.
+/// Returns the slack of a pose in its best piece, length units: the least over its facets, each with its clearance.
 fn best_spare(facets: &Facets<'_>, [x, y, yaw]: [f64; 3]) -> f64 {
     let units = (yaw / core::f64::consts::TAU * 4_294_967_296.0).round() as i64 as u32;
     let (s, c) = yaw.sin_cos();

@@ -200,7 +200,7 @@ fn a_welded_contact_is_found() {
 }
 
 /// An output that goes high again before the time is over does not hide a weld. A contact that follows the
-/// output, or that is slower than a short permit, is not taken for welded.
+/// output, or that is slower than a short permit, is not reported as welded.
 #[test]
 fn a_welded_contact_is_found_under_an_output_that_flaps() {
     for start in [0, u32::MAX - 45] {
@@ -287,7 +287,7 @@ fn a_heartbeat_stops_with_a_fault() {
     beaten.done();
 }
 
-/// A cycle that comes a millisecond early does not cost the beat a whole cycle: over a second there are as many beats as periods.
+/// A cycle that is a millisecond early does not delay the beat by a whole cycle: in a second there are as many beats as periods.
 #[test]
 fn a_heartbeat_keeps_its_rate_beside_jitter() {
     let beats: Vec<_> = (0..25)

@@ -191,7 +191,7 @@ fn only_the_last_report_is_a_repetition() {
     }
 }
 
-/// The path of a repetition leaves out a check: a repetition that is taken for the next report opens nothing.
+/// The path of a repetition omits a check: a repetition that is treated as the next report never opens the gate.
 #[test]
 fn a_repetition_never_completes_the_signature() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -428,8 +428,8 @@ fn with_byte(at: usize, changed: u8) -> Vec<u8> {
     bytes
 }
 
-/// Another valid table that replaces the one from the start (a bank swap, an update over the air) is refused in
-/// the next step, tick and scrub, whatever it permits, and the fault is latched.
+/// Another valid table that replaces the one from the start (a bank swap, an update over the air) is refused in the
+/// next step, tick and scrub, for any content. The fault is latched.
 #[test]
 fn a_table_that_is_replaced_is_refused() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -604,7 +604,7 @@ fn a_shorter_table_in_the_same_place_is_refused() {
 mod aging;
 mod hypotheses;
 
-/// Cells are walked no farther than the settings allow; facets do not ask.
+/// Cells are walked no farther than the settings allow; facets have no such limit.
 #[test]
 fn a_set_that_takes_too_many_runs_is_denied_for_that() {
     for (bytes, has_cells) in [(SEE_T7_GRID, true), (SEE_T7, false)] {

@@ -69,7 +69,7 @@ fn a_bet_is_fair() {
     }
 }
 
-/// Where errors are as claimed, or smaller, alarms are as rare as stated; where they are larger, they come soon.
+/// If errors are as claimed, or smaller, alarms are as rare as stated; if errors are larger, alarms come soon.
 #[test]
 fn alarms_are_rare_if_the_claims_hold_and_soon_if_not() {
     const BETWEEN: u32 = 500;
@@ -80,7 +80,7 @@ fn alarms_are_rare_if_the_claims_hold_and_soon_if_not() {
         let fixes: u32 = (0..RUNS)
             .map(|_| fixes_until_alarm(BETWEEN, most, |_| normal.innovation(scale)).unwrap_or(most))
             .sum();
-        // The mean of 300 waiting times errs by 6 % at most; what runs beyond the end is counted too low.
+        // The mean of 300 waiting times errs by 6 % at most; runs beyond the end are counted too low.
         assert!(fixes > BETWEEN * RUNS, "{scale}: {fixes}");
     }
     for (scale, within) in [(1.5, 60), (2.0, 20), (4.0, 5)] {
@@ -98,7 +98,7 @@ fn alarms_are_rare_if_the_claims_hold_and_soon_if_not() {
     assert!(fixes < BETWEEN * RUNS / 10, "{fixes}");
 }
 
-/// After a thousand good fixes a knocked camera is found as soon as after none.
+/// After a thousand good fixes a knocked camera is detected as soon as without them.
 #[test]
 fn a_camera_that_is_knocked_later_is_found_as_soon() {
     let mut normal = Normal(2);
@@ -145,7 +145,7 @@ fn an_innovation_is_the_fix_minus_the_prediction() {
     let dependent = Innovation::of_dependent(&fix, &prediction, slip).unwrap();
     let ratio = found.normalised_squared().unwrap() / dependent.normalised_squared().unwrap();
     assert!((ratio - 2.0).abs() < 1e-9, "{ratio}");
-    // What slip explains is no difference.
+    // A difference within the slip counts as zero.
     let all = Growth::of(0.04, 0.1).unwrap();
     let explained = Innovation::of_independent(&fix, &prediction, all).unwrap();
     assert_eq!(explained.normalised_squared(), Ok(0.0));
@@ -198,7 +198,7 @@ fn what_is_no_innovation_counts_for_nothing() {
     }
 }
 
-/// Doubt comes before contradiction, good fixes take it away, and a contradiction stays until the reset.
+/// Doubt comes before contradiction, good fixes remove it, and a contradiction stays until the reset.
 #[test]
 fn doubt_passes_and_a_contradiction_stays() {
     let fix = |squared: f64| Innovation {

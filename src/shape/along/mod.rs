@@ -61,7 +61,7 @@ enum Node {
     Near(Box<Resolved<f64>>, f64, u32),
     /// Outside of a cone about the tag's normal: cosine, and distance of its tip behind the tag.
     Square(Box<Resolved<f64>>, [f64; 2], u32),
-    /// In at least one of these half-planes, each with its number. Those that no pose is in are left out.
+    /// In at least one of these half-planes, each with its number. Half-planes without any pose are omitted.
     Sides(Vec<(u32, Line<f64>)>, u32),
     Any(Vec<Self>),
     All(Vec<Self>),

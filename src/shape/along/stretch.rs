@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_keep_what_ended_them() {
+    fn interval_ends_keep_their_constraint() {
         let whole = LineInterval::of(10.0);
         assert_eq!(
             whole.clipped(-2.0, 1.0, 1).unwrap().clipped(5.0, -1.0, 2),
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_stay_in_a_union() {
+    fn union_keeps_gaps() {
         let mut all = std::vec![
             stretch(6.0, 7.0, 1, 2),
             stretch(0.0, 2.0, 3, 4),

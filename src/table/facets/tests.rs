@@ -74,7 +74,7 @@ fn cells(yaw_lo: u32, yaw_span: u64) -> Cells {
 }
 
 #[test]
-fn a_layout_gives_what_was_written() {
+fn layout_reads_back_written_facets() {
     let bytes = Plan::good().bytes();
     let layout = Facets::parse(&bytes, &cells(1000, 2500)).unwrap();
     assert_eq!((layout.unit(), layout.reach(), layout.arm()), (12, 100, 40));
@@ -107,7 +107,7 @@ fn a_layout_gives_what_was_written() {
 }
 
 #[test]
-fn every_limit_is_looked_at() {
+fn every_limit_is_checked() {
     let good = Plan::good();
     assert!(good.is_read(|_| ()));
     assert!(!good.is_read(|plan| plan.zero = 1));
@@ -145,7 +145,7 @@ fn every_limit_is_looked_at() {
 }
 
 #[test]
-fn counts_add_up() {
+fn inconsistent_counts_are_refused() {
     let good = Plan::good();
     let mut bytes = good.bytes();
     bytes.push(0);

@@ -4,7 +4,7 @@ use posegate::table::{
     Axes, CRC_LENGTH, HEADER_LENGTH, MAGIC, NORMAL_BITS, Table, VERSION, WorstCase, checksum,
 };
 
-/// Corrects what the parser checks first: magic, version, lengths and
+/// Corrects the fields that the parser checks first: magic, version, lengths and
 /// checksum. With `to_the_end` the last layout gets all remaining bytes.
 pub fn repair(bytes: &mut [u8], to_the_end: bool) {
     let Some(end) = bytes.len().checked_sub(CRC_LENGTH) else {
@@ -32,7 +32,7 @@ pub fn repair(bytes: &mut [u8], to_the_end: bool) {
     bytes[end..].copy_from_slice(&crc.to_le_bytes());
 }
 
-/// Asserts that every accessor of a parsed table gives what the parser guarantees.
+/// Asserts that every accessor of a parsed table satisfies the parser's guarantees.
 pub fn walk(table: &Table<'_>) -> WorstCase {
     let again = Table::parse(table.bytes()).expect("it was parsed before");
     assert_eq!(

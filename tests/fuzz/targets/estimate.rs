@@ -66,8 +66,8 @@ fuzz_target!(|data: &[u8]| {
     is_at(estimate, &set);
     let table = &tables::all()[number];
     let decision = decide(table, &set);
-    let (told, margin) = decide_with_margin(table, &set);
-    assert_eq!(told, decision);
+    let (again, margin) = decide_with_margin(table, &set);
+    assert_eq!(again, decision);
     assert_eq!(margin >= Margin::ONE, decision == Decision::Inside);
     if decision == Decision::Inside {
         sound::holds(table, &set, margin, [3, -2, 1]);
@@ -141,7 +141,7 @@ fn is_docked(estimate: Estimate, reach: [f64; 3]) {
     let yaw = estimate.yaw_rad - (estimate.yaw_rad / TAU).round() * TAU;
     let [x, y, t] = tables::DOCK;
     let at = [estimate.x_m, estimate.y_m, yaw];
-    let room = [x + 1.1e-11, y + 1.1e-11, t.to_radians() + 2.1e-9];
-    let is_in = (0..3).all(|axis| at[axis].abs() + reach[axis] <= room[axis]);
+    let slack = [x + 1.1e-11, y + 1.1e-11, t.to_radians() + 2.1e-9];
+    let is_in = (0..3).all(|axis| at[axis].abs() + reach[axis] <= slack[axis]);
     assert!(is_in, "{estimate:?} reaching {reach:?}");
 }

@@ -11,7 +11,7 @@ use posegate_fuzz::{judged, layout, mutation, sound};
 
 const TAIL: usize = 2 * SET_LENGTH + 1;
 /// Number of runs and facets beyond which a decision is too slow to be repeated thousands of times.
-const DEAR: u32 = 20_000;
+const EXPENSIVE: u32 = 20_000;
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
     mutation::mutate(data, [size, max_size, TAIL], seed, fuzzer_mutate)
@@ -34,7 +34,7 @@ fuzz_target!(|data: &[u8]| -> Corpus {
     };
     let worst = layout::walk(&table);
     one_bit_is_enough(&bytes, sets);
-    if worst.runs > DEAR || worst.world_facets + worst.robot_facets > DEAR {
+    if worst.runs > EXPENSIVE || worst.world_facets + worst.robot_facets > EXPENSIVE {
         return Corpus::Keep;
     }
     for bytes in sets.chunks(SET_LENGTH) {

@@ -4,7 +4,7 @@ use crate::firmware::Firmware;
 use crate::golden::{Golden, Moment};
 use crate::machine::{At, Machine};
 use crate::random::Random;
-use crate::remote::{Gone, SP, XPSR};
+use crate::remote::{EmulatorEnded, SP, XPSR};
 
 /// Where a bit is flipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -75,7 +75,11 @@ impl Fault {
     }
 
     /// Flips the bit. The machine must be at the beginning of the cycle.
-    pub fn inject(&self, machine: &mut Machine, firmware: &Firmware) -> Result<String, Gone> {
+    pub fn inject(
+        &self,
+        machine: &mut Machine,
+        firmware: &Firmware,
+    ) -> Result<String, EmulatorEnded> {
         match *self {
             Self::Code { address, bit, .. } => {
                 machine.remote.flip(address, bit)?;
@@ -116,7 +120,11 @@ impl Fault {
 }
 
 /// Runs to a moment of a cycle. The machine must be at the beginning of that cycle.
-fn reach(machine: &mut Machine, firmware: &Firmware, moment: Moment) -> Result<String, Gone> {
+fn reach(
+    machine: &mut Machine,
+    firmware: &Firmware,
+    moment: Moment,
+) -> Result<String, EmulatorEnded> {
     machine.remote.set_breakpoint(moment.address)?;
     for hit in 1..=moment.hit {
         let at = machine.run();

@@ -132,7 +132,7 @@ fn trace(firmware: &Firmware, samples: &[Sample]) -> (Vec<Moment>, Vec<u32>) {
     assert_eq!(
         cycle as usize,
         samples.len(),
-        "the trace tells of every cycle"
+        "the trace contains every cycle"
     );
     let code = executed
         .into_iter()

@@ -1,7 +1,7 @@
 //! An emulated board under a debugger: runs a firmware from marker to marker, and reads its lamps.
 
 use crate::firmware::Firmware;
-use crate::remote::{Gone, PC, Remote, Stop};
+use crate::remote::{EmulatorEnded, PC, Remote, Stop};
 use posegate_testkit::firmware::start_qemu;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -47,7 +47,7 @@ pub enum At {
     LockedUp,
 }
 
-/// The lamps.
+/// The lamps' levels, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lamps(u8);
 
@@ -89,7 +89,7 @@ pub struct Machine {
     pub registers: [u32; 16],
     log: PathBuf,
     /// Bytes at the start of the log that are ignored.
-    forgotten: u64,
+    discarded: u64,
     // Contains the socket and the log; removed last.
     _directory: tempfile::TempDir,
 }
@@ -139,13 +139,13 @@ impl Machine {
             );
             std::thread::sleep(Duration::from_millis(2));
         };
-        let remote = Remote::new(stream).unwrap_or_else(|Gone| panic!("QEMU has ended"));
+        let remote = Remote::new(stream).unwrap_or_else(|EmulatorEnded| panic!("QEMU has ended"));
         let mut machine = Self {
             child,
             remote,
             registers: [0; 16],
             log,
-            forgotten: 0,
+            discarded: 0,
             _directory: directory,
         };
         for marker in firmware.stops() {
@@ -154,22 +154,22 @@ impl Machine {
                 machine
                     .remote
                     .set_breakpoint(place)
-                    .unwrap_or_else(|Gone| panic!("QEMU has ended"));
+                    .unwrap_or_else(|EmulatorEnded| panic!("QEMU has ended"));
             }
         }
         machine
             .stop_at(NEVER)
-            .unwrap_or_else(|Gone| panic!("QEMU has ended"));
+            .unwrap_or_else(|EmulatorEnded| panic!("QEMU has ended"));
         machine
     }
 
     /// Makes the firmware stop at the beginning of this cycle.
-    pub fn stop_at(&mut self, cycle: u32) -> Result<(), Gone> {
+    pub fn stop_at(&mut self, cycle: u32) -> Result<(), EmulatorEnded> {
         self.remote.write(STOP_AT, &cycle.to_le_bytes())
     }
 
     /// Runs, without a fault, to the beginning of a cycle, and passes the marker.
-    pub fn run_to(&mut self, firmware: &Firmware, cycle: u32) -> Result<(), Gone> {
+    pub fn run_to(&mut self, firmware: &Firmware, cycle: u32) -> Result<(), EmulatorEnded> {
         self.stop_at(cycle)?;
         let at = self.run();
         assert_eq!((at, self.registers[0]), (At::Address(firmware.stop), cycle));
@@ -182,14 +182,14 @@ impl Machine {
         self.try_run().unwrap_or(At::LockedUp)
     }
 
-    fn try_run(&mut self) -> Result<At, Gone> {
+    fn try_run(&mut self) -> Result<At, EmulatorEnded> {
         let started = self.hundredths()?;
         self.remote.start()?;
         let (mut slices, mut asleep_at) = (0, None);
         loop {
             match self.remote.wait() {
                 Stop::Stopped => break,
-                Stop::Gone => return Err(Gone),
+                Stop::EmulatorEnded => return Err(EmulatorEnded),
                 Stop::Running => slices += 1,
             }
             if slices == A_LOOK {
@@ -219,31 +219,31 @@ impl Machine {
 
     /// Returns `true` if the processor is just after a `wfi`. If it is there twice in succession, it sleeps forever: the
     /// firmware enables no interrupt. The board's clock is stopped as well.
-    fn is_behind_wfi(&mut self, at: u32) -> Result<bool, Gone> {
+    fn is_behind_wfi(&mut self, at: u32) -> Result<bool, EmulatorEnded> {
         const WFI: [u8; 2] = [0x30, 0xbf];
         let is_code = MEMORY.iter().any(|part| part.contains(&at));
         Ok(is_code && self.remote.read(at - 2, 2)? == WFI)
     }
 
-    fn hundredths(&mut self) -> Result<u32, Gone> {
+    fn hundredths(&mut self) -> Result<u32, EmulatorEnded> {
         let bytes = self.remote.read(HUNDREDTHS, 4)?;
         Ok(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
     }
 
     /// Passes over the first instruction of a marker, which does nothing.
-    pub fn pass(&mut self) -> Result<(), Gone> {
+    pub fn pass(&mut self) -> Result<(), EmulatorEnded> {
         let next = self.registers[usize::from(PC)] + 2;
         self.remote.set_register(PC, next)
     }
 
     /// Reads the lamps.
-    pub fn lamps(&mut self) -> Result<Lamps, Gone> {
+    pub fn lamps(&mut self) -> Result<Lamps, EmulatorEnded> {
         Ok(Lamps(self.remote.read(LEDS, 4)?[0]))
     }
 
     /// Sets the lamps by the store instruction at an address, because the stub writes only to memory. Changes
     /// registers.
-    pub fn set_lamps(&mut self, lamps: Lamps, store: u32) -> Result<(), Gone> {
+    pub fn set_lamps(&mut self, lamps: Lamps, store: u32) -> Result<(), EmulatorEnded> {
         self.remote.set_register(0, LEDS)?;
         self.remote.set_register(1, u32::from(lamps.0))?;
         self.remote.set_register(PC, store)?;
@@ -268,7 +268,7 @@ impl Machine {
         let before = self.events().len();
         match self.run() {
             At::LockedUp => false,
-            // At a marker after all: the firmware runs.
+            // It stopped at a marker: the firmware runs.
             At::Address(_) => true,
             At::Hung => {
                 let all = self.events();
@@ -285,20 +285,20 @@ impl Machine {
     }
 
     /// Discards all events so far.
-    pub fn forget(&mut self) {
-        self.forgotten = std::fs::metadata(&self.log).map_or(0, |data| data.len());
+    pub fn discard_events(&mut self) {
+        self.discarded = std::fs::metadata(&self.log).map_or(0, |data| data.len());
     }
 
     /// Returns the events that are not discarded.
     pub fn events(&self) -> Vec<Event> {
-        self.events_after(self.forgotten)
+        self.events_after(self.discarded)
     }
 
-    fn events_after(&self, forgotten: u64) -> Vec<Event> {
+    fn events_after(&self, discarded: u64) -> Vec<Event> {
         // "MPS2 FPGAIO write: offset 0x0 data 0x1 size 4"
         let mut text = Vec::new();
         let read = std::fs::File::open(&self.log).and_then(|mut file| {
-            file.seek(SeekFrom::Start(forgotten))?;
+            file.seek(SeekFrom::Start(discarded))?;
             file.read_to_end(&mut text)
         });
         // Before the first event there is no log.

@@ -2,8 +2,8 @@
 //!
 //! Without arguments it runs a small share, for the fast suite. `./ci.sh faults` runs the whole:
 //! `cargo test --release -p posegate-boards --test fault_injection -- N SEED`, N faults of each kind. Each fault
-//! has its own run: one bit of code, of a register or of memory is flipped at a random moment after the start,
-//! and the output at the end of each cycle is compared with that of the run without a fault. Prints one JSON line per
+//! has its own run: one bit of code, of a register or of memory is flipped at a random moment after the start. The
+//! output at the end of each cycle is compared with that of the run without a fault. Prints one JSON line per
 //! figure on stdout, and each wrong permit with its place on stderr.
 
 mod boot;
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
     let target = Firmware::build("fault_target", true);
     let golden = Golden::of(&target);
     faults_take_effect(&target, &golden);
-    hangs_are_seen(&target);
+    hangs_are_detected(&target);
     let mut short = !damaged_starts(&target, each, seed);
     if each > FEW {
         short |= every_bit(&target, &golden) > 0;
@@ -94,7 +94,7 @@ fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
 
 /// A firmware that reaches no marker again is detected quickly: a processor that sleeps, one that runs where there
 /// is no memory, and a loop.
-fn hangs_are_seen(firmware: &Firmware) {
+fn hangs_are_detected(firmware: &Firmware) {
     const WFI: [u8; 2] = [0x30, 0xbf];
     const TO_ITSELF: [u8; 2] = [0xfe, 0xe7];
     const NOWHERE: u32 = 0x0100_8000;

@@ -7,7 +7,7 @@
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Sample};
 use crate::machine::{At, Lamps, Machine};
-use crate::remote::{Gone, SP};
+use crate::remote::{EmulatorEnded, SP};
 use posegate::gate::Reason;
 
 /// Cycles that are observed after a fault if reports arrive: a new permit is possible within them.
@@ -23,7 +23,7 @@ pub struct Situation {
     /// Number of observed cycles, and the first cycle from which on the output must be low.
     cycles: u32,
     low_from: u32,
-    /// Whether a fault is latched before the damage.
+    /// `true` if a fault is latched before the damage.
     pub latched: bool,
 }
 
@@ -71,7 +71,7 @@ struct Rest<'f> {
 /// Levels of the output in the next cycles; fewer if the program or the schedule ended.
 type Levels = Vec<bool>;
 
-/// Whether the program ended within the cycles, and with what output.
+/// The end of the program within the cycles, and its output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     None,
@@ -81,7 +81,7 @@ enum End {
 }
 
 impl<'f> Rest<'f> {
-    fn of(firmware: &'f Firmware, situation: &Situation) -> Result<Self, Gone> {
+    fn of(firmware: &'f Firmware, situation: &Situation) -> Result<Self, EmulatorEnded> {
         let mut machine = Machine::start(firmware, &[]);
         let before = situation.cycle - u32::from(situation.latched);
         machine.run_to(firmware, before)?;
@@ -110,7 +110,7 @@ impl<'f> Rest<'f> {
         })
     }
 
-    fn put_back(&mut self) -> Result<(), Gone> {
+    fn put_back(&mut self) -> Result<(), EmulatorEnded> {
         if self.machine.lamps()? != self.lamps {
             self.machine.set_lamps(self.lamps, self.firmware.store)?;
         }
@@ -120,7 +120,7 @@ impl<'f> Rest<'f> {
         remote.set_all_registers(&self.registers)
     }
 
-    fn damage(&mut self, damage: Damage) -> Result<(), Gone> {
+    fn damage(&mut self, damage: Damage) -> Result<(), EmulatorEnded> {
         let gate = self.gate;
         match damage {
             Damage::Bit(bit) => self
@@ -132,8 +132,8 @@ impl<'f> Rest<'f> {
     }
 
     /// Returns the output in the next cycles, and why there are fewer.
-    fn levels(&mut self) -> Result<(Levels, End), Gone> {
-        self.machine.forget();
+    fn levels(&mut self) -> Result<(Levels, End), EmulatorEnded> {
+        self.machine.discard_events();
         self.machine.stop_at(self.end)?;
         let at = self.machine.run();
         let samples = Sample::all(self.lamps, &self.machine.events());
@@ -195,7 +195,7 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
         .windows(2)
         .find(|pair| pair[0].high && pair[1].reason == quiet);
     let ended = ended.expect("a permit that silence ends")[1].number;
-    // One report arrives in the silence, and no more.
+    // One report arrives in the silence.
     let short = golden.samples.windows(3).find(|three| {
         three.iter().all(|sample| !sample.high)
             && three[0].reason == quiet
@@ -248,9 +248,11 @@ pub fn situations(golden: &Golden) -> Vec<Situation> {
 /// Flips every bit of the gate, and sets every byte to four values.
 pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
     const GONE: &str = "QEMU has ended without a fault";
-    let start = || Rest::of(firmware, situation).unwrap_or_else(|Gone| panic!("{GONE}"));
+    let start = || Rest::of(firmware, situation).unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     let mut rest = start();
-    let (expected, end) = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
+    let (expected, end) = rest
+        .levels()
+        .unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     assert_eq!(end, End::None, "{}: ends without a fault", situation.name);
     // Without a fault the levels are low from some cycle on; otherwise no permit could be wrong.
     let low_from = situation.low_from as usize;
@@ -283,7 +285,7 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             rest.damage(damage)?;
             rest.levels()
         };
-        let (levels, end) = attempt().unwrap_or_else(|Gone| {
+        let (levels, end) = attempt().unwrap_or_else(|EmulatorEnded| {
             // A processor that has locked up keeps its output, without a heartbeat.
             let high = rest.machine.last_lamps().interlock();
             let end = if high {
@@ -308,8 +310,11 @@ pub fn every_bit(firmware: &Firmware, situation: &Situation) -> Counts {
             rest = start();
         }
     }
-    rest.put_back().unwrap_or_else(|Gone| panic!("{GONE}"));
-    let again = rest.levels().unwrap_or_else(|Gone| panic!("{GONE}"));
+    rest.put_back()
+        .unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
+    let again = rest
+        .levels()
+        .unwrap_or_else(|EmulatorEnded| panic!("{GONE}"));
     assert_eq!(again, (expected, End::None), "not all is put back");
     counts
 }

@@ -13,12 +13,12 @@ pub enum Stop {
     /// It still runs.
     Running,
     /// The emulator has ended.
-    Gone,
+    EmulatorEnded,
 }
 
 /// The emulator has ended.
 #[derive(Debug)]
-pub struct Gone;
+pub struct EmulatorEnded;
 
 /// A connection to an emulated processor.
 pub struct Remote {
@@ -33,7 +33,7 @@ const PATIENCE: u32 = 3000;
 
 impl Remote {
     /// Connects to QEMU's stub.
-    pub fn new(stream: UnixStream) -> Result<Self, Gone> {
+    pub fn new(stream: UnixStream) -> Result<Self, EmulatorEnded> {
         stream
             .set_read_timeout(Some(SLICE))
             .expect("a limit on reading");
@@ -42,7 +42,7 @@ impl Remote {
             pending: Vec::new(),
         };
         remote.ask("QStartNoAckMode")?;
-        remote.stream.write_all(b"+").map_err(|_| Gone)?;
+        remote.stream.write_all(b"+").map_err(|_| EmulatorEnded)?;
         // Without this the stub answers neither `p` nor `P`.
         remote.ask("qXfer:features:read:target.xml:0,ffb")?;
         Ok(remote)
@@ -53,14 +53,16 @@ impl Remote {
         UnixStream::connect(socket).ok()
     }
 
-    fn send(&mut self, command: &str) -> Result<(), Gone> {
+    fn send(&mut self, command: &str) -> Result<(), EmulatorEnded> {
         let sum = command.bytes().fold(0u8, u8::wrapping_add);
         let packet = format!("${command}#{sum:02x}");
-        self.stream.write_all(packet.as_bytes()).map_err(|_| Gone)
+        self.stream
+            .write_all(packet.as_bytes())
+            .map_err(|_| EmulatorEnded)
     }
 
     /// Returns the next packet, if it arrives within a slice of time.
-    fn packet(&mut self) -> Result<Option<String>, Gone> {
+    fn packet(&mut self) -> Result<Option<String>, EmulatorEnded> {
         loop {
             if let Some(start) = self.pending.iter().position(|b| *b == b'$')
                 && let Some(end) = self.pending[start..].iter().position(|b| *b == b'#')
@@ -72,18 +74,18 @@ impl Remote {
             }
             let mut buffer = [0; 4096];
             match self.stream.read(&mut buffer) {
-                Ok(0) => return Err(Gone),
+                Ok(0) => return Err(EmulatorEnded),
                 Ok(length) => self.pending.extend(&buffer[..length]),
                 Err(error) => match error.kind() {
                     ErrorKind::WouldBlock | ErrorKind::TimedOut => return Ok(None),
                     ErrorKind::Interrupted => {}
-                    _ => return Err(Gone),
+                    _ => return Err(EmulatorEnded),
                 },
             }
         }
     }
 
-    fn answer(&mut self) -> Result<String, Gone> {
+    fn answer(&mut self) -> Result<String, EmulatorEnded> {
         for _ in 0..PATIENCE {
             if let Some(packet) = self.packet()? {
                 return Ok(packet);
@@ -92,41 +94,41 @@ impl Remote {
         panic!("QEMU's stub does not answer");
     }
 
-    fn ask(&mut self, command: &str) -> Result<String, Gone> {
+    fn ask(&mut self, command: &str) -> Result<String, EmulatorEnded> {
         self.send(command)?;
         self.answer()
     }
 
-    fn demand_ok(&mut self, command: &str) -> Result<(), Gone> {
+    fn demand_ok(&mut self, command: &str) -> Result<(), EmulatorEnded> {
         let answer = self.ask(command)?;
         assert_eq!(answer, "OK", "QEMU's stub refuses {command}");
         Ok(())
     }
 
     /// Reads a register: 0 to 15, or [`XPSR`].
-    pub fn register(&mut self, number: u8) -> Result<u32, Gone> {
+    pub fn register(&mut self, number: u8) -> Result<u32, EmulatorEnded> {
         let answer = self.ask(&format!("p{number:x}"))?;
         let bytes = bytes_of(&answer);
         let word = bytes.first_chunk().expect("a register of 32 bits");
         Ok(u32::from_le_bytes(*word))
     }
 
-    pub fn set_register(&mut self, number: u8, value: u32) -> Result<(), Gone> {
+    pub fn set_register(&mut self, number: u8, value: u32) -> Result<(), EmulatorEnded> {
         let value = hex(&value.to_le_bytes());
         self.demand_ok(&format!("P{number:x}={value}"))
     }
 
     /// Reads all registers at once, in the stub's format.
-    pub fn all_registers(&mut self) -> Result<String, Gone> {
+    pub fn all_registers(&mut self) -> Result<String, EmulatorEnded> {
         self.ask("g")
     }
 
-    pub fn set_all_registers(&mut self, all: &str) -> Result<(), Gone> {
+    pub fn set_all_registers(&mut self, all: &str) -> Result<(), EmulatorEnded> {
         self.demand_ok(&format!("G{all}"))
     }
 
     /// Reads the sixteen core registers.
-    pub fn registers(&mut self) -> Result<[u32; 16], Gone> {
+    pub fn registers(&mut self) -> Result<[u32; 16], EmulatorEnded> {
         let bytes = bytes_of(&self.ask("g")?);
         let word = |k: usize| bytes[4 * k..4 * k + 4].first_chunk().copied();
         Ok(std::array::from_fn(|k| {
@@ -134,19 +136,19 @@ impl Remote {
         }))
     }
 
-    pub fn read(&mut self, address: u32, length: u32) -> Result<Vec<u8>, Gone> {
+    pub fn read(&mut self, address: u32, length: u32) -> Result<Vec<u8>, EmulatorEnded> {
         let answer = self.ask(&format!("m{address:x},{length:x}"))?;
         let bytes = bytes_of(&answer);
         assert_eq!(bytes.len(), length as usize, "no memory at {address:#x}");
         Ok(bytes)
     }
 
-    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), Gone> {
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), EmulatorEnded> {
         self.demand_ok(&format!("M{address:x},{:x}:{}", bytes.len(), hex(bytes)))
     }
 
     /// Reads memory of any length; a packet contains 2 kB.
-    pub fn read_long(&mut self, address: u32, length: u32) -> Result<Vec<u8>, Gone> {
+    pub fn read_long(&mut self, address: u32, length: u32) -> Result<Vec<u8>, EmulatorEnded> {
         let mut bytes = Vec::new();
         while (bytes.len() as u32) < length {
             let at = bytes.len() as u32;
@@ -155,7 +157,7 @@ impl Remote {
         Ok(bytes)
     }
 
-    pub fn write_long(&mut self, address: u32, bytes: &[u8]) -> Result<(), Gone> {
+    pub fn write_long(&mut self, address: u32, bytes: &[u8]) -> Result<(), EmulatorEnded> {
         for (number, part) in (0..).zip(bytes.chunks(1024)) {
             self.write(address + 1024 * number, part)?;
         }
@@ -163,21 +165,21 @@ impl Remote {
     }
 
     /// Flips a bit of memory.
-    pub fn flip(&mut self, address: u32, bit: u8) -> Result<(), Gone> {
+    pub fn flip(&mut self, address: u32, bit: u8) -> Result<(), EmulatorEnded> {
         let byte = self.read(address, 1)?[0];
         self.write(address, &[byte ^ 1 << bit])
     }
 
-    pub fn set_breakpoint(&mut self, address: u32) -> Result<(), Gone> {
+    pub fn set_breakpoint(&mut self, address: u32) -> Result<(), EmulatorEnded> {
         self.demand_ok(&format!("Z0,{address:x},2"))
     }
 
-    pub fn clear_breakpoint(&mut self, address: u32) -> Result<(), Gone> {
+    pub fn clear_breakpoint(&mut self, address: u32) -> Result<(), EmulatorEnded> {
         self.demand_ok(&format!("z0,{address:x},2"))
     }
 
     /// Runs a command of QEMU's monitor.
-    pub fn console(&mut self, command: &str) -> Result<(), Gone> {
+    pub fn console(&mut self, command: &str) -> Result<(), EmulatorEnded> {
         self.send(&format!("qRcmd,{}", hex(command.as_bytes())))?;
         // Its output arrives in separate packets before `OK`.
         while self.answer()? != "OK" {}
@@ -185,12 +187,12 @@ impl Remote {
     }
 
     /// Starts the processor.
-    pub fn start(&mut self) -> Result<(), Gone> {
+    pub fn start(&mut self) -> Result<(), EmulatorEnded> {
         self.send("c")
     }
 
     /// Executes one instruction.
-    pub fn step(&mut self) -> Result<(), Gone> {
+    pub fn step(&mut self) -> Result<(), EmulatorEnded> {
         self.ask("s").map(drop)
     }
 
@@ -198,19 +200,21 @@ impl Remote {
     pub fn wait(&mut self) -> Stop {
         match self.packet() {
             Ok(Some(packet)) if packet.starts_with('T') || packet.starts_with('S') => Stop::Stopped,
-            Ok(Some(packet)) if packet.starts_with('W') || packet.starts_with('X') => Stop::Gone,
+            Ok(Some(packet)) if packet.starts_with('W') || packet.starts_with('X') => {
+                Stop::EmulatorEnded
+            }
             Ok(_) => Stop::Running,
-            Err(Gone) => Stop::Gone,
+            Err(EmulatorEnded) => Stop::EmulatorEnded,
         }
     }
 
     /// Stops the processor wherever it is.
-    pub fn interrupt(&mut self) -> Result<(), Gone> {
-        self.stream.write_all(&[3]).map_err(|_| Gone)?;
+    pub fn interrupt(&mut self) -> Result<(), EmulatorEnded> {
+        self.stream.write_all(&[3]).map_err(|_| EmulatorEnded)?;
         for _ in 0..PATIENCE {
             match self.wait() {
                 Stop::Stopped => return Ok(()),
-                Stop::Gone => return Err(Gone),
+                Stop::EmulatorEnded => return Err(EmulatorEnded),
                 Stop::Running => {}
             }
         }

@@ -26,7 +26,7 @@ impl Tally {
                 "{}: fault {index}, cycle {}: {} ({:?}, first seen in cycle {:?}, reason {:?})",
                 trial.class.name(),
                 fault.cycle(),
-                trial.told,
+                trial.fault_place,
                 trial.end,
                 trial.wrong_in,
                 trial.reason

@@ -4,7 +4,7 @@ use crate::fault::Fault;
 use crate::firmware::Firmware;
 use crate::golden::{Golden, Sample};
 use crate::machine::{At, Lamps, Machine};
-use crate::remote::Gone;
+use crate::remote::EmulatorEnded;
 
 /// How a run with a fault ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,26 +63,26 @@ pub struct Trial {
     /// The reason of the first verdict that differs from the run without the fault.
     pub reason: Option<u32>,
     /// The place of the fault, and the first cycle with a wrong output.
-    pub told: String,
+    pub fault_place: String,
     pub wrong_in: Option<u32>,
 }
 
 /// Runs the firmware with a fault.
 pub fn run(firmware: &Firmware, golden: &Golden, fault: &Fault) -> Trial {
     let mut machine = Machine::start(firmware, &[]);
-    let mut told = String::new();
-    let end = observe(&mut machine, firmware, fault, &mut told).unwrap_or(End::LockedUp);
-    classify(&mut machine, golden, end, told)
+    let mut fault_place = String::new();
+    let end = observe(&mut machine, firmware, fault, &mut fault_place).unwrap_or(End::LockedUp);
+    classify(&mut machine, golden, end, fault_place)
 }
 
 fn observe(
     machine: &mut Machine,
     firmware: &Firmware,
     fault: &Fault,
-    told: &mut String,
-) -> Result<End, Gone> {
+    fault_place: &mut String,
+) -> Result<End, EmulatorEnded> {
     machine.run_to(firmware, fault.cycle())?;
-    *told = fault.inject(machine, firmware)?;
+    *fault_place = fault.inject(machine, firmware)?;
     match machine.run() {
         At::Address(address) if address == firmware.over => Ok(End::Over),
         At::Address(address) if address == firmware.halted => Ok(End::Halted),
@@ -92,14 +92,14 @@ fn observe(
     }
 }
 
-fn classify(machine: &mut Machine, golden: &Golden, end: End, told: String) -> Trial {
+fn classify(machine: &mut Machine, golden: &Golden, end: End, fault_place: String) -> Trial {
     let finished = Sample::all(Lamps::default(), &machine.events()).len();
     let open_at_the_end = match end {
         End::Over => false,
         End::LockedUp => machine.last_lamps().interlock(),
         End::Halted | End::Hung => machine
             .lamps()
-            .unwrap_or_else(|Gone| machine.last_lamps())
+            .unwrap_or_else(|EmulatorEnded| machine.last_lamps())
             .interlock(),
     };
     let beats = end == End::Hung && machine.beats();
@@ -136,7 +136,7 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, told: String) -> T
         class,
         end,
         reason,
-        told,
+        fault_place,
         wrong_in,
     }
 }

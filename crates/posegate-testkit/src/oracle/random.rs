@@ -1,5 +1,5 @@
 //! Random sets, pose sets and estimates. Every number is first rounded as a site file would write it
-//! (1e-4 m, 1e-3 degrees), then converted to radians, so that another program can get the same numbers.
+//! (1e-4 m, 1e-3 degrees), then converted to radians. So another program can get the same numbers.
 
 use super::scale::{Effort, scale_with};
 use super::sets::{signed_area, slack};

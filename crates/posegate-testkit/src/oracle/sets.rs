@@ -258,7 +258,7 @@ pub struct Sight {
     pub psi: f64,
     /// In AprilTag's corner order; `None` if the depth is below `z_near`.
     pub corners_px: [Option<[f64; 2]>; 4],
-    /// Whether all the limits of the visibility set hold.
+    /// `true` if all the limits of the visibility set hold.
     pub seen: bool,
 }
 

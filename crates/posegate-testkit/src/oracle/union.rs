@@ -2,10 +2,10 @@
 
 use super::{Pose, PoseSet, Rng, World, cholesky, wrap};
 
-/// What a pose has to spare in a set: at least 0 if the set contains it.
+/// The slack of a pose in a set: at least 0 if the set contains it.
 pub type Slack<'a> = &'a (dyn Fn(Pose) -> f64 + Sync);
 
-/// Steps of a ray in which the first pose outside is looked for.
+/// Steps of a ray in which the first pose outside is searched.
 const STEPS: usize = 96;
 /// Rays in all directions, those of them that are improved, and steps of an improvement.
 const RAYS: usize = 3_000;
@@ -78,7 +78,7 @@ pub fn union_scale(
         let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
         v.map(|c| c / length)
     };
-    // A lattice of Fibonacci, turned at random.
+    // A Fibonacci lattice, rotated at random.
     let start = rng.unit();
     let mut rays: Vec<(f64, [f64; 3])> = (0..RAYS)
         .map(|i| {

@@ -8,13 +8,13 @@ namespace posegate {
 
 /// The permit at one moment.
 struct Permit {
-  /// Whether the task may run now.
+  /// `true` if the task may run now.
   bool permitted = false;
-  /// Why not: a reason of Posegate in snake case, or a sentence. Empty with a permit.
+  /// Why the task may not run: a reason of Posegate in snake case, or a sentence. Empty with a permit.
   std::string reason = "silent";
 };
 
-/// A source of permits. It must deny by itself if nothing is heard: a stored permit is not one.
+/// A source of permits. It must deny by itself when no message arrives: a stored permit is not valid.
 class PermitSource {
  public:
   virtual ~PermitSource() = default;

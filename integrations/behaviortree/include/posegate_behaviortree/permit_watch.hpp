@@ -15,7 +15,7 @@
 
 namespace posegate {
 
-/// The longest time for which a heartbeat is believed, whatever it says, milliseconds.
+/// The longest time for which a heartbeat is valid, whatever it states, milliseconds.
 constexpr std::int64_t kMostValidMs = 1000;
 /// A heartbeat from farther in the future shows that the clocks of the machines differ, milliseconds.
 constexpr std::int64_t kMostAheadMs = 20;
@@ -56,7 +56,7 @@ class PermitWatch : public PermitSource {
   static std::int64_t steady_ns();
 
  private:
-  /// Returns why a heartbeat does not permit; if it permits, for how long from its stamp, milliseconds.
+  /// Returns the reason if a heartbeat does not permit; otherwise how long it permits from its stamp, milliseconds.
   std::pair<std::optional<std::string>, std::int64_t> checked(const Heartbeat& message, std::int64_t system_ns);
 
   const std::string task_;

@@ -15,7 +15,7 @@ constexpr const char* kSourceEntry = "permit_source";
 
 /// SUCCESS while the source permits, else FAILURE: also without a source, and if the source throws. Never RUNNING.
 ///
-/// Ports: `permit_source` (input, the blackboard's entry of the same name by default), `reason` (output: why not).
+/// Ports: `permit_source` (input, the blackboard's entry of the same name by default), `reason` (output: why the task may not run).
 class PosePermitted : public BT::ConditionNode {
  public:
   PosePermitted(const std::string& name, const BT::NodeConfig& config);

@@ -1,4 +1,4 @@
-// Asks a watch that heard nothing.
+// Asks a watch that has received no heartbeat.
 
 #include "posegate_behaviortree/permit_watch.hpp"
 #include "posegate_behaviortree/pose_permitted.hpp"

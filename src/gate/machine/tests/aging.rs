@@ -65,7 +65,7 @@ fn verdict(
 }
 
 proptest! {
-    /// The verdict is that of a source whose one inflation is the factor of the age.
+    /// The verdict equals that of a source whose only inflation is the factor of the age.
     #[test]
     fn verdict_is_that_of_the_factor_of_the_age(
         y_m in -2.0f64..2.0,
@@ -93,11 +93,11 @@ fn an_older_fix_permits_less() {
     assert_eq!(farthest[3], farthest[4]);
 }
 
-/// A damaged table in memory permits what the flash does not. The second evaluation finds it by the factor of the age, whatever the age.
+/// A damaged table in memory permits sets that the flash does not. The second evaluation detects this with the factor of every age.
 #[test]
 fn the_second_evaluation_uses_the_age() {
     let wide = wider();
-    // Between what the flash permits to a fix that is older, and to one that is fresh.
+    // Between the sets that the flash permits for an old fix and for a fresh fix.
     for (y_m, fresh, older) in [(1.25, 512, 4993), (1.0, 4992, 59_969)] {
         assert_eq!(verdict(aged(), y_m, Some(fresh), &wide), Ok(()), "{y_m}");
         let found = [Some(older), None].map(|age| verdict(aged(), y_m, age, &wide));

@@ -1,4 +1,4 @@
-//! Reports with several hypotheses, and movement beside the estimates: both evaluations decide on each.
+//! Reports with several hypotheses and with slip: both evaluations decide on each.
 
 use super::*;
 
@@ -52,7 +52,7 @@ fn every_hypothesis_must_be_inside() {
     assert_eq!(step(&[at(1.0)], metres(0.9)), Err(Reason::NotContained));
 }
 
-/// The examination names the hypothesis that is denied, or the one of least margin.
+/// The examination names the denied hypothesis, or the one with the least margin.
 #[test]
 fn the_examination_names_a_hypothesis() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -76,8 +76,8 @@ fn the_examination_names_a_hypothesis() {
     assert_eq!(verdict, Verdict::deny(Reason::TooManyHypotheses));
 }
 
-/// A damaged table in memory permits what the flash does not: the second evaluation finds it in each hypothesis, and in what the robot
-/// can have moved.
+/// A damaged table in memory permits sets that the flash does not: the second evaluation detects this in each hypothesis, and in the
+/// movement.
 #[test]
 fn the_second_evaluation_decides_on_each_hypothesis_and_movement() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -120,7 +120,7 @@ fn the_second_evaluation_decides_on_each_hypothesis_and_movement() {
     assert_eq!(with(&fast, &[], Growth::NONE), disagree);
 }
 
-/// What the hypotheses leave out makes the sets larger, in both evaluations.
+/// Omitted hypotheses make the sets larger, in both evaluations.
 #[test]
 fn what_is_left_out_counts() {
     let table = Table::parse(SEE_T7).unwrap();
@@ -168,7 +168,7 @@ fn what_is_left_out_counts() {
     assert_eq!(step(SEE_T7, Risk::NONE), Ok(()));
     assert_eq!(step(SEE_T7, risk(0.995)), Err(Reason::NotContained));
     assert_eq!(step(SEE_T7, risk(0.98)), Err(Reason::ElsewhereTooLikely));
-    // A bound has no distribution, and slip is beside the sets.
+    // A bound has no distribution, and slip is not part of the sets.
     let mut bounded = at(0.0);
     bounded.spread = Some(Uncertainty::Bounded {
         translation_m: 0.01,
