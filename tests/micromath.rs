@@ -59,7 +59,7 @@ fn faults(name: &str, code: &str) -> Vec<String> {
         // Telemetry takes a sighting by reference and returns a number: it makes no sighting, no answer and no set.
         for word in [
             "&mut",
-            "Answer",
+            "TagVisibility",
             ".answer",
             "Scene",
             "-> Sighting",
@@ -138,7 +138,7 @@ fn seeded_faults_are_detected() {
         ),
         ("set/mod.rs", "sight::telemetry"),
         ("sight/telemetry.rs", "pub fn fix(seen: &mut Sighting) {"),
-        ("sight/telemetry.rs", "fn seen() -> Answer {"),
+        ("sight/telemetry.rs", "fn seen() -> TagVisibility {"),
     ] {
         assert!(!faults(name, code).is_empty(), "{name}: {code}");
     }

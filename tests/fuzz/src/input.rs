@@ -1,6 +1,6 @@
 //! Numbers from the bytes of an input, with zeros past its end.
 
-use posegate::set::{Estimate, PoseSet, RadiusSquared};
+use posegate::set::{Estimate, Growth, PoseSet, RadiusSquared};
 use posegate::table::Table;
 use std::f64::consts::TAU;
 
@@ -63,7 +63,7 @@ impl Input<'_> {
         };
         let [a, b, t] = [width, height, turn].map(|width| width * self.scale());
         let [ab, at, bt] = [0; 3].map(|_| 2.0 * self.share() - 1.0);
-        if kind & 1 == 0 {
+        let set = if kind & 1 == 0 {
             // Only about half have correlations, so that not most of them are invalid.
             let [ab, at, bt] = [ab * a * b, at * a * t, bt * b * t].map(|covariance| {
                 if kind & 2 == 0 {
@@ -78,9 +78,16 @@ impl Input<'_> {
                 1 => RadiusSquared::from_q16(1 << 16)?,
                 _ => table.radius_squared(),
             };
-            PoseSet::gaussian(estimate, covariance, radius_squared).ok()
+            PoseSet::gaussian(estimate, covariance, radius_squared).ok()?
         } else {
-            PoseSet::bounded(estimate, a, t).ok()
+            PoseSet::bounded(estimate, a, t).ok()?
+        };
+        // Half of the sets have moved, by up to about their size.
+        let [length, angle] = [kind >> 3 & 3, kind >> 5 & 3].map(|part| f64::from(part) / 2.0);
+        if kind & 4 == 0 {
+            Some(set)
+        } else {
+            Growth::of(a * length, t * angle).map(|by| set.grown(by))
         }
     }
 }

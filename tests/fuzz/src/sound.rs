@@ -4,7 +4,7 @@
 
 use posegate::contain::{Margin, facet_clearance_q14};
 use posegate::pose::Pose;
-use posegate::set::{Extent, PoseSet};
+use posegate::set::{Extent, PoseSet, SqrtFactor};
 use posegate::table::{Axes, Cells, Facets, NORMAL_BITS, Piece, Table};
 use std::f64::consts::TAU;
 
@@ -26,26 +26,33 @@ fn border(set: &PoseSet, scale: f64, pick: [i8; 3]) -> Vec<Offset> {
         unit.push([sign(0), 0.3 * sign(1), 0.1 * sign(2)]);
         unit.push([0, 1, 2].map(|axis| if axis == signs % 3 { sign(2) } else { 0.0 }));
     }
-    let offsets = unit.into_iter().map(|[u, v, w]| match set.extent() {
-        Extent::Gaussian(factor) => {
-            let length = u.hypot(v).hypot(w).max(1e-9) / scale;
-            let u = [u, v, w].map(|part| part / length);
-            let along = |row: [i32; 3]| -> f64 { (0..3).map(|k| f64::from(row[k]) * u[k]).sum() };
-            let yaw = f64::from(factor.yaw_q24()) * u[0] * 256.0;
-            [along(factor.x_um()), along(factor.y_um()), yaw]
-        }
+    let in_ellipsoid = |factor: SqrtFactor, [u, v, w]: [f64; 3]| {
+        let length = u.hypot(v).hypot(w).max(1e-9) / scale;
+        let u = [u, v, w].map(|part| part / length);
+        let along = |row: [i32; 3]| -> f64 { (0..3).map(|k| f64::from(row[k]) * u[k]).sum() };
+        let yaw = f64::from(factor.yaw_q24()) * u[0] * 256.0;
+        [along(factor.x_um()), along(factor.y_um()), yaw]
+    };
+    let in_cylinder = |[translation_um, yaw_q24]: [i32; 2], [u, v, w]: [f64; 3]| {
+        let length = v.hypot(w).max(1e-9) / scale;
+        let radius = f64::from(translation_um);
+        let yaw = f64::from(yaw_q24) * 256.0 * u.clamp(-1.0, 1.0) * scale;
+        [
+            radius * v / length,
+            radius * w / length,
+            yaw.clamp(-TURN / 2.0, TURN / 2.0),
+        ]
+    };
+    let offsets = unit.into_iter().map(|unit| match set.extent() {
+        Extent::Gaussian(factor) => in_ellipsoid(factor, unit),
         Extent::Bounded {
             translation_um,
             yaw_q24,
-        } => {
-            let length = v.hypot(w).max(1e-9) / scale;
-            let radius = f64::from(translation_um);
-            let yaw = f64::from(yaw_q24) * 256.0 * u.clamp(-1.0, 1.0) * scale;
-            [
-                radius * v / length,
-                radius * w / length,
-                yaw.clamp(-TURN / 2.0, TURN / 2.0),
-            ]
+        } => in_cylinder([translation_um, yaw_q24], unit),
+        Extent::Grown { factor, by } => {
+            let moved = in_cylinder([by.translation_um(), by.yaw_q24()], unit);
+            let still = in_ellipsoid(factor, unit);
+            [0, 1, 2].map(|axis| still[axis] + moved[axis])
         }
     });
     offsets
@@ -53,15 +60,14 @@ fn border(set: &PoseSet, scale: f64, pick: [i8; 3]) -> Vec<Offset> {
         .collect()
 }
 
-/// Asserts that poses of the set scaled by its reported margin lie in one piece of the facets, or
+/// Asserts that poses of the set scaled by its reported margin lie each in a piece of the facets, or
 /// each in a covered cell.
 pub fn holds(table: &Table<'_>, set: &PoseSet, margin: Margin, pick: [i8; 3]) {
     let offsets = border(set, f64::from(margin.q16()) / 65_536.0, pick);
     let in_facets = table.facets().is_some_and(|layout| {
-        layout.pieces().any(|piece| {
-            offsets
-                .iter()
-                .all(|offset| is_in_piece(table, layout, &piece, set, *offset))
+        offsets.iter().all(|offset| {
+            let mut pieces = layout.pieces();
+            pieces.any(|piece| is_in_piece(table, layout, &piece, set, *offset))
         })
     });
     let in_cells = || offsets.iter().all(|offset| is_in_cell(table, set, *offset));
@@ -86,6 +92,9 @@ pub fn is_of(set: &PoseSet, pose: Pose) {
     let is_wide = match set.extent() {
         Extent::Gaussian(factor) => f64::from(factor.yaw_q24()) * 256.0 > TURN / 2.0,
         Extent::Bounded { .. } => false,
+        Extent::Grown { factor, by } => {
+            f64::from(factor.yaw_q24().saturating_add(by.yaw_q24())) * 256.0 > TURN / 2.0
+        }
     };
     let reaches = |turns: f64| is_within(set, [x, y, (yaw + turns * TURN) / 256.0]);
     let is_of = reaches(0.0) || is_wide && (reaches(-1.0) || reaches(1.0));
@@ -96,7 +105,7 @@ pub fn is_of(set: &PoseSet, pose: Pose) {
 fn is_within(set: &PoseSet, offset: [f64; 3]) -> bool {
     let dot = |a: [f64; 3], b: [f64; 3]| -> f64 { (0..3).map(|k| a[k] * b[k]).sum() };
     let rounding = match set.extent() {
-        Extent::Gaussian(factor) => {
+        Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
             let length = |row: [i32; 3]| dot(row.map(f64::from), row.map(f64::from)).sqrt();
             let length = length(factor.x_um()).max(length(factor.y_um()));
             let yaw = f64::from(factor.yaw_q24());
@@ -106,8 +115,11 @@ fn is_within(set: &PoseSet, offset: [f64; 3]) -> bool {
     };
     (0..27).all(|number: i32| {
         let signs = [number % 3, number / 3 % 3, number / 9].map(|v| f64::from(v - 1));
+        let in_cylinder = |[translation_um, yaw_q24]: [i32; 2], [x, y, yaw]: [f64; 3]| {
+            f64::from(translation_um) * x.hypot(y) + f64::from(yaw_q24) * yaw.abs()
+        };
         let (along, reach) = match set.extent() {
-            Extent::Gaussian(factor) => {
+            Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
                 let rows = [
                     factor.x_um().map(f64::from),
                     factor.y_um().map(f64::from),
@@ -115,16 +127,19 @@ fn is_within(set: &PoseSet, offset: [f64; 3]) -> bool {
                 ];
                 let along = [0, 1, 2].map(|k| signs[k] / dot(rows[k], rows[k]).sqrt().max(1.0));
                 let column = |k: usize| (0..3).map(|row| rows[row][k] * along[row]).sum::<f64>();
-                (along, column(0).hypot(column(1)).hypot(column(2)))
+                let moved = match set.extent() {
+                    Extent::Grown { by, .. } => {
+                        in_cylinder([by.translation_um(), by.yaw_q24()], along)
+                    }
+                    _ => 0.0,
+                };
+                let still = column(0).hypot(column(1)).hypot(column(2));
+                (along, still + moved)
             }
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
-            } => {
-                let [x, y, yaw] = signs;
-                let radius = f64::from(translation_um) * x.hypot(y);
-                (signs, radius + f64::from(yaw_q24) * yaw.abs())
-            }
+            } => (signs, in_cylinder([translation_um, yaw_q24], signs)),
         };
         dot(along, offset) <= reach + dot(along.map(f64::abs), rounding)
     })

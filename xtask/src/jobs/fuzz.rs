@@ -5,8 +5,10 @@ use crate::files::target_folder;
 use crate::need;
 use crate::report::{Report, print_with};
 use crate::shell::{Result, cmd, say};
+use std::path::PathBuf;
 
-const FOLDER: &str = "tests/fuzz";
+/// The workspace of the fuzz targets.
+pub const FOLDER: &str = "tests/fuzz";
 /// Least number of code edges that a target must reach: with fewer it is not past the checksums. In 10 s from the seeds alone the targets
 /// reach 903, 912 and 799. Without a repaired checksum the table target reaches 31; a wire harness that neither decodes nor sends anything
 /// reaches 647.
@@ -17,6 +19,11 @@ const FLOORS: [(&str, u64); 4] = [
     ("report", 700),
 ];
 
+/// Returns the folder for what is built of it.
+pub fn built() -> PathBuf {
+    target_folder().join("fuzz")
+}
+
 /// Runs every fuzz target (or those named) for a number of seconds each. Seeds are real tables, recorded estimates, and earlier finds in
 /// tests/fuzz/corpus. Prints a line for each target. Fails on a finding, and if a target reached too few edges.
 pub fn fuzz(given: &Arguments) -> Result {
@@ -24,15 +31,10 @@ pub fn fuzz(given: &Arguments) -> Result {
     given.number(0, 0)?;
     need::command("c++", "g++")?;
     need::cargo_command("cargo-fuzz")?;
-    let built = target_folder().join("fuzz");
+    let built = built();
     let manifest = format!("--manifest-path {FOLDER}/Cargo.toml");
     cmd(&format!("cargo fmt {manifest} --check")).run()?;
-    cmd(&format!(
-        "cargo clippy {manifest} --all-targets --target-dir"
-    ))
-    .arg(&built)
-    .words("-- -D warnings")
-    .run()?;
+    super::lint::fuzz_targets()?;
     cmd(&format!(
         "cargo run {manifest} --example seeds --target-dir"
     ))

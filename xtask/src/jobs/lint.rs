@@ -23,8 +23,8 @@ pub fn quick(_: &Arguments) -> Result {
     lint("--workspace --exclude posegate-peers --all-targets")
 }
 
-/// Checks the library alone with each set of features, all other crates with their features, and the code for
-/// controllers.
+/// Checks the library alone with each set of features, all other crates with their features, the code for controllers, and the fuzz
+/// targets, which no other build includes.
 pub fn clippy(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     quick(given)?;
@@ -45,5 +45,17 @@ pub fn clippy(given: &Arguments) -> Result {
             "-p posegate --examples --target thumbv7em-none-eabihf --features {features}"
         ))?;
     }
-    Ok(())
+    need::command("c++", "g++")?;
+    fuzz_targets()
+}
+
+/// Checks the fuzz targets, a workspace of its own, in the folder where [`super::fuzz`] builds them.
+pub fn fuzz_targets() -> Result {
+    cmd(&format!(
+        "cargo clippy --locked --manifest-path {}/Cargo.toml --all-targets --target-dir",
+        super::fuzz::FOLDER
+    ))
+    .arg(super::fuzz::built())
+    .words("-- -D warnings")
+    .run()
 }

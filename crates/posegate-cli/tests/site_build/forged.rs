@@ -85,7 +85,6 @@ fn mismatched_table_and_proof_are_neither_kept_nor_merged() {
         "site_digest",
         "tool_version",
         "layout",
-        "table",
     ];
     for (number, how) in changes.into_iter().enumerate() {
         let copy = format!("copy-{number}");
