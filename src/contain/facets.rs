@@ -30,22 +30,19 @@
 
 use super::compact::{Columns, QuantizedPoseSet};
 use super::frame::{FramePoints, Ready};
-use super::heading::{self, Sweep};
+use super::heading::{self, Sweep, in_arc};
 use super::nearest::{DecisionObserver, Nearest, NoObserver, ONE_Q10};
 use super::union;
 use crate::num::{COS_SIN_ERROR_Q15, Divisor, sqrt_floor, sqrt_upper};
 use crate::parts;
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet, Turn};
-use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
+use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS};
 
 /// Most by which rounding can lower an extent's reach along a normal, in the extent's units.
 const ROUNDING: i32 = 8;
 /// Most by which the roundings of step 3 can lower the bend, in the extent's units.
 const ROUNDING_OF_BEND: i32 = 16;
-/// Slack of an arc, 2^-32 turn: headings of estimate and goal are each within 0.51, and the proof treats the border of
-/// a box's arc as 1.37 wide.
-const ARC_SLACK: u32 = 3;
 /// Largest `|x| + |y|` of a normal in any axes: 2^14 sqrt(1 + 2^-7) sqrt(2).
 const ALONG_AT_ANY_ANGLE: i64 = 23_262;
 /// Half of [`ALONG_AT_ANY_ANGLE`], times 1.118.
@@ -134,15 +131,6 @@ fn is_held(
             }
         })
     })
-}
-
-/// Returns `true` if headings up to `reach` from one that is `above_goal`, 2^-32 turn, lie in a piece's arc.
-#[inline(always)]
-pub(super) fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
-    let above = above_goal.wrapping_sub(piece.from);
-    let reach = reach.saturating_add(ARC_SLACK);
-    let room = above.min(piece.width.saturating_sub(above));
-    piece.is_whole_circle() || (above <= piece.width && reach <= room)
 }
 
 /// Returns `true` if the set's points satisfy the facets of a frame.

@@ -47,11 +47,10 @@
 //! rounding of a scale (margins only).
 
 use super::compact;
-use super::facets::in_arc;
 use crate::num::{BinaryAngle, product, sqrt_ceil};
 use crate::pose::Pose;
 use crate::set::{Extent, Growth, PoseSet, SqrtFactor};
-use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS};
+use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS, Piece};
 
 /// Most by which roundings to the nearest can lower a bound, fine units.
 const SLACK: i64 = 28;
@@ -72,6 +71,19 @@ const TAU: i64 = 105_414_358;
 const U: u32 = 15;
 /// One in radians, cosines and sines: 2^-28.
 const ONE: i64 = 1 << 28;
+
+/// Slack of an arc, 2^-32 turn: headings of estimate and goal are each within 0.51, and the proof treats the border of
+/// a box's arc as 1.37 wide.
+const ARC_SLACK: u32 = 3;
+
+/// Returns `true` if headings up to `reach` from one that is `above_goal`, 2^-32 turn, lie in a piece's arc.
+#[inline(always)]
+pub(super) fn in_arc(piece: &Piece<'_>, above_goal: u32, reach: u32) -> bool {
+    let above = above_goal.wrapping_sub(piece.from);
+    let reach = reach.saturating_add(ARC_SLACK);
+    let room = above.min(piece.width.saturating_sub(above));
+    piece.is_whole_circle() || (above <= piece.width && reach <= room)
+}
 
 /// A pose-set's numbers for this test.
 #[derive(Clone, Copy, Debug)]

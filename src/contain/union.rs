@@ -23,8 +23,7 @@
 //! numbers of a facet's section are linear in its normal, its offset and its point. Two numbers are not: the part of G in robot axes and
 //! the part of `along` in world axes. They are carried separately from the sum, the latter rounded up.
 
-use super::facets::in_arc;
-use super::heading::{Root, Section, Slab, Sweep, Width};
+use super::heading::{Root, Section, Slab, Sweep, Width, in_arc};
 use crate::num::{product, sqrt_ceil};
 use crate::parts;
 use crate::pose::Pose;

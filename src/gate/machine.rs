@@ -7,6 +7,7 @@ use super::permission::{Check, FlowSignature};
 use super::scrub::{Scrub, ScrubProgress};
 use super::self_test;
 use super::standing::{DecodedState, StateSnapshot};
+use super::state::State;
 use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
 use crate::contain::{self, Decision, second};
 use crate::motion::MotionBounds;
@@ -15,34 +16,6 @@ use crate::set::{Growth, Trust};
 use crate::table::{self, Table};
 use crate::task::Risk;
 use core::hint::black_box;
-
-/// The state of a gate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum State {
-    /// Closed: the last report was denied, or there was no report yet.
-    Inhibited(Reason),
-    /// Closed: this number of consecutive reports have permitted. More must permit, or the hold time is not over.
-    Qualifying(u16),
-    /// Open.
-    Permitted,
-    /// Closed until [`Gate::reset`].
-    Latched(Reason),
-}
-
-impl State {
-    /// Returns the state's name in snake case, as JSON lines write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Inhibited(_) => "inhibited",
-            Self::Qualifying(_) => "qualifying",
-            Self::Permitted => "permitted",
-            Self::Latched(_) => "latched",
-        }
-    }
-}
 
 /// The answer of a gate at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

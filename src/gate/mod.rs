@@ -39,7 +39,7 @@ use crate::table::Table;
 
 pub use self::evidence::{Evidence, MOST_HYPOTHESES};
 pub use self::interlock::{Interlock, InterlockFault, NoPin};
-pub use self::machine::{Gate, State, Step};
+pub use self::machine::{Gate, Step};
 pub use self::monitor::{Innovation, ModelStanding, Monitor};
 pub use self::permission::{DENY, PERMIT, Permission};
 pub use self::reason::{Advice, Reason};
@@ -47,6 +47,7 @@ pub use self::scrub::{Scrub, ScrubProgress};
 pub use self::seal::Seal;
 pub use self::self_test::self_test;
 pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
+pub use self::state::State;
 
 mod doubled;
 mod elsewhere;
@@ -61,6 +62,7 @@ mod seal;
 mod self_test;
 mod settings;
 mod standing;
+mod state;
 
 #[doc = include_str!("assumptions.md")]
 pub mod assumptions {}

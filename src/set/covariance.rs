@@ -44,7 +44,6 @@
 
 use core::num::NonZeroU32;
 
-use super::given::Target;
 use super::trust::{Reach, Scaled};
 use super::{InputError, SqrtFactor};
 use crate::num::{Divisor, Float, Inverse, Leading, Rounding, product, sqrt_ceil, wide};
@@ -76,17 +75,9 @@ const Q24_2: Unit = Unit {
 const LARGEST_LENGTH: i64 = 1 << 28;
 const LARGEST_YAW: i64 = 1 << 29;
 
-/// Returns the factor of `r2 P`, rounded outwards, and a bound from inside, or the reason why `p` is not a covariance.
-/// The squared radius may differ between the plane and yaw if the terms between them are zero.
-pub(super) fn factor(p: &[[f64; 3]; 3], reach: Reach) -> Result<(SqrtFactor, Target), InputError> {
-    let target = target(p, reach)?;
-    let factor = target.factor().ok_or(InputError::CovarianceTooLarge)?;
-    Ok((factor, Target::of(&target)))
-}
-
 /// Checks a covariance and returns `r2 P`.
 #[inline(always)]
-fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance, InputError> {
+pub(super) fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance, InputError> {
     let is_finite = |value: &f64| (value.to_bits() >> 52) as u32 & 0x7ff != 0x7ff;
     if !p.iter().flatten().all(is_finite) {
         return Err(InputError::CovarianceNotFinite);

@@ -279,7 +279,7 @@ impl PoseSet {
         covariance: &[[f64; 3]; 3],
         reach: Reach,
     ) -> Result<Self, InputError> {
-        let (factor, target) = covariance::factor(covariance, reach)?;
+        let (factor, target) = given::factor(covariance, reach)?;
         let extent = Extent::Gaussian(factor);
         Ok(Self::given(mean, extent, Given::Ellipsoid(target)))
     }

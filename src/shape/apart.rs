@@ -75,7 +75,7 @@ impl Exclusion {
             }
             Self::Square { view, psi_min_deg } => {
                 let normal = view.resolve::<f64>(goal).normal;
-                let (psi_min_deg, back) = squarest(view, *psi_min_deg);
+                let (psi_min_deg, back) = view.too_head_on(*psi_min_deg);
                 let plain = ray(view);
                 let ray = [0, 1, 2].map(|i| plain[i] + back * normal[i]);
                 f64::cos_sin_deg(psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
@@ -132,7 +132,7 @@ impl Exclusion {
             Self::Square { view, psi_min_deg } => {
                 let tag: Resolved<f64> = view.resolve(goal);
                 let normal = tag.normal;
-                let [c, s] = f64::cos_sin_deg(squarest(view, *psi_min_deg).0);
+                let [c, s] = f64::cos_sin_deg(view.too_head_on(*psi_min_deg).0);
                 let (first, second) = across(normal);
                 (0..DIRECTIONS)
                     .map(around)
@@ -157,19 +157,6 @@ impl Exclusion {
                 .collect(),
         }
     }
-}
-
-/// Returns the half angle of the cone of views that are too head-on, degrees (below 90), and how far its
-/// tip is moved behind the tag, metres. Both include the tolerances.
-pub(super) fn squarest(view: &Visibility, psi_min_deg: f64) -> (f64, f64) {
-    let turned = view.tag_tolerance.turn_deg;
-    let angle = if turned > 0.0 {
-        (psi_min_deg + turned + 1e-12).min(90.0)
-    } else {
-        psi_min_deg
-    };
-    let back = view.tolerance_margins().ray / f64::cos_sin_deg(angle)[1] * (1.0 + 1e-9);
-    (angle, back)
 }
 
 /// Returns the edges of a polygon.
@@ -213,7 +200,7 @@ mod tests {
             ..test_view()
         };
         for psi_min_deg in [1.0, 45.0, 89.9, 89.9995] {
-            let (angle, back) = squarest(&view, psi_min_deg);
+            let (angle, back) = view.too_head_on(psi_min_deg);
             assert!(angle >= psi_min_deg + 2e-4 && angle < 90.0, "{angle}");
             assert!(back >= 0.01 / libm::sin(angle.to_radians()), "{back}");
         }

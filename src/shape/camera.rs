@@ -131,6 +131,35 @@ impl Camera {
     }
 }
 
+impl Window {
+    /// Creates the image of a pinhole camera without a border of `border_px` pixels on each side: left,
+    /// right, top, bottom. If a difference is not an exact `f64`, the plane is rounded inwards.
+    pub(crate) fn of_pinhole(camera: &Camera, border_px: f64) -> Self {
+        let (left, top) = (below(camera.cx, border_px), below(camera.cy, border_px));
+        let right = below(below(camera.width_px, camera.cx), border_px);
+        let bottom = below(below(camera.height_px, camera.cy), border_px);
+        Self::of_planes(&[
+            [camera.fx, 0.0, left],
+            [-camera.fx, 0.0, right],
+            [0.0, camera.fy, top],
+            [0.0, -camera.fy, bottom],
+        ])
+    }
+}
+
+/// Returns `a - b`, rounded down if it is not an exact `f64`.
+fn below(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    // The rounding error, exactly (Knuth's two-sum).
+    let back = difference - a;
+    let lost = (a - (difference - back)) - (b + back);
+    if lost < 0.0 {
+        difference.next_down()
+    } else {
+        difference
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,5 +196,17 @@ mod tests {
         assert_eq!(camera.view(), half);
         camera.fx = 614.0;
         assert!(!camera.view().contains([0.0, 0.0]));
+    }
+
+    #[test]
+    fn differences_round_down() {
+        assert_eq!(below(640.0, 320.0), 320.0);
+        // 2^53 + 2 - (1 + 2^-52): below 2^53 + 1, which is halfway.
+        assert_eq!(
+            below(9_007_199_254_740_994.0, 1.0f64.next_up()),
+            9_007_199_254_740_992.0
+        );
+        assert_eq!(below(1.0, 1e-20), 1.0f64.next_down());
+        assert_eq!(below(1.0, -1e-20), 1.0);
     }
 }

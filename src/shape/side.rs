@@ -150,7 +150,7 @@ impl SeparatingHalfPlane {
                 toward,
             } => {
                 let tag: Resolved<S> = view.resolve(goal);
-                let (psi_min_deg, back) = super::apart::squarest(view, *psi_min_deg);
+                let (psi_min_deg, back) = view.too_head_on(*psi_min_deg);
                 let cosine = S::cos_sin_deg(psi_min_deg)[0];
                 let toward = shortened(*toward).map(S::exact);
                 let k: Vector<S> = [0, 1, 2].map(|i| cosine * toward[i] - tag.normal[i]);

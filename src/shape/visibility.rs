@@ -126,6 +126,19 @@ impl Visibility {
         ]
     }
 
+    /// Returns the half angle of the cone of views that are too head-on, degrees (below 90), and how far its
+    /// tip is moved behind the tag, metres. Both include the tolerances.
+    pub(super) fn too_head_on(&self, psi_min_deg: f64) -> (f64, f64) {
+        let turned = self.tag_tolerance.turn_deg;
+        let angle = if turned > 0.0 {
+            (psi_min_deg + turned + 1e-12).min(90.0)
+        } else {
+            psi_min_deg
+        };
+        let back = self.tolerance_margins().ray / f64::cos_sin_deg(angle)[1] * (1.0 + 1e-9);
+        (angle, back)
+    }
+
     /// Returns by how much the tolerances of tag and mount reduce the slacks, rounded up. All zero if neither has a
     /// tolerance.
     #[must_use]

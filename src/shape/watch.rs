@@ -1,6 +1,6 @@
 //! Repeated evaluation of a task's view of its tag at many poses.
 
-use super::planar::seen;
+use super::membership::seen;
 use super::visibility::{Resolved, distance_and_angles};
 use super::{Planar, Scalar, Shape, SuccessSet};
 

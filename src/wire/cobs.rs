@@ -5,7 +5,7 @@
 //! but the decoder accepts it. Implemented here because a panic must not be reachable; the tests
 //! compare it with the `cobs` crate.
 
-use super::frame::Frame;
+use super::Frame;
 use heapless::Vec;
 
 /// Returns the encoding of at most `N` bytes, with the closing zero, or `None` if it does not fit.

@@ -1,12 +1,9 @@
 //! Frames: COBS and a checksum around a body.
 
 use super::cobs;
-use super::{LONGEST_BODY, LONGEST_FRAME, WireError};
+use super::{Frame, LONGEST_BODY, WireError};
 use crate::table::checksum;
 use heapless::Vec;
-
-/// A body whose checksum was correct.
-pub type Frame = Vec<u8, { LONGEST_FRAME }>;
 
 /// Returns the frame of a body of at most [`LONGEST_BODY`] bytes, with the closing zero. For a longer body
 /// it is empty.

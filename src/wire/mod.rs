@@ -88,7 +88,7 @@ use crate::recordings::Evaluator;
 use crate::set::{Estimate, InputError, PoseSet, RadiusSquared};
 use heapless::Vec;
 
-pub use self::frame::{Frame, Receiver, encode};
+pub use self::frame::{Receiver, encode};
 pub use self::hypotheses::{HypothesisCollector, counted_report_body, hypothesis_body};
 pub use self::odometry::{increment_body, increment_from_body};
 pub use self::report::{report_body, report_from_body};
@@ -110,6 +110,9 @@ pub const VERSION_2: u8 = 2;
 pub const LONGEST_BODY: usize = 141;
 /// Longest frame: body, CRC, one COBS byte per 254 bytes, and the zero.
 pub const LONGEST_FRAME: usize = LONGEST_BODY + 4 + 1 + 1;
+
+/// A body whose checksum was correct.
+pub type Frame = Vec<u8, { LONGEST_FRAME }>;
 
 const PERMIT: u8 = 0xa5;
 const GAUSSIAN: u8 = 1;

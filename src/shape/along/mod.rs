@@ -141,7 +141,7 @@ fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &m
             Node::Near(Box::new(view.resolve(goal)), least, own)
         }
         Shape::Apart(Exclusion::Square { view, psi_min_deg }) => {
-            let (psi_min_deg, back) = super::apart::squarest(view, *psi_min_deg);
+            let (psi_min_deg, back) = view.too_head_on(*psi_min_deg);
             let cosine = f64::cos_sin_deg(psi_min_deg)[0];
             Node::Square(Box::new(view.resolve(goal)), [cosine, back], own)
         }
