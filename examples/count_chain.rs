@@ -41,7 +41,8 @@ mod firmware {
 
     #[inline(never)]
     fn chain(start: BeliefState, steps: &[Step<'_>; STEPS]) -> Option<Evaluation<STEPS>> {
-        evaluate(start, *steps, StartAssumption::General, decide_with_margin)
+        let steps = steps.iter().copied();
+        evaluate(start, steps, StartAssumption::General, decide_with_margin)
     }
 
     fn cylinder(translation_m: f64, yaw_rad: f64) -> Result<Cylinder, Failure> {
