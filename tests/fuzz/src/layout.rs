@@ -120,7 +120,8 @@ fn facets(table: &Table<'_>, worst: &mut WorstCase) {
                     (&mut worst.world_facets, i32::from(i16::MAX))
                 }
                 Axes::Robot => {
-                    assert!(length + 2 * i32::from(layout.reach()) <= i32::from(layout.lever()));
+                    let lever = length + 2 * i32::from(layout.reach());
+                    assert!(lever <= i32::from(layout.lever()));
                     (&mut worst.robot_facets, i32::from(layout.farthest()))
                 }
             };
@@ -131,6 +132,13 @@ fn facets(table: &Table<'_>, worst: &mut WorstCase) {
                 assert!(b.abs() <= limit);
             }
         }
+    }
+    // Slabs of one piece if the table states that points may turn with the heading, and of several pieces together.
+    if layout.lever() > 0 {
+        worst.heading_slabs += 33;
+    }
+    if worst.pieces > 1 {
+        worst.heading_slabs += 5 * 96;
     }
     assert_eq!(worst.frames as usize, layout.frame_count());
     assert_eq!(
