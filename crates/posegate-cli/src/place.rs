@@ -199,33 +199,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         line["before"] = before.map_or(Value::Null, |before| before.to_json());
         print_json(&line)?;
     } else {
-        if let Ok(before) = &before {
-            print(&"before:")?;
-            print_placed(before)?;
-            print(&"best:")?;
-        }
-        print_placed(&found.best)?;
+        print_places(before.as_ref().ok(), &found)?;
         print(&format_args!(
-            "in the site  {}",
-            pose_line(&found.best.pose)
-        ))?;
-        for other in &found.others {
-            let pose = other.pose;
-            print(&format_args!(
-                "another: x {:.4}, y {:.4}, z {:.4}, yaw {:.3} deg{}",
-                pose.x,
-                pose.y,
-                pose.z,
-                pose.yaw_deg,
-                other.mean.map_or(String::new(), |mean| format!(
-                    ", mean cost {:.6}",
-                    mean.value
-                )),
-            ))?;
-        }
-        restarts(&found)?;
-        print(&format_args!(
-            "{} places looked at ({})",
+            "{} places evaluated ({})",
             found.evaluations,
             space.name()
         ))?;
@@ -251,6 +227,35 @@ fn error_of_reserve(site: &Site, order: &PlacementProblem<'_>, best: &Placed) ->
         "if the tag is off by the reserve and the site file keeps the pose above, every pose from it is off, too. {}: {}; survey the tag after mounting, and write its `pose` and `tolerance` into the site file",
         warning.about, warning.message
     ))
+}
+
+/// Prints the present place, the best one, others that are about as good, and how far apart the restarts ended.
+fn print_places(before: Option<&Placed>, found: &Placement) -> Result<(), Failure> {
+    if let Some(before) = before {
+        print(&"before:")?;
+        print_placed(before)?;
+        print(&"best:")?;
+    }
+    print_placed(&found.best)?;
+    print(&format_args!(
+        "in the site  {}",
+        pose_line(&found.best.pose)
+    ))?;
+    for other in &found.others {
+        let pose = other.pose;
+        let mean = |value| format!(", mean cost {value:.6}");
+        print(&format_args!(
+            "another: x {:.4}, y {:.4}, z {:.4}, yaw {:.3} deg{}",
+            printed(pose.x),
+            printed(pose.y),
+            printed(pose.z),
+            printed(pose.yaw_deg),
+            other
+                .mean
+                .map_or_else(String::new, |found| mean(found.value)),
+        ))?;
+    }
+    restarts(found)
 }
 
 /// Prints how far apart the restarts of the search ended.
