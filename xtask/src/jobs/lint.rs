@@ -23,8 +23,8 @@ pub fn quick(_: &Arguments) -> Result {
     lint("--workspace --exclude posegate-peers --all-targets")
 }
 
-/// Checks the library alone with each set of features, all other crates with their features, the code for controllers, and the fuzz
-/// targets, which no other build includes.
+/// Checks the library alone with each set of features, all other crates with their features, the code for controllers, the fuzz
+/// targets, which no other build includes, and the lock files of the other workspaces.
 pub fn clippy(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     quick(given)?;
@@ -46,7 +46,8 @@ pub fn clippy(given: &Arguments) -> Result {
         ))?;
     }
     need::command("c++", "g++")?;
-    fuzz_targets()
+    fuzz_targets()?;
+    lock_files()
 }
 
 /// Checks the fuzz targets, a workspace of its own, in the folder where [`super::fuzz`] builds them.
@@ -58,4 +59,16 @@ pub fn fuzz_targets() -> Result {
     .arg(super::fuzz::built())
     .words("-- -D warnings")
     .run()
+}
+
+/// Checks that the lock files of the workspaces that only their own jobs build are current.
+fn lock_files() -> Result {
+    for name in ["python", "ros2"] {
+        let manifest = format!("crates/posegate-{name}/Cargo.toml");
+        cmd("cargo metadata --locked --format-version 1 --manifest-path")
+            .arg(&manifest)
+            .read()
+            .map_err(|error| format!("{manifest}: {error}; run `cargo metadata` without --locked, and commit the lock file"))?;
+    }
+    Ok(())
 }
