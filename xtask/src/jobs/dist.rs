@@ -78,7 +78,7 @@ pub fn dist(given: &Arguments) -> Result {
 /// Installs what the job needs.
 fn tools() -> Result {
     need::targets(&[build::STATIC])?;
-    need::targets(&archives::CORES)?;
+    need::targets(&build::CORES)?;
     need::qemu()?;
     for (command, package) in [
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),

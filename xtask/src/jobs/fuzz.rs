@@ -8,7 +8,7 @@ use crate::shell::{Result, cmd, say};
 use std::path::PathBuf;
 
 /// The workspace of the fuzz targets.
-pub const FOLDER: &str = "tests/fuzz";
+const FOLDER: &str = "tests/fuzz";
 /// Least number of code edges that a target must reach: with fewer it is not past the checksums. In 10 s from the seeds alone the targets
 /// reach 903, 912 and 799. Without a repaired checksum the table target reaches 31; a wire harness that neither decodes nor sends anything
 /// reaches 647.
@@ -20,8 +20,18 @@ const FLOORS: [(&str, u64); 4] = [
 ];
 
 /// Returns the folder for what is built of it.
-pub fn built() -> PathBuf {
+fn built() -> PathBuf {
     target_folder().join("fuzz")
+}
+
+/// Checks the code of the fuzz targets, a workspace of its own.
+pub fn check() -> Result {
+    cmd(&format!(
+        "cargo clippy --locked --manifest-path {FOLDER}/Cargo.toml --all-targets --target-dir"
+    ))
+    .arg(built())
+    .words("-- -D warnings")
+    .run()
 }
 
 /// Runs every fuzz target (or those named) for a number of seconds each. Seeds are real tables, recorded estimates, and earlier finds in
@@ -34,7 +44,7 @@ pub fn fuzz(given: &Arguments) -> Result {
     let built = built();
     let manifest = format!("--manifest-path {FOLDER}/Cargo.toml");
     cmd(&format!("cargo fmt {manifest} --check")).run()?;
-    super::lint::fuzz_targets()?;
+    check()?;
     cmd(&format!(
         "cargo run {manifest} --example seeds --target-dir"
     ))

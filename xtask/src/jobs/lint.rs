@@ -46,19 +46,8 @@ pub fn clippy(given: &Arguments) -> Result {
         ))?;
     }
     need::command("c++", "g++")?;
-    fuzz_targets()?;
+    super::fuzz::check()?;
     lock_files()
-}
-
-/// Checks the fuzz targets, a workspace of its own, in the folder where [`super::fuzz`] builds them.
-pub fn fuzz_targets() -> Result {
-    cmd(&format!(
-        "cargo clippy --locked --manifest-path {}/Cargo.toml --all-targets --target-dir",
-        super::fuzz::FOLDER
-    ))
-    .arg(super::fuzz::built())
-    .words("-- -D warnings")
-    .run()
 }
 
 /// Checks that the lock files of the workspaces that only their own jobs build are current.

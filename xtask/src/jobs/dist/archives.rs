@@ -5,13 +5,6 @@ use crate::files::{self, Scratch};
 use crate::shell::{Result, cmd, program_at, say};
 use std::path::{Path, PathBuf};
 
-/// The cores for which there is an archive for C.
-pub const CORES: [&str; 4] = [
-    "thumbv6m-none-eabi",
-    "thumbv7m-none-eabi",
-    "thumbv7em-none-eabihf",
-    "thumbv8m.main-none-eabihf",
-];
 pub const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 /// What a robot's integrator copies: files of the repository.
 const FOR_ROS: [&str; 3] = [

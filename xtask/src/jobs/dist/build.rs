@@ -8,6 +8,14 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// The cores for which there is an archive for C.
+pub const CORES: [&str; 4] = [
+    "thumbv6m-none-eabi",
+    "thumbv7m-none-eabi",
+    "thumbv7em-none-eabihf",
+    "thumbv8m.main-none-eabihf",
+];
+
 /// The target of the static programs.
 pub const STATIC: &str = "x86_64-unknown-linux-musl";
 /// The target of the wheel.
@@ -178,7 +186,7 @@ pub fn archives(sources: &Sources) -> Result<Built> {
     say("archives for C");
     let mut all = BTreeSet::new();
     let mut files = Vec::new();
-    for core in super::archives::CORES {
+    for core in CORES {
         all.append(
             &mut sources.cargo(&format!("-p posegate-c --profile firmware --target {core}"))?,
         );

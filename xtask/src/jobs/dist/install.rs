@@ -1,6 +1,6 @@
 //! Installs a release into empty roots by the commands of the README, and runs it there.
 
-use super::archives::CORES;
+use super::build::CORES;
 use super::{SUMS, installs};
 use crate::files::{self, Scratch};
 use crate::report::Report;

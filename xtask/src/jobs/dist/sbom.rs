@@ -2,7 +2,7 @@
 //! needs. `cargo metadata` describes the packages; `cargo tree` lists which of them a file has, since the former also lists optional
 //! packages that are not used.
 
-use super::archives::CORES;
+use super::build::CORES;
 use super::build::{Crate, STATIC, Sources, WHEEL};
 use crate::files;
 use crate::need;
