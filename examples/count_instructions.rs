@@ -245,11 +245,11 @@ mod firmware {
                 .is_some_and(|facets| facets.pieces().nth(1).is_some());
             let (cost, depth) = if is_union {
                 (
-                    "dearest of several pieces found",
+                    "most expensive decision found, several pieces",
                     "deepest stack found of several pieces",
                 )
             } else {
-                ("dearest of facets found", "deepest stack found of facets")
+                ("most expensive decision found, facets", "deepest stack found of facets")
             };
             let limits = match (is_union, M4F) {
                 (false, true) => [20_000, 29_000],
@@ -262,7 +262,7 @@ mod firmware {
             counter.short_of(depth, u64::from(deepest), "B", [512, most]);
         } else {
             counter.line(
-                "dearest of cells found,",
+                "most expensive decision found, cells,",
                 name,
                 search.cost(),
                 "instructions",
