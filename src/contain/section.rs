@@ -39,8 +39,8 @@ pub struct Cut {
 pub struct Offset(pub [i64; 3]);
 
 impl Offset {
-    /// Returns the pose at this offset, shrunk by 2^-12 so that the offset's own rounding cannot
-    /// leave the set.
+    /// Returns `mean` plus this offset, both in the goal frame. The offset is first shortened by 2^-12 of
+    /// itself, so that its rounding cannot leave the set.
     pub fn applied_to(self, mean: Pose) -> Pose {
         // Shrunk by at least one unit, towards zero.
         let drawn_in = |v: i64| match v.signum() {

@@ -165,7 +165,8 @@ pub struct PoseErrorSet {
 }
 
 impl PoseErrorSet {
-    /// Creates the knowledge that the error is certain to be in a cylinder: after a localization, r_l.
+    /// Creates the knowledge that the error is certain to be in a cylinder. After a localization, that is the largest
+    /// error of an observation (r_l).
     pub const fn bounded(within: Cylinder) -> Self {
         Self {
             certain: within,

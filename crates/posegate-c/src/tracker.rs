@@ -10,7 +10,8 @@ use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettin
 
 /// Words of a `posegate_tracker`.
 pub const POSEGATE_TRACKER_WORDS: usize = 192;
-/// Number of increments that a tracker keeps for late fixes.
+/// Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
+/// (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
 pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
 
 /// Storage of a tracker, which carries the newest fix of a slow source along the odometry. So a gate can evaluate a
