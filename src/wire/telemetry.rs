@@ -24,15 +24,15 @@ pub struct Telemetry {
     pub now_ms: u32,
     /// The report that was evaluated, if any.
     pub weighed: Option<ReportOutcome>,
-    /// The state of the gate after it.
+    /// The state of the gate after that report, or after the cycle.
     pub state: State,
     /// `true` if the permission given to the interlock is a permit.
     pub permitted: bool,
     /// `true` if the interlock's output is high, read back.
     pub interlock_high: bool,
-    /// The latched fault of the interlock.
+    /// The latched fault of the interlock; `None` if there is none.
     pub fault: Option<InterlockFault>,
-    /// Counts of the line.
+    /// Counts of the serial line.
     pub line: LinkCounters,
 }
 

@@ -8,7 +8,7 @@ use posegate::recordings::Evaluator;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
 
-/// Words of a `posegate_judge`.
+/// Number of 64-bit words of a `posegate_judge`.
 pub const POSEGATE_JUDGE_WORDS: usize = 20;
 /// Pointers of a `posegate_judge`.
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;

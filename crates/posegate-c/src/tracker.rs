@@ -8,7 +8,7 @@ use posegate::report::Report;
 use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
 
-/// Words of a `posegate_tracker`.
+/// Number of 64-bit words of a `posegate_tracker`.
 pub const POSEGATE_TRACKER_WORDS: usize = 192;
 /// Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
 /// (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).

@@ -17,7 +17,7 @@ use posegate::wire::{Receiver, Reply, Request, WireError, encode};
 
 /// Bytes of the longest message or frame.
 pub const POSEGATE_LONGEST_MESSAGE: usize = 152;
-/// Words of a `posegate_receiver`.
+/// Number of 64-bit words of a `posegate_receiver`.
 pub const POSEGATE_RECEIVER_WORDS: usize = 24;
 
 const _: () = assert!(posegate::wire::LONGEST_FRAME <= POSEGATE_LONGEST_MESSAGE);

@@ -92,7 +92,8 @@ pub struct SeenFrom {
     pub worst_for: Option<&'static str>,
     /// The pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// The four corners in AprilTag's order, pixels; `None` for a corner that is not in front of the camera.
+    /// The four corners in AprilTag's order ([`posegate::shape::Sight`]), pixels; `None` for a corner that is not in
+    /// front of the camera.
     pub corners: [Option<[f64; 2]>; 4],
 }
 

@@ -64,7 +64,7 @@ pub struct BoundCheck {
 /// The result for a region, or for all regions together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionCheck {
-    /// The ends of d (m), phi and psi (degrees).
+    /// The ends of d (m), phi and psi (degrees): see [`Detection::at`](super::Detection::at).
     pub ends: [[f64; 2]; 3],
     /// New detections in it.
     pub rows: u64,

@@ -36,7 +36,7 @@ pub struct InflationSettings {
     pub new_group: bool,
 }
 
-/// The factors of a source's covariance.
+/// A file of learnt factors by which the covariances of a source are multiplied: one per condition, one overall.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InflationModel {
     document: Document,
@@ -94,7 +94,7 @@ pub struct InflationReport {
     /// The number of independent rows with the same information on the share of sets without the truth. Consecutive
     /// rows are dependent.
     pub independent_rows: u64,
-    /// The share of the sets that contained the truth without a factor.
+    /// The share of the pose-sets that contained the truth without a factor.
     pub held: f64,
     /// The factor at which the share would have been epsilon among these rows; may be below 1.
     pub needed: f64,
