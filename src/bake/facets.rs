@@ -66,7 +66,7 @@ pub struct PiecePlan {
     pub from: u32,
     /// Width of the arc, 2^-32 turn; `u32::MAX` for the whole circle.
     pub width: u32,
-    /// Its frames.
+    /// The frames of the piece.
     pub frames: Vec<FramePlan>,
 }
 
@@ -82,11 +82,11 @@ impl PiecePlan {
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FramePlan {
-    /// Its axes.
+    /// The axes of the facets' normals.
     pub axes: Axes,
-    /// v or q, length units.
+    /// Length units: a point v of the robot for world axes, a point q of the goal frame for robot axes.
     pub point: [i16; 2],
-    /// Its facets.
+    /// The facets of the frame.
     pub facets: Vec<Facet>,
 }
 

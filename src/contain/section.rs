@@ -19,9 +19,9 @@ pub enum Side {
 /// A part of the goal frame, relative to the estimate: a row within a slab. Closed intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Micrometres.
+    /// Lower and upper end, micrometres.
     pub y: [i64; 2],
-    /// 2^-24 turn.
+    /// Lower and upper end, 2^-24 turn.
     pub yaw: [i64; 2],
 }
 

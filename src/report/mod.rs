@@ -63,7 +63,7 @@ pub struct Report {
     pub sequence: u32,
     /// The time of the estimate, milliseconds of the controller's wrapping clock.
     pub stamp_ms: u32,
-    /// The estimate.
+    /// The estimated pose and its uncertainty.
     pub belief: PoseEstimate,
 }
 

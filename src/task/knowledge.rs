@@ -45,13 +45,13 @@ impl Cylinder {
         })
     }
 
-    /// Micrometres.
+    /// Returns the largest distance, micrometres, from 0 to 2^28.
     #[must_use]
     pub const fn translation_um(self) -> i32 {
         self.translation_um
     }
 
-    /// 2^-24 turn; half a turn is every heading.
+    /// Returns the largest angle, 2^-24 turn; half a turn is every heading.
     #[must_use]
     pub const fn yaw_q24(self) -> i32 {
         self.yaw_q24

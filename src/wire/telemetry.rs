@@ -42,9 +42,9 @@ pub struct Telemetry {
 pub struct ReportOutcome {
     /// The source in the report.
     pub source: u8,
-    /// Its sequence number.
+    /// The report's sequence number.
     pub sequence: u32,
-    /// Its stamp, as the controller received it.
+    /// The report's stamp as the controller received it, milliseconds.
     pub stamp_ms: u32,
     /// `Ok` if the report permits by itself.
     pub verdict: Result<(), Reason>,

@@ -181,7 +181,7 @@ pub struct Cover {
     /// Lower bound: no choice that serves these tasks by chains within [`CoverOptions::beside`] costs less (see
     /// [`language`](super::language) for the assumptions).
     pub bound: f64,
-    /// The same bound, computed without a solver's answer.
+    /// The same lower bound as `bound`, computed without a solver's answer.
     pub bound_checked: f64,
     /// Largest distance from the straight line of the looks of the bound's chains, metres.
     pub beside: f64,

@@ -113,7 +113,7 @@ impl SeenFrom {
     }
 }
 
-/// Draws the tags of a task in the image of its camera, or of the first camera if there are several.
+/// Returns an SVG of the tags of a task in the image of its camera, or of the first camera if there are several.
 ///
 /// # Errors
 /// [`DrawError::NoCamera`] if the success set has no camera.

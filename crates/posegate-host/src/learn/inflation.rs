@@ -85,11 +85,11 @@ impl Default for InflationSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InflationReport {
-    /// The condition's ends, both included.
+    /// The smallest value of the condition's column, included.
     pub from: f64,
-    /// See `from`.
+    /// The largest value of the condition's column, included.
     pub to: f64,
-    /// Rows in it.
+    /// Rows with such values.
     pub rows: u64,
     /// The number of independent rows with the same information on the share of sets without the truth. Consecutive
     /// rows are dependent.

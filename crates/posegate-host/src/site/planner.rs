@@ -10,7 +10,7 @@ use super::success::{self, Names};
 use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
 use posegate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
 
-/// The planner's settings. Costs have any unit, such as seconds: only their ratio matters.
+/// The planner's settings. All costs have one unit of any kind, such as seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planner {
     /// The cost of a metre of driving.
