@@ -13,7 +13,7 @@
 use crate::set::RadiusSquared;
 
 /// Returns `P(chi^2_3 <= r2)`: the probability that a Gaussian pose-set of squared radius `r2`
-/// contains the true pose. Error below 1e-14.
+/// contains the true pose. Error below 1e-14. Returns 0 for `r2` below 0; `r2` must be finite.
 #[must_use]
 pub fn probability(r2: f64) -> f64 {
     if r2 <= 0.0 {

@@ -38,7 +38,7 @@ impl Effort {
 /// The facet layout of a table before it is encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FacetPlan {
-    /// Exponent of the length unit.
+    /// Exponent k of the length unit, 2^k um.
     pub unit: u8,
     /// An estimate farther from the goal than this on an axis is not inside, length units.
     pub reach: u16,
@@ -84,7 +84,8 @@ impl PiecePlan {
 pub struct FramePlan {
     /// The axes of the facets' normals.
     pub axes: Axes,
-    /// Length units: a point v of the robot for world axes, a point q of the goal frame for robot axes.
+    /// Length units. For world axes a point v of the robot, in its frame; for robot axes a point q of the world, from
+    /// the goal.
     pub point: [i16; 2],
     /// The facets of the frame.
     pub facets: Vec<Facet>,

@@ -57,7 +57,7 @@ pub struct PoseEstimate {
 pub struct Report {
     /// The index of the source among the gate's sources.
     pub source: u8,
-    /// The frame of its numbers.
+    /// The frame of the estimate.
     pub frame: FrameId,
     /// The source's count of its reports: one more each time, wrapping.
     pub sequence: u32,

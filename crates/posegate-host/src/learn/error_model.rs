@@ -36,7 +36,7 @@ pub struct Detectability {
 pub struct RegionReport {
     /// The ends of d (m), phi and psi (degrees): see [`Detection::at`](super::Detection::at).
     pub ends: [[f64; 2]; 3],
-    /// Detections on which it was calibrated.
+    /// Detections on which the region was calibrated.
     pub detections: u64,
     /// The number of independent detections with the same information.
     pub independent: u64,
@@ -49,9 +49,9 @@ pub struct RegionReport {
 pub struct CellReport {
     /// The ends of d (m), phi and psi (degrees): see [`Detection::at`](super::Detection::at).
     pub ends: [[f64; 2]; 3],
-    /// Detections in it.
+    /// Detections in this part.
     pub detections: u64,
-    /// The reason.
+    /// The reason why there are no bounds.
     pub why: String,
 }
 

@@ -454,7 +454,7 @@ impl InflationModel {
         Self::new(super::kind::of(text, file)?, file)
     }
 
-    /// Returns the text of its file.
+    /// Returns the text of the model's file.
     ///
     /// # Errors
     /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
@@ -502,13 +502,13 @@ impl InflationModel {
         &self.document.condition
     }
 
-    /// Returns the confidence of the pose-sets for which it was learnt.
+    /// Returns the confidence of the pose-sets for which the model was learnt.
     #[must_use]
     pub fn epsilon(&self) -> f64 {
         self.document.epsilon
     }
 
-    /// Returns the confidence with which its factors are large enough.
+    /// Returns the confidence with which the factors are large enough.
     #[must_use]
     pub fn confidence(&self) -> f64 {
         self.document.confidence

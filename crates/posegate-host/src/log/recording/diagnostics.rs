@@ -21,7 +21,7 @@ pub enum SkipReason {
 }
 
 impl SkipReason {
-    /// Returns its name, in snake case.
+    /// Returns the reason's name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -77,7 +77,7 @@ pub struct Sample {
 pub struct Exact {
     /// Time of the estimate.
     pub stamp: i64,
-    /// Time at which it was recorded.
+    /// Time at which the estimate was recorded.
     pub logged: i64,
 }
 

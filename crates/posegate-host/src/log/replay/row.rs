@@ -43,7 +43,7 @@ pub struct Row {
     pub step: Result<(), Reason>,
     /// The true pose (m, m, rad), if known.
     pub truth: Option<[f64; 3]>,
-    /// The time since the last fix of its source, milliseconds, if known.
+    /// The time since the last fix of the source, milliseconds, if known.
     pub since_fix_ms: Option<u32>,
     /// The comparison with the truth.
     pub against: Option<TruthComparison>,
