@@ -148,7 +148,8 @@ pub struct Polished {
     pub moved: [f64; 2],
     /// The reserve before the move, and on the complete polished site. The reserve is the largest factor for the
     /// errors of all starts and all looks with which each task that looks at the tag still has a plan. Such a plan
-    /// uses only the chosen tags that the task's plan looked at. At least 1; searched in steps of 2 %, rounded down.
+    /// uses only the chosen tags that the task's plan looked at. 0 if there is no such plan, else at least 1. Searched in
+    /// steps of 2 %, rounded down; the search ends above 4.
     pub reserve: [f64; 2],
 }
 
