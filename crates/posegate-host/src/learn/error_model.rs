@@ -151,7 +151,8 @@ impl ErrorModel {
     }
 
     /// Returns bounds on the errors of a detection at d (m), phi and psi (rad), as in
-    /// [`Detection::at`](super::Detection::at): metres and radians. `None` if the model has no bounds there. On the border between cells, the larger bounds. Takes some 150 ns.
+    /// [`Detection::at`](super::Detection::at): metres and radians. `None` if the model has no bounds there. On the
+    /// border between cells, the larger bounds. Takes some 150 ns.
     #[must_use]
     pub fn bounds(&self, d: f64, phi: f64, psi: f64) -> Option<(f64, f64)> {
         self.bounds_deg([d, phi.to_degrees(), psi.to_degrees()])
