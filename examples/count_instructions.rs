@@ -249,7 +249,10 @@ mod firmware {
                     "deepest stack found of several pieces",
                 )
             } else {
-                ("most expensive decision found, facets", "deepest stack found of facets")
+                (
+                    "most expensive decision found, facets",
+                    "deepest stack found of facets",
+                )
             };
             let limits = match (is_union, M4F) {
                 (false, true) => [20_000, 29_000],

@@ -29,7 +29,7 @@
 #define POSEGATE_OTHERS 7U
 
 /**
- * Words of a `posegate_gate`.
+ * Number of 64-bit words of a `posegate_gate`.
  */
 #define POSEGATE_GATE_WORDS 60U
 
@@ -39,7 +39,7 @@
 #define POSEGATE_GATE_POINTERS 24U
 
 /**
- * Words of a `posegate_judge`.
+ * Number of 64-bit words of a `posegate_judge`.
  */
 #define POSEGATE_JUDGE_WORDS 20U
 
@@ -49,7 +49,7 @@
 #define POSEGATE_JUDGE_POINTERS 12U
 
 /**
- * Words of a `posegate_monitor`.
+ * Number of 64-bit words of a `posegate_monitor`.
  */
 #define POSEGATE_MONITOR_WORDS 5U
 
@@ -89,12 +89,13 @@
 #define POSEGATE_ABI_VERSION 5U
 
 /**
- * Words of a `posegate_tracker`.
+ * Number of 64-bit words of a `posegate_tracker`.
  */
 #define POSEGATE_TRACKER_WORDS 192U
 
 /**
- * Number of increments that a tracker keeps for late fixes.
+ * Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
+ * (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
  */
 #define POSEGATE_TRACKER_INCREMENTS 64U
 
@@ -104,7 +105,7 @@
 #define POSEGATE_LONGEST_MESSAGE 152U
 
 /**
- * Words of a `posegate_receiver`.
+ * Number of 64-bit words of a `posegate_receiver`.
  */
 #define POSEGATE_RECEIVER_WORDS 24U
 
@@ -765,7 +766,7 @@ typedef struct posegate_mavlink_odometry {
      */
     float position[3];
     /**
-     * w, x, y, z.
+     * The orientation: a quaternion w, x, y, z.
      */
     float q[4];
     /**
@@ -875,11 +876,11 @@ typedef struct posegate_age {
  */
 typedef struct posegate_source {
     /**
-     * The frame that its reports must be in, such as "map".
+     * The frame that the source's reports must be in, such as "map".
      */
     char frame[POSEGATE_NAME_LENGTH];
     /**
-     * The factor by which its covariances are multiplied before use: from 1 to 4096.
+     * The factor by which the source's covariances are multiplied before use: from 1 to 4096.
      */
     double inflation;
     /**
@@ -996,11 +997,11 @@ typedef struct posegate_report {
      */
     struct posegate_belief belief;
     /**
-     * The frame of its numbers, from `posegate_frame_id`.
+     * The frame of the estimate, from `posegate_frame_id`.
      */
     uint64_t frame;
     /**
-     * The source that sent it: its index in the settings.
+     * The index in the settings of the source that sent the report.
      */
     uint32_t source;
     /**
@@ -1033,11 +1034,11 @@ typedef struct posegate_permission {
      */
     uint8_t complement;
     /**
-     * The signature.
+     * The signature of the checks that led to the verdict, low byte first. Do not change it.
      */
     uint8_t flow[2];
     /**
-     * The time of the step, low byte first.
+     * The time of the step, milliseconds of the controller's clock, low byte first.
      */
     uint8_t made_ms[4];
 } posegate_permission;
@@ -1182,7 +1183,7 @@ typedef struct posegate_verdict {
      */
     uint32_t margin_q16;
     /**
-     * The pose of the pose-set that leaves the table first as the set grows.
+     * The pose of the pose-set that leaves the table first as the set grows, world frame.
      */
     struct posegate_pose worst_pose;
 } posegate_verdict;
@@ -1237,7 +1238,7 @@ typedef struct posegate_estimate {
      */
     uint32_t stamp_ms;
     /**
-     * The time of its use, by the same clock.
+     * The time at which the estimate is used, milliseconds of the same clock.
      */
     uint32_t now_ms;
     /**
@@ -1374,7 +1375,7 @@ typedef struct posegate_increment {
      */
     double ahead_m;
     /**
-     * To the left, metres.
+     * To the left, metres: from -4 to 4.
      */
     double left_m;
     /**
@@ -1382,11 +1383,12 @@ typedef struct posegate_increment {
      */
     double turn_rad;
     /**
-     * The time at its beginning, milliseconds of the controller's clock. If it is not the end of the previous increment, one was lost.
+     * The time at which the movement begins, milliseconds of the controller's clock. If it is not the end of the previous
+     * increment, one was lost.
      */
     uint32_t begins_ms;
     /**
-     * The time at its end, by the same clock.
+     * The time at which the movement ends, milliseconds of the same clock.
      */
     uint32_t stamp_ms;
 } posegate_increment;
@@ -1463,7 +1465,8 @@ typedef struct posegate_request {
      */
     uint32_t stamp_ms;
     /**
-     * The time of its use, by the same clock. A controller with its own clock uses that instead.
+     * The time at which the estimate is used, milliseconds of the same clock. A controller with its own clock uses that
+     * instead.
      */
     uint32_t now_ms;
     /**

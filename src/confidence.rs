@@ -13,11 +13,15 @@
 use crate::set::RadiusSquared;
 
 /// Returns `P(chi^2_3 <= r2)`: the probability that a Gaussian pose-set of squared radius `r2`
-/// contains the true pose. Error below 1e-14.
+/// contains the true pose. Error below 1e-14. Returns 0 for `r2` of 0 and below, and 1 for infinity.
 #[must_use]
 pub fn probability(r2: f64) -> f64 {
     if r2 <= 0.0 {
         return 0.0;
+    }
+    // Beyond, the rest is below 1e-300; at infinity the product would be NaN.
+    if r2 > 1_400.0 {
+        return 1.0;
     }
     let r = libm::sqrt(r2);
     let tail = libm::sqrt(2.0 / core::f64::consts::PI) * r * libm::exp(-0.5 * r2);
@@ -75,6 +79,13 @@ pub fn core_radius(epsilon: f64) -> Option<RadiusSquared> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn infinite_radius_contains_everything() {
+        for r2 in [1_399.0, 1_401.0, 1e300, f64::INFINITY] {
+            assert_eq!(probability(r2), 1.0, "{r2}");
+        }
+    }
 
     #[test]
     fn quantiles_equal_published_values() {

@@ -80,7 +80,7 @@ impl GoalFrame {
         })
     }
 
-    /// Rotates a vector of the world into the goal frame. Both inputs must be within [`REACH_UM`]. The
+    /// Rotates a vector of the world into the goal frame, micrometres. Both inputs must be within [`REACH_UM`]. The
     /// error on each axis is at most 1 um (0.5 from cosine and sine, 0.5 from the shift).
     #[must_use]
     pub fn turn_to_goal(&self, x_um: i32, y_um: i32) -> (i32, i32) {

@@ -30,7 +30,7 @@ use std::ops::Range;
 /// A sealed firmware file.
 #[derive(Clone, Debug)]
 pub struct Sealed {
-    /// The file.
+    /// The bytes of the sealed file.
     pub file: Vec<u8>,
     /// Load address of the image.
     pub start: u32,

@@ -38,7 +38,7 @@ impl Effort {
 /// The facet layout of a table before it is encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FacetPlan {
-    /// Exponent of the length unit.
+    /// Exponent k of the length unit, 2^k um.
     pub unit: u8,
     /// An estimate farther from the goal than this on an axis is not inside, length units.
     pub reach: u16,
@@ -66,7 +66,7 @@ pub struct PiecePlan {
     pub from: u32,
     /// Width of the arc, 2^-32 turn; `u32::MAX` for the whole circle.
     pub width: u32,
-    /// Its frames.
+    /// The frames of the piece.
     pub frames: Vec<FramePlan>,
 }
 
@@ -82,11 +82,12 @@ impl PiecePlan {
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FramePlan {
-    /// Its axes.
+    /// The axes of the facets' normals.
     pub axes: Axes,
-    /// v or q, length units.
+    /// Length units. For world axes a point v of the robot, in its frame; for robot axes a point q of the world, from
+    /// the goal.
     pub point: [i16; 2],
-    /// Its facets.
+    /// The facets of the frame.
     pub facets: Vec<Facet>,
 }
 

@@ -103,7 +103,7 @@ pub enum BakeError {
         /// The largest distance, metres.
         limit: f64,
     },
-    /// The set or the table cannot be expressed as facets.
+    /// The set or the table cannot be expressed as facets; the text is the reason.
     #[error("no facets: {0}; use layout = \"grid\" or \"auto\"")]
     NoPieces(&'static str),
     /// A task name that does not fit into the header.

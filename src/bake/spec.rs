@@ -61,8 +61,8 @@ impl TableSpec {
     /// cut into equal slabs no wider than the step.
     ///
     /// # Errors
-    /// [`BakeError::TooLarge`] with the numbers, or [`BakeError::BadExtent`] if the extent is empty or a step
-    /// is not above zero.
+    /// [`BakeError::TooLarge`] or [`BakeError::TooFar`] with the numbers, or [`BakeError::BadExtent`] if the extent is
+    /// empty or a step is not above zero.
     pub fn cells(&self) -> Result<Cells, BakeError> {
         let Extent { x, y, yaw_deg } = self.extent;
         let step_um = libm::round(self.step.xy * 1e6).max(1.0);

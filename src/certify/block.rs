@@ -57,7 +57,7 @@ pub struct Prover {
 const MOST_HALVINGS: u32 = 12;
 
 impl Prover {
-    /// Encloses the numbers of a success set in intervals.
+    /// Prepares a success set for proofs: its numbers become intervals that enclose them.
     #[must_use]
     pub fn new(set: &SuccessSet) -> Self {
         let parts = Parts::of(set);

@@ -153,7 +153,7 @@ pub struct StepEvaluation {
     pub margin: Option<Margin>,
     /// The reason if the step fails.
     pub failure: Option<Failure>,
-    /// The risk that this step adds.
+    /// The part of [`Evaluation::risk`] that this step adds.
     pub risk: Risk,
 }
 

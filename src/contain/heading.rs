@@ -406,7 +406,8 @@ impl Sweep {
         [um(x, self.x), um(y, self.y), yaw]
     }
 
-    /// Returns cosine and sine of the heading at u = e, 2^-30.
+    /// Returns cosine and sine of the heading at u = e / 2^15, 2^-30. u is from -1 to 1, times the largest heading
+    /// offset.
     pub fn turned_to(&self, e: i32) -> [i32; 2] {
         if e == 0 {
             return self.facing;

@@ -19,9 +19,9 @@ pub enum Side {
 /// A part of the goal frame, relative to the estimate: a row within a slab. Closed intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Micrometres.
+    /// Lower and upper end, micrometres.
     pub y: [i64; 2],
-    /// 2^-24 turn.
+    /// Lower and upper end, 2^-24 turn.
     pub yaw: [i64; 2],
 }
 
@@ -39,8 +39,8 @@ pub struct Cut {
 pub struct Offset(pub [i64; 3]);
 
 impl Offset {
-    /// Returns the pose at this offset, shrunk by 2^-12 so that the offset's own rounding cannot
-    /// leave the set.
+    /// Returns `mean` plus this offset, both in the goal frame. The offset is first shortened by 2^-12 of
+    /// itself, so that its rounding cannot leave the set.
     pub fn applied_to(self, mean: Pose) -> Pose {
         // Shrunk by at least one unit, towards zero.
         let drawn_in = |v: i64| match v.signum() {

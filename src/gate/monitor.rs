@@ -30,9 +30,10 @@ const BETS: [(f64, f64); 2] = [(2.0, 1.0), (4.0, 2.0)];
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Innovation {
-    /// The fix minus the prediction: x and y in metres in world axes, yaw in radians within half a turn.
+    /// The fix minus the prediction, less its slip: x and y in metres in world axes, yaw in radians within half a turn.
     pub difference: [f64; 3],
-    /// The covariance of this difference that both claim, by rows: m^2, m rad, rad^2.
+    /// The claimed covariance of `difference`, by rows, world axes: m^2, m rad, rad^2. It is the sum of the covariances
+    /// of fix and prediction, or twice that if their errors may be dependent.
     pub covariance: [[f64; 3]; 3],
 }
 
@@ -140,7 +141,7 @@ pub enum ModelStanding {
     Holds,
     /// The logarithm of the evidence has reached half of the limit for a contradiction: check camera and tags soon.
     InDoubt,
-    /// It is contradicted. Deny with [`super::Reason::ModelContradicted`] until a manual check.
+    /// The fixes contradict the model. Deny with [`super::Reason::ModelContradicted`] until a manual check.
     Contradicted,
 }
 

@@ -8,9 +8,9 @@ use crate::set::{Aging, CrossTerms, Growth, Inflation, Trust};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Source {
-    /// The frame that its reports must be in: the world frame of the site.
+    /// The frame that the source's reports must be in: the world frame of the site.
     pub frame: FrameId,
-    /// The trust in its covariances, for any time since its last fix.
+    /// The trust in the source's covariances, for any time since its last fix.
     pub trust: Trust,
     /// Smaller inflations for estimates soon after a fix ([`super::Evidence::since_fix_ms`]); none is larger than that of `trust`.
     /// [`Aging::NONE`] if one factor is used.

@@ -33,9 +33,9 @@ pub enum Axes {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VisionPositionEstimate {
-    /// x, y, z, metres.
+    /// x, y, z as in the message, metres.
     pub position: [f32; 3],
-    /// Roll, pitch, yaw, radians.
+    /// Roll, pitch, yaw as in the message, radians.
     pub angles: [f32; 3],
     /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
     pub covariance: [f32; 21],
@@ -45,9 +45,9 @@ pub struct VisionPositionEstimate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Odometry {
-    /// x, y, z, metres.
+    /// x, y, z as in the message, metres.
     pub position: [f32; 3],
-    /// `q`: w, x, y, z.
+    /// The orientation `q`: w, x, y, z.
     pub q: [f32; 4],
     /// `pose_covariance`, as in [`VisionPositionEstimate::covariance`].
     pub pose_covariance: [f32; 21],

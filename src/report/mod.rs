@@ -57,13 +57,13 @@ pub struct PoseEstimate {
 pub struct Report {
     /// The index of the source among the gate's sources.
     pub source: u8,
-    /// The frame of its numbers.
+    /// The frame of the estimate.
     pub frame: FrameId,
     /// The source's count of its reports: one more each time, wrapping.
     pub sequence: u32,
     /// The time of the estimate, milliseconds of the controller's wrapping clock.
     pub stamp_ms: u32,
-    /// The estimate.
+    /// The estimated pose and its uncertainty.
     pub belief: PoseEstimate,
 }
 

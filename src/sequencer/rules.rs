@@ -25,7 +25,7 @@ use crate::task::Cylinder;
 
 /// First four bytes of a rule table.
 pub const MAGIC: [u8; 4] = *b"PGSQ";
-/// Version of the format.
+/// Version of the format of rule tables.
 pub const VERSION: u16 = 1;
 /// Bytes before the task names.
 pub const HEAD: usize = 48;

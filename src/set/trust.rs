@@ -137,9 +137,9 @@ impl CrossTerms {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Trust {
-    /// The inflation of its covariance.
+    /// The factor by which the source's covariances are multiplied.
     pub inflation: Inflation,
-    /// The terms that it fills.
+    /// The terms of the covariance that the source fills.
     pub cross_terms: CrossTerms,
 }
 

@@ -2,7 +2,7 @@
 
 use super::visibility::{Sight, Visibility};
 
-/// A bound on the error of an observation by distance and angles:
+/// A bound on the error of an observation by distance and angles ([`Sight`]):
 /// `c0 + c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad, rad; the paper's form with a constant). It covers the detector only.
 /// The error that the tolerances of tag and camera add is [`Visibility::tolerance_error`].
 ///

@@ -12,7 +12,7 @@ pub struct Membership {
     pub inside: bool,
     /// The slack of each constraint by name: at least 0 inside, roughly metres or radians.
     pub slack: Vec<(&'static str, f64)>,
-    /// For visibility sets: the tag as the camera sees it.
+    /// The tag as the camera sees it, if the set has exactly one view ([`Shape::visibility`]).
     pub sight: Option<Sight>,
 }
 

@@ -141,13 +141,17 @@ impl Shape {
     /// Returns the visibility set in the shape if there is exactly one: the camera and its tag.
     #[must_use]
     pub fn visibility(&self) -> Option<&Visibility> {
+        only(self.simple().into_iter().filter_map(|set| match set {
+            Self::Visibility(view) | Self::Bounded { view, .. } => Some(view),
+            _ => None,
+        }))
+    }
+
+    /// Returns the sets of which the shape is a union and an intersection, at any depth.
+    fn simple(&self) -> Vec<&Self> {
         match self {
-            Self::Visibility(set) | Self::Bounded { view: set, .. } => Some(set),
-            Self::Any(sets) | Self::All(sets) => {
-                let mut seen = sets.iter().filter_map(Self::visibility);
-                seen.next().filter(|_| seen.next().is_none())
-            }
-            Self::Box(_) | Self::Footprint(_) | Self::Apart(_) => None,
+            Self::Any(sets) | Self::All(sets) => sets.iter().flat_map(Self::simple).collect(),
+            _ => vec![self],
         }
     }
 
@@ -171,14 +175,10 @@ impl Shape {
     /// Returns the error limit in the shape if there is exactly one.
     #[must_use]
     pub fn error_limit(&self) -> Option<&ErrorLimit> {
-        match self {
+        only(self.simple().into_iter().filter_map(|set| match set {
             Self::Bounded { limit, .. } => Some(limit),
-            Self::Any(sets) | Self::All(sets) => {
-                let mut limits = sets.iter().filter_map(Self::error_limit);
-                limits.next().filter(|_| limits.next().is_none())
-            }
             _ => None,
-        }
+        }))
     }
 
     /// Returns `true` if no view keeps the error within its limit; tolerances can cause this.
@@ -216,6 +216,12 @@ impl Shape {
             Self::All(_) => "all",
         }
     }
+}
+
+/// Returns the item of an iterator that has exactly one.
+fn only<T>(mut items: impl Iterator<Item = T>) -> Option<T> {
+    let first = items.next();
+    first.filter(|_| items.next().is_none())
 }
 
 fn each_within(sets: Vec<Shape>, tolerance: Tolerance) -> Vec<Shape> {
@@ -258,5 +264,25 @@ impl SuccessSet {
         }
         let slack = obstacles(&self.shape, self.goal);
         (slack < 0.0).then_some(slack)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two views in a nested set are no missing view.
+    #[test]
+    fn single_view_is_counted_at_any_depth() {
+        let view = |id| {
+            let mut view = visibility::test_view();
+            view.tag.id = id;
+            Shape::Visibility(view)
+        };
+        let nested = Shape::All(vec![Shape::Any(vec![view(1), view(2)]), view(3)]);
+        assert_eq!(nested.visibility(), None);
+        let one = Shape::All(vec![Shape::Any(vec![view(1)])]);
+        assert_eq!(one.visibility().map(|view| view.tag.id), Some(1));
+        assert_eq!(Shape::Any(Vec::new()).visibility(), None);
     }
 }

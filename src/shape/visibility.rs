@@ -51,16 +51,17 @@ pub struct Visibility {
     pub error_room: Option<[f64; 2]>,
 }
 
-/// A tag's centre and corners as the camera sees them at a pose.
+/// A tag's centre and corners as the camera sees them at a pose: the distance d and the angles phi and psi.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
     /// Camera centre to tag centre, metres.
     pub d: f64,
-    /// Optical axis to tag centre, radians.
+    /// Angle between the optical axis and the ray to the tag's centre, radians.
     pub phi: f64,
-    /// Tag normal to camera, radians.
+    /// Angle between the tag's normal and the ray to the camera, radians.
     pub psi: f64,
-    /// The four corners in AprilTag's order, pixels; `None` if the depth is below `z_near`.
+    /// The four corners, pixels; `None` if the depth is below `z_near`. AprilTag's order: counter-clockwise from the
+    /// lower left, as a viewer sees the tag.
     pub corners_px: [Option<[f64; 2]>; 4],
 }
 

@@ -35,8 +35,9 @@ impl SuccessSet {
 }
 
 impl ViewEvaluator<'_> {
-    /// Returns `[d, phi, psi]` (m, rad) of the task's only view at a world pose (x, y, yaw; m, rad) of the set. `None`
-    /// outside of the set, and for sets without exactly one view. Agrees with [`SuccessSet::membership`].
+    /// Returns `[d, phi, psi]` (m, rad; [`Sight`](super::Sight)) of the task's only view at a world pose (x, y, yaw; m,
+    /// rad) of the set. `None` outside of the set, and for sets without exactly one view. Agrees with
+    /// [`SuccessSet::membership`].
     #[must_use]
     pub fn at(&self, world: [f64; 3]) -> Option<[f64; 3]> {
         let view = self.view.as_ref()?;

@@ -97,7 +97,7 @@ crate::messages::messages!(no error FailedConstraint {
     Psi => "the camera sees the tag too obliquely (psi_max), or from behind",
 });
 
-/// A point in the image.
+/// A point in the image, with the origin of the calibration's optical axis (`cx`, `cy`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pixel {

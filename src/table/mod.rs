@@ -189,7 +189,8 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// Returns edge `k` of the slabs, relative to [`Cells::yaw_lo`], 2^-32 turn; `k` is at most [`Cells::slabs`].
+    /// Returns edge `k` of the slabs, relative to [`Cells::yaw_lo`], 2^-32 turn, rounded down; `k` is at most
+    /// [`Cells::slabs`].
     #[must_use]
     pub fn slab_edge(&self, k: u16) -> i64 {
         // At most 2^32 * 2^16.

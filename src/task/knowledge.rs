@@ -45,13 +45,13 @@ impl Cylinder {
         })
     }
 
-    /// Micrometres.
+    /// Returns the largest distance, micrometres, from 0 to 2^28.
     #[must_use]
     pub const fn translation_um(self) -> i32 {
         self.translation_um
     }
 
-    /// 2^-24 turn; half a turn is every heading.
+    /// Returns the largest angle, 2^-24 turn; half a turn is every heading.
     #[must_use]
     pub const fn yaw_q24(self) -> i32 {
         self.yaw_q24
@@ -165,7 +165,8 @@ pub struct PoseErrorSet {
 }
 
 impl PoseErrorSet {
-    /// Creates the knowledge that the error is certain to be in a cylinder: after a localization, r_l.
+    /// Creates the knowledge that the error is certain to be in a cylinder. After a localization, that is the largest
+    /// error of an observation (r_l).
     pub const fn bounded(within: Cylinder) -> Self {
         Self {
             certain: within,

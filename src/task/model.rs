@@ -107,8 +107,9 @@ impl Odometry {
         carry * covariance * carry.transpose() + noise
     }
 
-    /// Returns the covariance that a path adds: `V M V'` of its legs, carried to the path's end. If the path's ends
-    /// may be off, returns a matrix that dominates the added covariance of every such path.
+    /// Returns the covariance of (x, y, yaw) that a path adds: `V M V'` of its legs, carried to the path's end. World
+    /// axes; m^2, m rad, rad^2. If the path's ends may be off, returns a matrix that dominates the added covariance of
+    /// every such path.
     ///
     /// Let `c = (J v, 1)` be the column of the first turn and d with `|d| <= away` be added to v. Then
     /// `(c + Jd)(c + Jd)' <= (1 + p) c c' + (1 + 1/p) away^2 I_xy` for each p above 0. The same bound holds for the

@@ -77,9 +77,9 @@ impl Motion {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ends {
-    /// Tolerance of the estimate at the start.
+    /// Tolerance of the estimate at the start: position (m), heading (rad).
     pub start: [f64; 2],
-    /// Tolerance of the estimate at the end.
+    /// Tolerance of the estimate at the end: position (m), heading (rad).
     pub end: [f64; 2],
 }
 
@@ -163,7 +163,7 @@ impl Leg {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Travel {
-    /// Its length, metres.
+    /// Length of the path, metres.
     pub length_m: f64,
     /// Total turning, radians: the sum of `|rot1| + |rot2|`.
     pub turning_rad: f64,

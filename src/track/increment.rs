@@ -35,7 +35,7 @@ const LONGEST: i32 = 1 << 22;
 impl Increment {
     /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit, and the times of
     /// its beginning and its end: the end of one increment is the beginning of the next. `None` if a number is not finite, a length is
-    /// above 4 m, or the turn is half a turn or more.
+    /// above 2^22 um (4.19 m), or the turn is half a turn or more.
     #[must_use]
     pub fn of(ahead_m: f64, left_m: f64, turn_rad: f64, span_ms: [u32; 2]) -> Option<Self> {
         let length = |value: f64| {
@@ -49,7 +49,7 @@ impl Increment {
     }
 
     /// Returns an increment from micrometres and units of 2^-32 turn, and the times of its beginning and its end. `None` if a length is
-    /// above 4 m.
+    /// above 2^22 um (4.19 m).
     #[must_use]
     pub const fn new(
         ahead_um: i32,
@@ -79,7 +79,8 @@ impl Increment {
         [self.begins_ms, self.step.stamp_ms]
     }
 
-    /// Returns the movement ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn.
+    /// Returns the movement ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn. Axes are the
+    /// robot's at the beginning.
     #[must_use]
     pub const fn entries(&self) -> [i32; 3] {
         [self.step.x_um, self.step.y_um, self.step.turn]

@@ -66,7 +66,7 @@ use rayon::prelude::*;
 pub struct ExpectedTable<'a> {
     /// The task's name.
     pub task: &'a str,
-    /// Its success set and goal.
+    /// The task's success set and goal.
     pub success: &'a SuccessSet,
     /// The site's confidence.
     pub epsilon: f64,
@@ -77,9 +77,9 @@ pub struct ExpectedTable<'a> {
 /// A table that has been proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proof {
-    /// Runs that were proven inside.
+    /// Runs of cells that were proven inside.
     pub runs: u64,
-    /// Cells in them.
+    /// Cells in the proven runs.
     pub cells: u64,
     /// Corners of facet pieces that were proven inside or cut off.
     pub corners: u64,
@@ -92,9 +92,9 @@ pub struct Proof {
     pose[0], pose[1], pose[2].to_degrees()
 )]
 pub struct Unproven {
-    /// Yaw slab.
+    /// Number of the yaw slab, from 0.
     pub slab: u16,
-    /// Row along y.
+    /// Number of the row along y, from 0.
     pub row: u16,
     /// First column whose cell is not proven by itself; the run's first column if each cell is.
     pub column: u16,

@@ -151,7 +151,8 @@ pub struct Request {
     pub table: u8,
     /// The time of the estimate, milliseconds of a wrapping clock.
     pub stamp_ms: u32,
-    /// The time of its use, by the same clock. A controller with its own clock uses that instead.
+    /// The time at which the estimate is used, milliseconds of the same clock. A controller with its own clock uses
+    /// that instead.
     pub now_ms: u32,
     /// Squared radius of a Gaussian set, at least that of the table.
     pub radius_squared: RadiusSquared,

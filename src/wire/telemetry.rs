@@ -24,15 +24,15 @@ pub struct Telemetry {
     pub now_ms: u32,
     /// The report that was evaluated, if any.
     pub weighed: Option<ReportOutcome>,
-    /// The state of the gate after it.
+    /// The state of the gate after that report, or after the cycle.
     pub state: State,
     /// `true` if the permission given to the interlock is a permit.
     pub permitted: bool,
     /// `true` if the interlock's output is high, read back.
     pub interlock_high: bool,
-    /// The latched fault of the interlock.
+    /// The latched fault of the interlock; `None` if there is none.
     pub fault: Option<InterlockFault>,
-    /// Counts of the line.
+    /// Counts of the serial line.
     pub line: LinkCounters,
 }
 
@@ -42,9 +42,9 @@ pub struct Telemetry {
 pub struct ReportOutcome {
     /// The source in the report.
     pub source: u8,
-    /// Its sequence number.
+    /// The report's sequence number.
     pub sequence: u32,
-    /// Its stamp, as the controller received it.
+    /// The report's stamp as the controller received it, milliseconds.
     pub stamp_ms: u32,
     /// `Ok` if the report permits by itself.
     pub verdict: Result<(), Reason>,

@@ -76,7 +76,7 @@ pub struct posegate_ros_pose {
 pub struct posegate_mavlink_odometry {
     /// x, y, z, metres.
     pub position: [f32; 3],
-    /// w, x, y, z.
+    /// The orientation: a quaternion w, x, y, z.
     pub q: [f32; 4],
     /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
     pub pose_covariance: [f32; 21],

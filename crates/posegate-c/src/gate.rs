@@ -18,7 +18,7 @@ use posegate::report::FrameId;
 use posegate::set::{Aging, CrossTerms, Trust};
 use posegate::table::checksum_continued;
 
-/// Words of a `posegate_gate`.
+/// Number of 64-bit words of a `posegate_gate`.
 pub const POSEGATE_GATE_WORDS: usize = 60;
 /// Pointers of a `posegate_gate`.
 pub const POSEGATE_GATE_POINTERS: usize = 24;

@@ -8,7 +8,7 @@ use posegate::recordings::Evaluator;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
 
-/// Words of a `posegate_judge`.
+/// Number of 64-bit words of a `posegate_judge`.
 pub const POSEGATE_JUDGE_WORDS: usize = 20;
 /// Pointers of a `posegate_judge`.
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;
@@ -41,7 +41,7 @@ pub struct posegate_estimate {
     pub belief: posegate_belief,
     /// The time of the estimate, milliseconds of a wrapping clock.
     pub stamp_ms: u32,
-    /// The time of its use, by the same clock.
+    /// The time at which the estimate is used, milliseconds of the same clock.
     pub now_ms: u32,
     /// The squared radius of a Gaussian set, unit 2^-16: at least that of the table, or 0 for that of the table.
     pub radius_squared_q16: u32,

@@ -5,7 +5,7 @@ use super::memory::{Storage, close, open, read, separate, take, write};
 use super::{posegate_evidence, posegate_report, posegate_status};
 use posegate::gate::{Innovation, ModelStanding, Monitor};
 
-/// Words of a `posegate_monitor`.
+/// Number of 64-bit words of a `posegate_monitor`.
 pub const POSEGATE_MONITOR_WORDS: usize = 5;
 
 /// Storage of a monitor. It compares the fixes of a source with predictions, and reports when they contradict the errors that the source

@@ -22,9 +22,9 @@ pub struct posegate_permission {
     pub verdict: u8,
     /// The complement of the verdict.
     pub complement: u8,
-    /// The signature.
+    /// The signature of the checks that led to the verdict, low byte first. Do not change it.
     pub flow: [u8; 2],
-    /// The time of the step, low byte first.
+    /// The time of the step, milliseconds of the controller's clock, low byte first.
     pub made_ms: [u8; 4],
 }
 
@@ -77,7 +77,7 @@ pub struct posegate_verdict {
     /// The factor by which the pose-set could be scaled and still be inside, unit 2^-16, rounded down: at least
     /// 65,536 with a permit, below it otherwise.
     pub margin_q16: u32,
-    /// The pose of the pose-set that leaves the table first as the set grows.
+    /// The pose of the pose-set that leaves the table first as the set grows, world frame.
     pub worst_pose: posegate_pose,
 }
 

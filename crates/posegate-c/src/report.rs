@@ -11,9 +11,9 @@ use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 pub struct posegate_report {
     /// The estimate of the source.
     pub belief: posegate_belief,
-    /// The frame of its numbers, from `posegate_frame_id`.
+    /// The frame of the estimate, from `posegate_frame_id`.
     pub frame: u64,
-    /// The source that sent it: its index in the settings.
+    /// The index in the settings of the source that sent the report.
     pub source: u32,
     /// The source's count of its reports: one more each time, wrapping.
     pub sequence: u32,

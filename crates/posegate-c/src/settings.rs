@@ -66,9 +66,9 @@ pub struct posegate_age {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_source {
-    /// The frame that its reports must be in, such as "map".
+    /// The frame that the source's reports must be in, such as "map".
     pub frame: [c_char; POSEGATE_NAME_LENGTH],
-    /// The factor by which its covariances are multiplied before use: from 1 to 4096.
+    /// The factor by which the source's covariances are multiplied before use: from 1 to 4096.
     pub inflation: f64,
     /// A `posegate_cross_terms`.
     pub cross_terms: u32,

@@ -8,9 +8,10 @@ use posegate::report::Report;
 use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
 
-/// Words of a `posegate_tracker`.
+/// Number of 64-bit words of a `posegate_tracker`.
 pub const POSEGATE_TRACKER_WORDS: usize = 192;
-/// Number of increments that a tracker keeps for late fixes.
+/// Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
+/// (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
 pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
 
 /// Storage of a tracker, which carries the newest fix of a slow source along the odometry. So a gate can evaluate a
@@ -74,13 +75,14 @@ pub struct posegate_tracker_settings {
 pub struct posegate_increment {
     /// Ahead, metres: from -4 to 4.
     pub ahead_m: f64,
-    /// To the left, metres.
+    /// To the left, metres: from -4 to 4.
     pub left_m: f64,
     /// Counter-clockwise, radians: less than half a turn.
     pub turn_rad: f64,
-    /// The time at its beginning, milliseconds of the controller's clock. If it is not the end of the previous increment, one was lost.
+    /// The time at which the movement begins, milliseconds of the controller's clock. If it is not the end of the previous
+    /// increment, one was lost.
     pub begins_ms: u32,
-    /// The time at its end, by the same clock.
+    /// The time at which the movement ends, milliseconds of the same clock.
     pub stamp_ms: u32,
 }
 

@@ -17,7 +17,7 @@ use posegate::wire::{Receiver, Reply, Request, WireError, encode};
 
 /// Bytes of the longest message or frame.
 pub const POSEGATE_LONGEST_MESSAGE: usize = 152;
-/// Words of a `posegate_receiver`.
+/// Number of 64-bit words of a `posegate_receiver`.
 pub const POSEGATE_RECEIVER_WORDS: usize = 24;
 
 const _: () = assert!(posegate::wire::LONGEST_FRAME <= POSEGATE_LONGEST_MESSAGE);
@@ -56,7 +56,8 @@ pub struct posegate_request {
     pub table: u32,
     /// The time of the estimate, milliseconds of a wrapping clock.
     pub stamp_ms: u32,
-    /// The time of its use, by the same clock. A controller with its own clock uses that instead.
+    /// The time at which the estimate is used, milliseconds of the same clock. A controller with its own clock uses that
+    /// instead.
     pub now_ms: u32,
     /// Squared radius of a Gaussian set, unit 2^-16, at least that of the table.
     pub radius_squared_q16: u32,

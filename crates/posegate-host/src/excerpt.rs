@@ -35,7 +35,7 @@ pub struct Excerpt {
 impl Excerpt {
     /// Extracts the lines of a fault, and one line before and after. The run time is proportional to the length of
     /// the text; the result is of limited size. `fault` is a range of bytes, moved to character boundaries; `line` is
-    /// the number of the line in which it begins.
+    /// the number of the line in which it begins, counted from 1.
     #[must_use]
     pub fn new(text: &str, fault: Range<usize>, line: usize) -> Self {
         let start = text.floor_char_boundary(fault.start);

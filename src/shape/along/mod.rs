@@ -31,7 +31,7 @@ pub struct LineSegment {
     pub from: [f64; 2],
     /// Direction; `t` is in units of its length.
     pub way: [f64; 2],
-    /// Largest `t`.
+    /// Largest `t`: metres only if `way` is a unit vector.
     pub length: f64,
 }
 

@@ -148,7 +148,8 @@ pub struct Polished {
     pub moved: [f64; 2],
     /// The reserve before the move, and on the complete polished site. The reserve is the largest factor for the
     /// errors of all starts and all looks with which each task that looks at the tag still has a plan. Such a plan
-    /// uses only the chosen tags that the task's plan looked at. At least 1; searched in steps of 2 %, rounded down.
+    /// uses only the chosen tags that the task's plan looked at. 0 if there is no such plan, else at least 1. Searched in
+    /// steps of 2 %, rounded down; the search ends above 4.
     pub reserve: [f64; 2],
 }
 
@@ -181,7 +182,7 @@ pub struct Cover {
     /// Lower bound: no choice that serves these tasks by chains within [`CoverOptions::beside`] costs less (see
     /// [`language`](super::language) for the assumptions).
     pub bound: f64,
-    /// The same bound, computed without a solver's answer.
+    /// The same lower bound as `bound`, computed without a solver's answer.
     pub bound_checked: f64,
     /// Largest distance from the straight line of the looks of the bound's chains, metres.
     pub beside: f64,

@@ -5,9 +5,9 @@ use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Uncertainty};
 /// A pose-set about an estimate, in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSetF64 {
-    /// m, m, rad.
+    /// The estimated pose: x, y (m), yaw (rad), world frame.
     pub estimate: [f64; 3],
-    /// The uncertainty, in world axes.
+    /// The uncertainty: a covariance in world axes, or a bound.
     pub spread: Uncertainty,
     /// The squared radius of a Gaussian set; unused for a bounded set.
     pub radius_squared: RadiusSquared,

@@ -16,7 +16,7 @@ const GAP: [f64; 2] = [40.0, 62.0];
 /// Panels in a row: with three, A4 paper shows them at their own size.
 const COLUMNS: usize = 3;
 
-/// Draws the borders at up to five headings, about evenly spaced, including the goal's. `sections` has headings
+/// Returns an SVG of the borders at up to five headings, about evenly spaced, including the goal's. `sections` has headings
 /// relative to the goal's in degrees, with closed polygons in metres of the goal frame.
 #[must_use]
 pub fn borders_picture(

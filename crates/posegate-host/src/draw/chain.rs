@@ -27,7 +27,7 @@ const NEEDED: Style = Style::outlined("#444444", 1.2).dashed("2 3");
 /// The largest panel of the hall, pixels.
 const HALL: [f64; 2] = [600.0, 420.0];
 
-/// Draws a chain; `success` returns the success set of a task by its name. With a site, its hall comes first, with
+/// Returns an SVG of a chain; `success` returns the success set of a task by its name. With a site, its hall comes first, with
 /// the route and the poses at which the robot looks.
 #[must_use]
 pub fn chain_picture<'s>(

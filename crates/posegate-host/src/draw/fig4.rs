@@ -126,7 +126,7 @@ pub(super) fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Co
 /// Number of times that `places` calls `progress`.
 pub(super) const STEPS: u64 = 3;
 
-/// Draws Fig. 4: the tag at the start, and at its best places.
+/// Returns an SVG of Fig. 4: the tag at the start, and at its best places.
 #[must_use]
 pub fn fig4_placement(study: &CaseStudy) -> String {
     let title = format!(

@@ -15,7 +15,7 @@ const LINES: [Style; 3] = [
     Style::outlined("#009e73", 2.0).dashed("2 3"),
 ];
 
-/// Draws curves of points (x, y), all above zero, on logarithmic axes; at most three.
+/// Returns an SVG of curves of points (x, y), all above zero, on logarithmic axes; at most three.
 #[must_use]
 pub fn logarithmic(title: &str, axes: [&str; 2], curves: &[(&str, &[[f64; 2]])]) -> String {
     let decades = |axis: usize| -> [i32; 2] {

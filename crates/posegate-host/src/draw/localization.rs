@@ -23,7 +23,7 @@ const NAMES: [&str; 5] = ["(a) ", "(b) ", "(c) ", "(d) ", "(e) "];
 /// The headings of S_w's sections, degrees.
 const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
 
-/// Draws Fig. 3: sections of S_l and S_w with the pose-sets before and after the localization.
+/// Returns an SVG of Fig. 3: sections of S_l and S_w with the pose-sets before and after the localization.
 ///
 /// # Errors
 /// [`StudyError`] if one of the tasks is missing from the study.

@@ -15,7 +15,7 @@ const HEIGHT: f64 = 1110.0;
 /// The headings of the sections, degrees.
 const YAWS_DEG: [f64; 7] = [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0];
 
-/// Draws Fig. 1: the errors at which the car is still in its space, and the parking success set at several headings.
+/// Returns an SVG of Fig. 1: the errors at which the car is still in its space, and the parking success set at several headings.
 ///
 /// # Errors
 /// [`StudyError`] if the study has no parking task.

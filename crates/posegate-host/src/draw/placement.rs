@@ -37,7 +37,7 @@ const FLOOR_HEIGHT: f64 = 230.0;
 const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_fill_opacity("#222222", 0.12);
 const FROM_BORDER: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
 
-/// Draws places next to each other.
+/// Returns an SVG of places next to each other.
 #[must_use]
 pub fn placement_picture(title: &str, columns: &[Column]) -> String {
     let reach = columns

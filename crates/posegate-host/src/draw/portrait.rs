@@ -39,7 +39,7 @@ struct Body {
     face: Vec<[f64; 3]>,
 }
 
-/// Draws a tag with its axes: x out of the face, z up; its corners in AprilTag's order.
+/// Returns an SVG of a tag with its axes: x out of the face, z up; its corners in AprilTag's order.
 #[must_use]
 pub fn tag_portrait(name: &str, tag: &Tag) -> String {
     let pose = tag.pose;
@@ -61,7 +61,7 @@ pub fn tag_portrait(name: &str, tag: &Tag) -> String {
     draw(&title, &note, &body, ["x (m)", "y (m)"], "before its face")
 }
 
-/// Draws a camera on its robot: x along the optical axis, y left, z up in the image.
+/// Returns an SVG of a camera on its robot: x along the optical axis, y left, z up in the image.
 #[must_use]
 pub fn camera_portrait(name: &str, camera: &SiteCamera) -> String {
     let Pose3Deg { x, y, z, .. } = camera.mount;

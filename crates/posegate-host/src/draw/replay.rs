@@ -22,7 +22,7 @@ const MARGIN: Style = Style::outlined("#0072b2", 1.4);
 const POINT: Style = Style::filled("#0072b2");
 const LIMIT: Style = Style::outlined("#222222", 1.0).dashed("5 3");
 
-/// Draws a replay.
+/// Returns an SVG of a replay: margins, rules and the interlock over time.
 #[must_use]
 pub fn replay_picture(title: &str, replay: &Replay<'_>) -> String {
     let with_truth = replay.stanford().points() > 0;

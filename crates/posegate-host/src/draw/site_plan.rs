@@ -11,7 +11,7 @@ const LARGEST: [f64; 2] = [600.0, 560.0];
 const LEFT: f64 = 66.0;
 const WIDTH: f64 = 690.0;
 
-/// Draws the floor plan of a site in the world, with the routes of some plans or chains.
+/// Returns an SVG of a site's floor plan in the world, with the routes of some plans or chains.
 #[must_use]
 pub fn site_plan(site: &Site, routes: &[&ChainReport]) -> String {
     let title = "The site, as its file says it";

@@ -92,7 +92,8 @@ pub struct SeenFrom {
     pub worst_for: Option<&'static str>,
     /// The pose in the world: m, m, rad.
     pub pose: [f64; 3],
-    /// The four corners in AprilTag's order, pixels; `None` for a corner that is not in front of the camera.
+    /// The four corners in AprilTag's order ([`posegate::shape::Sight`]), pixels; `None` for a corner that is not in
+    /// front of the camera.
     pub corners: [Option<[f64; 2]>; 4],
 }
 
@@ -112,7 +113,7 @@ impl SeenFrom {
     }
 }
 
-/// Draws the tags of a task in the image of its camera, or of the first camera if there are several.
+/// Returns an SVG of the tags of a task in the image of its camera, or of the first camera if there are several.
 ///
 /// # Errors
 /// [`DrawError::NoCamera`] if the success set has no camera.

@@ -17,7 +17,7 @@ const LEFT: f64 = 66.0;
 /// Distance between the sampling points of an area, pixels; its border is bisected between them.
 const SPACING: f64 = 3.0;
 
-/// Draws the floor plan of a task, in the world.
+/// Returns an SVG of a task's floor plan in the world.
 ///
 /// # Errors
 /// [`DrawError::NoExtent`] if no extent can be chosen.

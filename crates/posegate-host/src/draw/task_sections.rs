@@ -21,7 +21,7 @@ const LARGEST: [f64; 2] = [226.0, 210.0];
 /// Largest number of headings.
 const MOST: usize = 9;
 
-/// Draws sections of a task's success set at several headings, with the content of its table, and
+/// Returns an SVG of sections of a task's success set at several headings, with the content of its table, and
 /// with the pose-sets on top.
 ///
 /// # Errors

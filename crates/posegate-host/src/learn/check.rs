@@ -64,9 +64,9 @@ pub struct BoundCheck {
 /// The result for a region, or for all regions together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionCheck {
-    /// The ends of d (m), phi and psi (degrees).
+    /// The ends of d (m), phi and psi (degrees): see [`Detection::at`](super::Detection::at).
     pub ends: [[f64; 2]; 3],
-    /// New detections in it.
+    /// New detections in the region.
     pub rows: u64,
     /// The bound on the position.
     pub translation: BoundCheck,
@@ -81,7 +81,7 @@ pub struct RegionCheck {
 pub struct DetectionCheck {
     /// New views in cells with enough views.
     pub views: u64,
-    /// Detected ones.
+    /// Views in which the tag was detected.
     pub detected: u64,
     /// The mean share that the model expects for these views.
     pub expected: f64,
@@ -96,7 +96,7 @@ pub struct DetectionCheck {
 pub struct CheckReport {
     /// The number of rows after which the model was contradicted; `None` if it was not.
     pub after_rows: Option<u64>,
-    /// New rows.
+    /// Number of new rows.
     pub rows: u64,
     /// Rows that are independent of each other, or runs: the number of bets.
     pub bets: u64,
@@ -104,7 +104,7 @@ pub struct CheckReport {
     pub without_bounds: u64,
     /// All regions together.
     pub overall: RegionCheck,
-    /// Each region.
+    /// The result of each region.
     pub regions: Vec<RegionCheck>,
     /// The share of detected views.
     pub detection: DetectionCheck,

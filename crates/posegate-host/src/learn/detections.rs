@@ -22,7 +22,9 @@ const PLACE: [&str; 3] = ["d_m", "phi_deg", "psi_deg"];
 /// One view of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// d in metres, above 0; phi and psi in degrees, 0 to 180; computed from the truth.
+    /// `[d, phi, psi]` of the true pose. d is the distance from camera to tag, metres, above 0. phi is the angle
+    /// between the optical axis and the ray to the tag, psi that between the tag's normal and the ray to the camera:
+    /// degrees, 0 to 180.
     pub at: [f64; 3],
     /// The magnitudes of the errors of the position, metres, and of the yaw, radians; `None` if the tag was
     /// not detected. If the detector gave two poses: those of the pose with the smaller yaw error.
@@ -171,7 +173,7 @@ fn errors(line: &Line<'_>, [translation, yaw]: [Column; 2]) -> Result<[f64; 2], 
     Ok([translation, libm::fabs(yaw)])
 }
 
-/// Reads the places `d_m, phi_deg, psi_deg` for which a model is evaluated.
+/// Reads the places `d_m, phi_deg, psi_deg` for which a model is evaluated ([`Detection::at`]).
 ///
 /// # Errors
 /// The first invalid field, with its line and column.

@@ -34,9 +34,9 @@ pub struct Detectability {
 /// A region whose cells were calibrated together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionReport {
-    /// The ends of d (m), phi and psi (degrees).
+    /// The ends of d (m), phi and psi (degrees): see [`Detection::at`](super::Detection::at).
     pub ends: [[f64; 2]; 3],
-    /// Detections on which it was calibrated.
+    /// Detections on which the region was calibrated.
     pub detections: u64,
     /// The number of independent detections with the same information.
     pub independent: u64,
@@ -47,11 +47,11 @@ pub struct RegionReport {
 /// A part of (d, phi, psi) without bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReport {
-    /// The ends of d (m), phi and psi (degrees).
+    /// The ends of d (m), phi and psi (degrees): see [`Detection::at`](super::Detection::at).
     pub ends: [[f64; 2]; 3],
-    /// Detections in it.
+    /// Detections in this part.
     pub detections: u64,
-    /// The reason.
+    /// The reason why there are no bounds.
     pub why: String,
 }
 
@@ -150,8 +150,9 @@ impl ErrorModel {
         (2.0 * self.document.quantile - 1.0).max(0.0)
     }
 
-    /// Returns bounds on the errors of a detection at a distance (m) and angles (rad): metres and radians. `None` if
-    /// the model has no bounds there. On the border between cells, the larger bounds. Takes some 150 ns.
+    /// Returns bounds on the errors of a detection at d (m), phi and psi (rad), as in
+    /// [`Detection::at`](super::Detection::at): metres and radians. `None` if the model has no bounds there. On the
+    /// border between cells, the larger bounds. Takes some 150 ns.
     #[must_use]
     pub fn bounds(&self, d: f64, phi: f64, psi: f64) -> Option<(f64, f64)> {
         self.bounds_deg([d, phi.to_degrees(), psi.to_degrees()])

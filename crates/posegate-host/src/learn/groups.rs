@@ -12,9 +12,9 @@ pub struct GroupReport {
     pub name: String,
     /// Rows with a possible covariance.
     pub rows: u64,
-    /// The share of its sets that contain the truth with the model's factors.
+    /// The share of the group's pose-sets that contain the truth with the model's factors.
     pub coverage: f64,
-    /// The same with the factors that the other groups need; `None` if they are too few.
+    /// That share with the factors that the other groups need; `None` if there are too few other groups.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_out_coverage: Option<f64>,
 }

@@ -36,7 +36,7 @@ pub struct InflationSettings {
     pub new_group: bool,
 }
 
-/// The factors of a source's covariance.
+/// A file of learnt factors by which the covariances of a source are multiplied: one per condition, one overall.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InflationModel {
     document: Document,
@@ -85,16 +85,16 @@ impl Default for InflationSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InflationReport {
-    /// The condition's ends, both included.
+    /// The smallest value of the condition's column, included.
     pub from: f64,
-    /// See `from`.
+    /// The largest value of the condition's column, included.
     pub to: f64,
-    /// Rows in it.
+    /// Rows with such values.
     pub rows: u64,
     /// The number of independent rows with the same information on the share of sets without the truth. Consecutive
     /// rows are dependent.
     pub independent_rows: u64,
-    /// The share of the sets that contained the truth without a factor.
+    /// The share of the pose-sets that contained the truth without a factor.
     pub held: f64,
     /// The factor at which the share would have been epsilon among these rows; may be below 1.
     pub needed: f64,
@@ -454,7 +454,7 @@ impl InflationModel {
         Self::new(super::kind::of(text, file)?, file)
     }
 
-    /// Returns the text of its file.
+    /// Returns the text of the model's file.
     ///
     /// # Errors
     /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
@@ -502,13 +502,13 @@ impl InflationModel {
         &self.document.condition
     }
 
-    /// Returns the confidence of the pose-sets for which it was learnt.
+    /// Returns the confidence of the pose-sets for which the model was learnt.
     #[must_use]
     pub fn epsilon(&self) -> f64 {
         self.document.epsilon
     }
 
-    /// Returns the confidence with which its factors are large enough.
+    /// Returns the confidence with which the factors are large enough.
     #[must_use]
     pub fn confidence(&self) -> f64 {
         self.document.confidence

@@ -32,7 +32,7 @@ pub fn outcomes(bytes: &[u8], file: &str) -> Result<Vec<bool>, LearnError> {
 /// The result of testing a fleet's outcomes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutcomesReport {
-    /// Dockings.
+    /// Number of dockings.
     pub count: u64,
     /// Dockings that succeeded.
     pub successes: u64,

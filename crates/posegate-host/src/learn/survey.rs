@@ -19,9 +19,9 @@ const LEFT: f64 = 1e-9;
 /// The goals of a site's docks, by the name of the task, and the places of its tags.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurveyedSite {
-    /// x, y (m), yaw (rad), world frame.
+    /// The goal of each dock, by its task's name: x, y (m), yaw (rad), world frame.
     pub docks: BTreeMap<String, [f64; 3]>,
-    /// x, y (m), world frame.
+    /// The place of each tag, by its name: x, y (m), world frame.
     pub tags: BTreeMap<String, [f64; 2]>,
 }
 

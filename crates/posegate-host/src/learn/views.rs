@@ -3,7 +3,8 @@
 
 use super::error_model::ErrorModel;
 
-/// Views in which both bounds are within a limit, ends included.
+/// Views in which both bounds are within a limit, ends included. [`Detection::at`](super::Detection::at) defines d, phi
+/// and psi.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewBox {
     /// Smallest and largest distance, metres; 0 as the smallest means no limit.

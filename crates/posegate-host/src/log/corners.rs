@@ -63,7 +63,7 @@ pub struct TagObservation<'t> {
     pub tag: &'t Tag,
     /// The tolerance of the tag's pose; the rotation is about the vertical.
     pub tolerance: Tolerance,
-    /// The tag's corners in AprilTag's order, pixels.
+    /// The tag's corners in AprilTag's order ([`posegate::shape::Sight`]), pixels.
     pub corners_px: [[f64; 2]; 4],
 }
 
@@ -72,11 +72,11 @@ pub struct TagObservation<'t> {
 pub struct Fix {
     /// x, y (m) and yaw (rad) in the world frame.
     pub pose: [f64; 3],
-    /// The covariance by rows, world axes. With tolerances it is wider than that of the noise: the ellipsoid of the
-    /// wanted radius holds the true pose.
+    /// The covariance by rows, world axes: m^2, m rad, rad^2. With tolerances of tags and camera it is wider than that
+    /// of the noise. The ellipsoid of `radius_squared` contains the true pose with the confidence of that radius.
     pub covariance: [[f64; 3]; 3],
-    /// The factor between that covariance and the first-order one, before tolerances. At least 1: at most 4 from
-    /// [`locate`]; from [`locate_all`] the largest of all directions.
+    /// The factor between the covariance and its first-order approximation, before tolerances: at least 1. At most 4
+    /// from [`locate`]; from [`locate_all`] the largest of all directions.
     pub grown: f64,
     /// The root mean square of the pixel residuals.
     pub rms_px: f64,

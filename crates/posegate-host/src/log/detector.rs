@@ -297,7 +297,7 @@ impl Detector {
     /// image, so its image may be the rectified one.
     ///
     /// # Errors
-    /// [`CameraInfoError`]
+    /// [`CameraInfoError`] if the calibration is invalid, or differs too much from the site's camera.
     pub fn camera(&self, info: &CameraInfo) -> Result<MountedCamera, CameraInfoError> {
         let site = &self.camera;
         let read = |image| {

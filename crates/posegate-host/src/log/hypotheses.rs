@@ -13,7 +13,8 @@ pub const MOST_HYPOTHESES: usize = 8;
 /// begins at each 0; the next rows are its hypotheses 1, 2 and so on, and have the same time.
 ///
 /// # Errors
-/// [`LogError::Hypothesis`] for the first row whose number or time does not continue its report. `file` names the input.
+/// [`LogError::Hypothesis`] for the first row whose number or time does not continue its report, or that exceeds
+/// [`MOST_HYPOTHESES`]. `file` names the input.
 pub fn reports(rows: &[Row], file: &str) -> Result<Vec<Range<usize>>, LogError> {
     let mut reports: Vec<Range<usize>> = Vec::with_capacity(rows.len());
     for (index, row) in rows.iter().enumerate() {

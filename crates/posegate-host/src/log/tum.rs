@@ -16,9 +16,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 /// A pose with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stamped {
-    /// Seconds.
+    /// Time, seconds.
     pub t_s: f64,
-    /// Metres.
+    /// Position in the world, metres.
     pub position: Vector3<f64>,
     /// Rotation from the body to the world.
     pub rotation: UnitQuaternion<f64>,
@@ -37,7 +37,7 @@ impl Stamped {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}:{column}: {message}; expected {expected}")]
 pub struct TumError {
-    /// The file.
+    /// The file's name.
     pub file: String,
     /// Line, from 1.
     pub line: usize,

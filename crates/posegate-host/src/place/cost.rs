@@ -8,7 +8,8 @@ use super::rough;
 use core::cell::Cell;
 use posegate::shape::{LineClipper, Shape, SuccessSet};
 
-/// The cost of a pose: `c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad) in S, and `c_high` outside.
+/// The cost of a pose: `c1 d^2 + c2 phi^2 + c3 psi^2` (m, rad) in S, and `c_high` outside. [`posegate::shape::Sight`]
+/// defines d, phi and psi.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// Cost of a pose outside S.

@@ -6,7 +6,7 @@ use crate::learn::ErrorModel;
 use core::cell::RefCell;
 use posegate::shape::{self, Visibility};
 
-/// A bound on the error of an observation by d, phi and psi.
+/// A bound on the error of an observation by d, phi and psi ([`posegate::shape::Sight`]).
 #[derive(Clone, Copy, Debug)]
 pub enum ViewBound<'a> {
     /// Learnt from data.

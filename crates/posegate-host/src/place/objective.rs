@@ -57,7 +57,7 @@ pub enum PosePrior {
     About(Gaussian),
 }
 
-/// The cost of a view, `[d, phi, psi]` in m and rad.
+/// The cost of a view, `[d, phi, psi]` in m and rad ([`posegate::shape::Sight`]).
 pub trait ViewCost: Sync {
     /// Returns the cost, finite and at least 0; infinity if the cost of such a view is not known. Such a view counts
     /// as a miss, in the mean and in the probability of a miss.

@@ -74,7 +74,7 @@ pub struct Placement {
     pub restarts: Vec<Restart>,
     /// Other local optima, the best first: a mirror image, for example.
     pub others: Vec<Placed>,
-    /// The number of places evaluated.
+    /// The number of places that were evaluated.
     pub evaluations: u64,
 }
 
@@ -159,8 +159,8 @@ impl Problem for Searched<'_> {
 /// Searches the best place in a space: an optimizer's search, a polish of its best solutions, and an evaluation of
 /// the final place at full accuracy.
 ///
-/// The result is the same for the same arguments and any number of threads. `progress` is called with the number of
-/// evaluations of each batch.
+/// `evaluations` is the number of places to evaluate, including those of the polish. The result is the same for the
+/// same arguments and any number of threads. `progress` is called with the number of evaluations of each batch.
 ///
 /// # Errors
 /// [`PlaceError`] if the problem is invalid or no place was found.

@@ -36,9 +36,9 @@ impl Default for Quadrature {
 /// rules: usually more than the error, but not a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Approximate {
-    /// The number.
+    /// The integral.
     pub value: f64,
-    /// The estimate of its error.
+    /// The estimated error of `value`, in its unit.
     pub error: f64,
 }
 

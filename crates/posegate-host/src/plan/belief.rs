@@ -11,11 +11,11 @@ use posegate::task::{Ends, Leg, Odometry, travel};
 /// Knowledge of the pose between two steps of a chain, in floats: metres and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeliefStateF64 {
-    /// Intended pose of the estimate: x, y, yaw in the world.
+    /// Intended pose of the estimate: x, y (m), yaw (rad) in the world.
     pub pose: [f64; 3],
-    /// Largest distance of the estimate from the intended pose: translation, yaw.
+    /// Largest distance of the estimate from the intended pose: translation (m), yaw (rad).
     pub spread: [f64; 2],
-    /// Bound of the error about the estimate: translation, yaw.
+    /// Bound of the error about the estimate: translation (m), yaw (rad).
     pub certain: [f64; 2],
     /// The probability that the error exceeds `certain`.
     pub doubt: f64,

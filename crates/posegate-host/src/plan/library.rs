@@ -25,7 +25,7 @@ pub struct Look {
     pub tags: Vec<String>,
     /// The largest error r_l, and the share of observations within it.
     pub bound: ErrorBound,
-    /// Position of the look's tag (or its goal), metres.
+    /// x and y of the look's tag (or its goal), metres, world frame.
     pub centre: [f64; 2],
     /// Largest distance from the centre at which the look may be useful, metres.
     pub radius: f64,

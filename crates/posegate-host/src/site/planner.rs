@@ -10,14 +10,14 @@ use super::success::{self, Names};
 use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
 use posegate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
 
-/// The planner's settings.
+/// The planner's settings. All costs have one unit of any kind, such as seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planner {
     /// The cost of a metre of driving.
     pub metre: f64,
-    /// The cost of a look.
+    /// The cost of a look, in the unit of `metre`.
     pub look_cost: f64,
-    /// The number of places from which each tag may be observed.
+    /// The number of places from which each tag may be observed, 1 to 64.
     pub views: u32,
     /// The longest drive, metres.
     pub range: f64,
@@ -34,7 +34,7 @@ pub struct GeneratedLook {
     pub tag: String,
     /// The poses from which the tag is seen well enough. The goal frame is the world frame moved to the tag's place.
     pub success: SuccessSet,
-    /// The largest error.
+    /// The largest error of the pose that such a look gives.
     pub bound: ErrorBound,
 }
 

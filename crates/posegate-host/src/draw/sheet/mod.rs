@@ -55,7 +55,7 @@ const NOTES: [&str; 2] = [
     "Left and right are those of a person who faces the wall. Write the measured values into the site file, and check it again.",
 ];
 
-/// Draws the sheet: the A4 pages one below the other, 794 pixels (210 mm) wide. Pages have the same content as those of
+/// Returns the sheet as an SVG: the A4 pages one below the other, 794 pixels (210 mm) wide. Pages have the same content as those of
 /// [`mounting_sheet_html`], which prints each on its own sheet of paper.
 #[must_use]
 pub fn mounting_sheet(sheet: &MountingSheet<'_>) -> String {

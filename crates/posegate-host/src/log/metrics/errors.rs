@@ -7,9 +7,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// Errors by component, one entry for every pose or pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// Metres.
+    /// Errors of the position, metres.
     pub translation: Vec<f64>,
-    /// Radians, 0 to pi.
+    /// Angles of the rotation errors, radians, 0 to pi.
     pub rotation: Vec<f64>,
     /// The Frobenius norm of the error's 4x4 matrix minus the identity.
     pub full: Vec<f64>,

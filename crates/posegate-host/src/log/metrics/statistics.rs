@@ -1,13 +1,13 @@
 //! Statistics of errors.
 
-/// Statistics of errors, with `evo`'s names.
+/// Statistics of errors, with `evo`'s names, in the unit of the errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
     /// The number of errors.
     pub count: usize,
     /// The root mean square.
     pub rmse: f64,
-    /// The mean.
+    /// The mean error.
     pub mean: f64,
     /// The median. For an even number of errors, the mean of the two in the middle.
     pub median: f64,
@@ -17,7 +17,7 @@ pub struct Statistics {
     pub min: f64,
     /// The largest error.
     pub max: f64,
-    /// The sum of squares.
+    /// The sum of squares, in the square of the unit.
     pub sse: f64,
     /// The root of the sum of squares: the paper's Eq. 1 as printed, without 1 / N.
     pub sum_norm: f64,

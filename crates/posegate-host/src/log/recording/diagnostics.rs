@@ -21,7 +21,7 @@ pub enum SkipReason {
 }
 
 impl SkipReason {
-    /// Returns its name, in snake case.
+    /// Returns the reason's name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -57,9 +57,9 @@ pub struct ReaderDiagnostics {
     pub read: BTreeMap<String, u64>,
     /// Number of transforms between two frames, parent and child, on the topics of transforms that are read.
     pub transforms: BTreeMap<(String, String), u64>,
-    /// Messages of requested topics that could not be decoded.
+    /// Number of messages of requested topics that could not be decoded.
     pub undecodable: u64,
-    /// A description of the first of them.
+    /// The first message that could not be decoded: its description. `None` if there is none.
     pub first_undecodable: Option<String>,
     /// Bytes of all messages, uncompressed.
     pub message_bytes: u64,

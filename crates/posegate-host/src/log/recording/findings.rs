@@ -21,13 +21,13 @@ pub struct Findings {
     pub duplicate_stamps: u64,
     /// Stamps that are not finite.
     pub time_not_finite: u64,
-    /// A coordinate or the heading is NaN or infinite.
+    /// Estimates with a coordinate or a heading that is NaN or infinite.
     pub pose_not_finite: u64,
     /// Quaternions whose length is not 1.
     pub quaternion_not_unit: u64,
     /// Estimates in another frame than the world frame.
     pub other_frame: u64,
-    /// The other frames by name.
+    /// The number of estimates in each other frame, by the frame's name.
     pub frames: BTreeMap<String, u64>,
     /// Estimates without a covariance.
     pub without_covariance: u64,

@@ -70,7 +70,7 @@ pub struct Detection {
     pub family: String,
     /// The tag's number.
     pub id: i32,
-    /// The tag's corners in AprilTag's order, pixels.
+    /// The tag's corners in AprilTag's order ([`posegate::shape::Sight`]), pixels.
     pub corners_px: [[f64; 2]; 4],
 }
 

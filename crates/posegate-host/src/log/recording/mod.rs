@@ -55,12 +55,12 @@ pub struct Sample {
     pub source: u8,
     /// Time of the estimate, seconds.
     pub t_s: f64,
-    /// Time at which it was recorded or used (`now_s`), seconds; `None` if the file does not contain it.
+    /// Time at which the estimate was recorded or used (`now_s`), seconds; `None` if the file does not contain it.
     pub logged_s: Option<f64>,
     /// Both times in nanoseconds, if the file has integers. An `f64` of seconds since 1970 has steps of 0.2
     /// microseconds, so equal times could differ by a millisecond after rounding.
     pub exact_ns: Option<Exact>,
-    /// The frame of its numbers; `None` means the world frame, for files without frames.
+    /// The frame of the estimate; `None` means the world frame, for files without frames.
     pub frame: Option<Arc<str>>,
     /// Height, metres. Not part of the estimate, but messages have it.
     pub z_m: f64,
@@ -77,7 +77,7 @@ pub struct Sample {
 pub struct Exact {
     /// Time of the estimate.
     pub stamp: i64,
-    /// Time at which it was recorded.
+    /// Time at which the estimate was recorded.
     pub logged: i64,
 }
 
@@ -99,11 +99,11 @@ impl Exact {
 /// A true pose as recorded. Its numbers are unchecked: any bits.
 #[derive(Clone, Debug)]
 pub struct TruePose {
-    /// Seconds.
+    /// Time of the pose, seconds.
     pub t_s: f64,
-    /// The frame of its numbers.
+    /// The frame of the pose.
     pub frame: Arc<str>,
-    /// Metres.
+    /// x, y, z, metres.
     pub position: [f64; 3],
     /// The quaternion x, y, z, w.
     pub orientation: [f64; 4],

@@ -9,13 +9,13 @@ use std::collections::{BTreeMap, VecDeque};
 pub struct InterlockTimes {
     /// From the first to the last estimate, seconds.
     pub recorded_s: f64,
-    /// Time for which it was open.
+    /// Time for which the interlock was open, seconds.
     pub open_s: f64,
-    /// Number of times that it opened.
+    /// Number of times that the interlock opened.
     pub openings: u64,
     /// Time for which it was shut, by the code of the reason.
     shut_s: [f64; 64],
-    /// The same over time.
+    /// The intervals in which the interlock was open, or was shut for one reason.
     pub lanes: Lanes,
     /// The last step.
     last: Option<Last>,
@@ -138,8 +138,8 @@ impl Last {
 pub struct WhyShut {
     /// The reason as text.
     pub words: String,
-    /// The setting's name, its value, and the least value with which the interlock would have opened; `None` if no single setting
-    /// decides.
+    /// The setting's name, its value, and the least value with which the interlock would have opened. `None` if no
+    /// single setting decides.
     pub setting: Option<(&'static str, u32, u32)>,
 }
 

@@ -24,7 +24,7 @@ impl LaneSpan {
         self.of(0)
     }
 
-    /// Returns the time for which it was shut for a reason, seconds.
+    /// Returns the time for which the interlock was shut for a reason, seconds.
     #[must_use]
     pub fn shut_s(&self, reason: Reason) -> f64 {
         self.of(usize::from(reason.code()))

@@ -131,7 +131,8 @@ pub struct ReplayConfig<'a> {
     pub examined: bool,
 }
 
-/// A running replay.
+/// A running replay of a recording through the gate. [`play`] feeds it a recording and returns the rows; the counts are
+/// read afterwards.
 pub struct Replay<'a> {
     setup: ReplayConfig<'a>,
     judge: Evaluator<'a>,
@@ -270,7 +271,7 @@ impl<'a> Replay<'a> {
         self.settle(false, out)
     }
 
-    /// Ends the recording: rows that wait for the truth are passed on without it.
+    /// Ends the recording: rows that wait for a true pose are passed to `out` without one.
     pub fn finish<E>(&mut self, out: &mut impl FnMut(&Row) -> Result<(), E>) -> Result<(), E> {
         if let Some(track) = &mut self.track {
             track.complete();

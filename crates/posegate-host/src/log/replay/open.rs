@@ -8,11 +8,11 @@ use std::collections::VecDeque;
 /// Steps of the gate after which the interlock was open, and whether the robot was in the success set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OpenMoments {
-    /// Steps after which it was open.
+    /// Steps of the gate after which the interlock was open.
     pub open: u64,
-    /// Those with a known true pose.
+    /// Such steps with a known true pose.
     pub with_truth: u64,
-    /// Those whose true pose was outside of the success set.
+    /// Such steps whose true pose was outside of the success set.
     pub outside: u64,
     /// Steps whose true pose may still come, seconds.
     waiting: VecDeque<f64>,

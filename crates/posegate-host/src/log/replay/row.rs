@@ -11,15 +11,15 @@ use serde_json::{Value, json};
 /// One estimate of a replay, with all results.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// From 0, in the order of the recording.
+    /// The number of the estimate, from 0, in the order of the recording.
     pub index: u64,
     /// The number of the estimate's source.
     pub source: u8,
     /// The estimate's stamp, seconds.
     pub t_s: f64,
-    /// Time at which it was recorded, seconds, if the gate uses that clock.
+    /// Time at which the estimate was recorded, seconds, if the gate uses that clock.
     pub logged_s: Option<f64>,
-    /// x, y (m), yaw (rad), as recorded.
+    /// The estimated pose: x, y (m), yaw (rad), as recorded.
     pub pose: [f64; 3],
     /// The uncertainty that the gate was given.
     pub spread: Option<Uncertainty>,
@@ -27,23 +27,23 @@ pub struct Row {
     pub recorded: Option<Uncertainty>,
     /// The estimate's age, seconds, if known.
     pub age: Option<f64>,
-    /// `true` if it is in the world frame.
+    /// `true` if the estimate is in the world frame.
     pub in_world: bool,
-    /// `true` if it has a pose-set, at any age. Computed only if there may be a truth.
+    /// `true` if the estimate has a pose-set, at any age. Computed only if there may be a truth.
     pub possible: bool,
     /// The verdict on this estimate alone.
     pub verdict: Verdict,
     /// `true` if the margin was computed.
     pub examined: bool,
-    /// `true` if the gate is open after it.
+    /// `true` if the gate is open after the estimate.
     pub permitted: bool,
-    /// The gate's state after it.
+    /// The gate's state after the estimate.
     pub state: State,
     /// The result of the gate's step.
     pub step: Result<(), Reason>,
     /// The true pose (m, m, rad), if known.
     pub truth: Option<[f64; 3]>,
-    /// The time since the last fix of its source, milliseconds, if known.
+    /// The time since the last fix of the source, milliseconds, if known.
     pub since_fix_ms: Option<u32>,
     /// The comparison with the truth.
     pub against: Option<TruthComparison>,

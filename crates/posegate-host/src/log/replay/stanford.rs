@@ -42,7 +42,7 @@ impl Region {
         Self::UnavailableMisleading,
     ];
 
-    /// Returns its name, in snake case.
+    /// Returns the region's name, in snake case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

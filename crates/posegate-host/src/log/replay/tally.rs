@@ -9,7 +9,7 @@ use posegate::gate::Reason;
 pub struct Tally {
     /// All estimates that the rule can judge.
     pub estimates: u64,
-    /// Permits among them.
+    /// Estimates that the rule permits.
     pub permits: u64,
     /// Estimates with a known true pose.
     pub with_truth: u64,

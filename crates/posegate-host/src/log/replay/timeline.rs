@@ -9,9 +9,9 @@ const MOST: usize = 512;
 /// A span of time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bucket {
-    /// Estimates in it.
+    /// Estimates in the span.
     pub estimates: u64,
-    /// Permitted verdicts.
+    /// Estimates with a permit as their verdict.
     pub permits: u64,
     /// Steps after which the gate was open.
     pub open: u64,
@@ -30,7 +30,7 @@ pub struct Bucket {
 pub struct RuleCounts {
     /// Estimates that the rule can judge.
     pub judged: u64,
-    /// Permits among them.
+    /// Estimates that the rule permits.
     pub permits: u64,
     /// Permits with the true pose outside of the success set.
     pub false_permits: u64,

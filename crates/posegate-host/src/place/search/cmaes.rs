@@ -139,9 +139,9 @@ impl Optimizer for Cmaes {
 /// One run from a point that is known to be good.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Descent {
-    /// The start.
+    /// The point at which the search begins.
     pub from: Solution,
-    /// First standard deviation, as a share of the cube.
+    /// First standard deviation, as a share of the unit cube's edge.
     pub sigma: f64,
 }
 

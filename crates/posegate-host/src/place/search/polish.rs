@@ -11,11 +11,11 @@ use rand_distr::StandardNormal;
 /// The search's settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polish {
-    /// The start.
+    /// The point at which the search begins.
     pub from: Solution,
-    /// First step, as a share of the cube.
+    /// First step, as a share of the unit cube's edge.
     pub step: f64,
-    /// Last step.
+    /// Step at which the search ends, in the unit of `step`.
     pub smallest: f64,
 }
 
