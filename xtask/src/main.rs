@@ -336,8 +336,8 @@ const ALL: &[&str] = &[
     "c",
     "parts",
     "budgets",
-    "adversarial 1000000 1 grid",
-    "adversarial 1000000 1 facets",
+    "adversarial 250000 today grid",
+    "adversarial 250000 today facets",
 ];
 
 fn main() -> ExitCode {

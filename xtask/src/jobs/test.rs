@@ -4,6 +4,7 @@ use crate::arguments::Arguments;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Returns `cargo test` with packages and features of the fast suite, so that all jobs use the same build. The tests of
 /// `posegate-peers` are separate: their dependencies take longer to build than the rest.
@@ -56,18 +57,32 @@ pub fn deep(_: &Arguments) -> Result {
         .run()?;
     cmd("cargo test --release -p posegate-cli --test hostile_files crafted")
         .env("POSEGATE_DEEP", "1")
-        .run()
+        .run()?;
+    for layout in ["grid", "facets"] {
+        suite("--test adversarial --")
+            .args(["1000000", "1", layout])
+            .print()?;
+    }
+    Ok(())
 }
 
-/// Compares N random and searched pose-sets with the exact oracle.
+/// Compares N random and searched pose-sets with the exact oracle. The seed `today` is another one on each day of the year.
 pub fn adversarial(given: &Arguments) -> Result {
+    let seed = match given.or(1, "1") {
+        "today" => today()?.to_string(),
+        seed => seed.to_owned(),
+    };
     suite("--test adversarial --")
-        .args([
-            given.or(0, "1000000"),
-            given.or(1, "1"),
-            given.or(2, "grid"),
-        ])
+        .args([given.or(0, "1000000"), &seed, given.or(2, "grid")])
         .print()
+}
+
+/// Returns the number of the day in a cycle of 366 days, from 1.
+fn today() -> Result<u64> {
+    let now = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_err(|error| error.to_string())?;
+    Ok(now.as_secs() / 86_400 % 366 + 1)
 }
 
 /// Measures the accepted scale over the true one on N random pose-sets of reference set A.
