@@ -190,7 +190,7 @@ impl<'a> Rules<'a> {
         self.digest
     }
 
-    /// Returns a task's name.
+    /// Returns a task's name; `None` beyond the last.
     #[must_use]
     pub fn name(&self, number: u16) -> Option<&'a str> {
         let bytes = self.names.get(usize::from(number))?;
@@ -202,7 +202,7 @@ impl<'a> Rules<'a> {
         core::str::from_utf8(name).ok()
     }
 
-    /// Returns a rule.
+    /// Returns a rule; `None` beyond the last.
     #[must_use]
     pub fn get(&self, number: u16) -> Option<Rule> {
         let mut bytes = Reader(self.rules.get(usize::from(number))?);

@@ -20,7 +20,7 @@ use posegate::table::checksum_continued;
 
 /// Number of 64-bit words of a `posegate_gate`.
 pub const POSEGATE_GATE_WORDS: usize = 60;
-/// Pointers of a `posegate_gate`.
+/// Number of pointers of a `posegate_gate`.
 pub const POSEGATE_GATE_POINTERS: usize = 24;
 
 /// Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.

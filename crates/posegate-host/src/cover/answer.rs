@@ -73,7 +73,7 @@ pub struct Incumbent {
     pub cost: f64,
     /// A proven lower bound of the cost of any choice.
     pub bound: f64,
-    /// Seconds since the beginning.
+    /// Seconds since the search began.
     pub seconds: f64,
 }
 
@@ -166,7 +166,7 @@ pub struct TaskCoverage {
     pub alone: usize,
     /// The plan on the site with the chosen tags, or the reason why there is none.
     pub planned: PlanResult,
-    /// The reason why the task is not served.
+    /// The reason why the task is not served; `None` if it is.
     pub reason: Option<String>,
 }
 

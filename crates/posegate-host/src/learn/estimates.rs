@@ -32,7 +32,7 @@ pub struct Scored {
     pub condition: f64,
     /// The run of the row, of one robot or source. Rows of a run are consecutive in time.
     pub run: u32,
-    /// The index of its group in [`ScoredEstimates::groups`].
+    /// The index of the row's group in [`ScoredEstimates::groups`].
     pub group: u32,
 }
 

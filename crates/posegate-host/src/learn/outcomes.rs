@@ -41,9 +41,10 @@ pub struct OutcomesReport {
     pub limits: [f64; 2],
     /// The value of the bet against the claim after the last docking.
     pub e_value: f64,
-    /// The largest value of the bet.
+    /// The largest value of the bet against the claim.
     pub largest_e_value: f64,
-    /// The number of dockings after which the bet first reached `1 / alpha`: the claim is contradicted.
+    /// The number of dockings after which the bet first reached `1 / alpha`: the claim is contradicted. `None` if
+    /// it never did.
     pub contradicted_at: Option<u64>,
 }
 

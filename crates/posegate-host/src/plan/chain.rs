@@ -34,7 +34,7 @@ pub struct StepReport {
     pub after: BeliefStateF64,
     /// The belief before the step, in the core's integers.
     pub standing: BeliefState,
-    /// The margin in the task's success set.
+    /// The margin in the task's success set; `None` for a drive.
     pub margin: Option<Margin>,
     /// The reason of the failure, if the step fails.
     pub failure: Option<Failure>,

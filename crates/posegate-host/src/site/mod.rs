@@ -202,7 +202,8 @@ impl Site {
         chosen_table(&task.success, &task.wish)
     }
 
-    /// Returns the extent, step and layout of a task's table: those of the task, else the site's default.
+    /// Returns the extent, step and layout of a task's table: those of the task, else the site's default. `None` if
+    /// neither is complete.
     #[must_use]
     pub fn table_spec<'a>(&'a self, task: &'a Task) -> Option<&'a TableSpec> {
         task.table.as_ref().or(self.table.as_ref())

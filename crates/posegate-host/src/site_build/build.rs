@@ -49,7 +49,7 @@ pub struct BuildSummary {
 /// the site, at most one piece per thread and, if plans are made, the planner's library of the site.
 ///
 /// # Errors
-/// [`SiteBuildError`]. Finished pieces remain, and a later build with `resume` has_valid_file them. If some pieces cannot be
+/// [`SiteBuildError`]. Finished pieces remain, and a later build with `resume` keeps them. If some pieces cannot be
 /// made, all others are made ([`SiteBuildError::Refused`]).
 pub fn build(
     site: &Site,

@@ -66,7 +66,7 @@ pub struct Sample {
     pub z_m: f64,
     /// The estimate's pose and uncertainty.
     pub belief: PoseEstimate,
-    /// The true pose (m, m, rad), if it is in the same row.
+    /// The true pose in the world (m, m, rad), if it is in the same row.
     pub truth: Option<[f64; 3]>,
     /// The time since the last fix of the source, milliseconds, rounded up; `None` if it is not known.
     pub since_fix_ms: Option<u32>,

@@ -247,6 +247,9 @@ impl<'a> Replay<'a> {
 
     /// Takes estimates in the order in which they were recorded. Calls `out` with each row once its truth is known. A
     /// batch of about a thousand keeps every core busy.
+    ///
+    /// # Errors
+    /// The first error of `out`.
     pub fn estimates<E>(
         &mut self,
         samples: &[Sample],
@@ -272,6 +275,9 @@ impl<'a> Replay<'a> {
     }
 
     /// Ends the recording: rows that wait for a true pose are passed to `out` without one.
+    ///
+    /// # Errors
+    /// The first error of `out`.
     pub fn finish<E>(&mut self, out: &mut impl FnMut(&Row) -> Result<(), E>) -> Result<(), E> {
         if let Some(track) = &mut self.track {
             track.complete();
@@ -601,13 +607,13 @@ impl<'a> Replay<'a> {
         self.counts.tallies(&self.setup.thresholds)
     }
 
-    /// Returns the number of permitted estimates, and of all estimates.
+    /// Returns the number of estimates whose verdict is a permit, and of all estimates.
     #[must_use]
     pub const fn permits(&self) -> [u64; 2] {
         [self.counts.verdicts.permits, self.next]
     }
 
-    /// Returns the count of each reason that was given.
+    /// Returns the number of denied verdicts for each reason; reasons that were not given are omitted.
     #[must_use]
     pub fn reasons(&self) -> Vec<(Reason, u64)> {
         self.counts.reasons()
