@@ -65,7 +65,7 @@ pub struct Rule {
     pub tag: u32,
     /// The next rule; a work rule refers to itself.
     pub then: u16,
-    /// The next rule after the last failed attempt.
+    /// The next rule after the last failed attempt; `None` gives up.
     pub otherwise: Option<u16>,
     /// Pose where the step begins.
     pub place: Pose,
@@ -112,7 +112,7 @@ pub struct Rules<'a> {
 }
 
 impl<'a> Rules<'a> {
-    /// Parses a rule table and checks all of its contents.
+    /// Parses and checks a rule table.
     ///
     /// # Errors
     /// [`RulesError`] if the length, header, checksum, a name or a rule is invalid.

@@ -51,9 +51,9 @@ mod trust;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// x, metres.
+    /// x, metres, world frame.
     pub x_m: f64,
-    /// y, metres.
+    /// y, metres, world frame.
     pub y_m: f64,
     /// Yaw, radians, counter-clockwise; any number of turns below 16,384 rad.
     pub yaw_rad: f64,

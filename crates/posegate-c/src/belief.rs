@@ -75,11 +75,11 @@ pub struct posegate_ros_pose {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_mavlink_odometry {
-    /// x, y, z, metres.
+    /// x, y, z in the message's axes, metres.
     pub position: [f32; 3],
     /// The orientation: a quaternion w, x, y, z.
     pub q: [f32; 4],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub pose_covariance: [f32; 21],
 }
 
@@ -87,11 +87,11 @@ pub struct posegate_mavlink_odometry {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_mavlink_vision {
-    /// x, y, z, metres.
+    /// x, y, z in the message's axes, metres.
     pub position: [f32; 3],
     /// Roll, pitch, yaw, radians.
     pub angles: [f32; 3],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub covariance: [f32; 21],
 }
 
@@ -99,9 +99,9 @@ pub struct posegate_mavlink_vision {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_compact {
-    /// x, metres.
+    /// x, metres, in the report's frame.
     pub x_m: f32,
-    /// y, metres.
+    /// y, metres, in the report's frame.
     pub y_m: f32,
     /// Yaw, radians, counter-clockwise.
     pub yaw_rad: f32,

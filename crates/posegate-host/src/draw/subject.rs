@@ -24,7 +24,7 @@ pub struct Subject<'a> {
     pub task: &'a Task,
     /// The task's set, prepared for evaluation.
     pub depth: SlackEvaluator,
-    /// The task's table.
+    /// The task's table; `None` if none was added.
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
     pub beliefs: Vec<PoseSetF64>,

@@ -7,7 +7,7 @@ use super::sheet::Sheet;
 /// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` if that column exists.
 ///
 /// # Errors
-/// The first invalid field, with its line and column; a file without rows.
+/// A missing column; the first invalid field, with its line and column; a file without rows.
 pub fn outcomes(bytes: &[u8], file: &str) -> Result<Vec<bool>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
     let success = sheet.needed("success", &["success"])?;

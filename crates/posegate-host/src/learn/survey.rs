@@ -54,7 +54,7 @@ pub struct OffsetReport {
     pub kind: Surveyed,
     /// The object's name.
     pub name: String,
-    /// Dockings with it.
+    /// Number of dockings with the object.
     pub dockings: u64,
     /// The true place minus that of the site file: x, y (m, world axes), yaw (rad). `None` if there are too few dockings.
     pub offset: Option<[f64; 3]>,
@@ -62,12 +62,12 @@ pub struct OffsetReport {
     /// if there are too few dockings, or if their offsets do not scatter independently in x, y and yaw: such numbers are
     /// not measurements, and the offset is not tested.
     pub region: Option<[f64; 3]>,
-    /// Hotelling's statistic of the offset over the limit beyond which it is significant; above 1 if it is.
+    /// Hotelling's statistic of the offset over the limit beyond which the offset is significant: significant above 1.
     pub significance: f64,
     /// `true` if the object must be surveyed again: its offset is significant, and explains the looks better than any
     /// other.
     pub stale: bool,
-    /// Other objects whose offset explains the looks equally well, because they were only seen together.
+    /// Other objects whose offset explains the looks equally well, because the objects were only seen together.
     pub or: Vec<(Surveyed, String)>,
 }
 
@@ -76,7 +76,7 @@ pub struct OffsetReport {
 /// look at that tag.
 ///
 /// # Errors
-/// The first invalid field, with its line and column; a dock or a tag that the site does not have; a file without rows.
+/// A missing column; the first invalid field, with its line and column; a dock or a tag that the site does not have; a file without rows.
 pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>, LearnError> {
     const ALL: [&str; 6] = ["run", "dock", "tag", "x_m", "y_m", "yaw_rad"];
     let mut sheet = Sheet::new(bytes, file)?;

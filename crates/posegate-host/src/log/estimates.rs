@@ -33,7 +33,7 @@ pub struct Row {
     pub covariance: [[f64; 3]; 3],
     /// The true pose in the world (m, m, rad), if given.
     pub truth: Option<[f64; 3]>,
-    /// The number of the row within its report; `None` if there is no such column.
+    /// The number of the row within its report, from 0; `None` if there is no such column.
     pub hypothesis: Option<u64>,
     /// The time since the last fix, seconds; `None` if the reader has no column for it or the field is empty.
     pub since_fix_s: Option<f64>,

@@ -19,7 +19,7 @@ pub struct BeliefStateF64 {
     pub certain: [f64; 2],
     /// The probability that the error exceeds `certain`.
     pub doubt: f64,
-    /// The normally distributed part of the error.
+    /// The normally distributed part of the error; `None` if there is no such part.
     pub random: Option<Random>,
 }
 

@@ -74,7 +74,7 @@ impl ChainReport {
     }
 }
 
-/// Evaluates a chain of a site file. Builds and proves the tables that it needs.
+/// Evaluates a chain of a site file; errors call it `name`. Builds and proves the tables that the chain needs.
 ///
 /// Decisions are those of [`posegate::chain`], with the margins of [`posegate::contain::examine`].
 ///

@@ -13,7 +13,8 @@ pub struct Options {
     pub survive_a_lost_tag: bool,
     /// The number of labels that a search may expand.
     pub limit: usize,
-    /// Costs of drives by the places' names; `start` and the work task's name are places too.
+    /// Costs of drives by the places' names; `start` and the work task's name are places too. Other drives
+    /// cost [`Planner::metre`](crate::site::Planner::metre) per metre.
     pub costs: BTreeMap<(String, String), f64>,
     /// Ends the search early.
     pub stop: StopSignal,

@@ -294,13 +294,13 @@ pub struct Task {
 /// The table settings in a site file; the rest is chosen ([`Site::chosen_table`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TableOverrides {
-    /// The poses to cover.
+    /// The poses to cover; `None` if the file has none.
     pub extent: Option<Extent>,
-    /// The cell size.
+    /// The cell size; `None` if the file has none.
     pub step: Option<Step>,
-    /// The layouts to write.
+    /// The layouts to write; `None` if the file has none.
     pub layout: Option<Layout>,
-    /// The bounded pose-set, about the goal, in which the robot is expected.
+    /// The bounded pose-set, about the goal, in which the robot is expected; `None` if the file has none.
     pub expected: Option<Tolerance>,
 }
 

@@ -29,8 +29,8 @@ pub struct BuildOptions {
     pub shard: Shard,
     /// If `true`, valid existing pieces are kept.
     pub resume: bool,
-    /// Number of pieces that are made in parallel, each on one thread; by default one per core. The results do not
-    /// depend on it.
+    /// Number of pieces that are made in parallel, each on one thread; `None` for one per core. The results do not
+    /// depend on this number.
     pub threads: Option<NonZeroUsize>,
 }
 

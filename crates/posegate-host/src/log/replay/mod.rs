@@ -117,7 +117,8 @@ pub struct ReplayConfig<'a> {
     pub settings: &'a Settings<'a>,
     /// The success set itself, for the comparison with the truth.
     pub success: &'a SuccessSet,
-    /// A bounded set around each estimate instead of its covariance: metres, radians.
+    /// A bounded set around each estimate instead of its covariance: metres, radians. `None` uses the
+    /// covariances.
     pub bounded: Option<[f64; 2]>,
     /// The world frame's name.
     pub world: &'a str,

@@ -19,11 +19,11 @@ pub struct Row {
     pub t_s: f64,
     /// Time at which the estimate was recorded, seconds, if the gate uses that clock.
     pub logged_s: Option<f64>,
-    /// The estimated pose: x, y (m), yaw (rad), as recorded.
+    /// The estimated pose: x, y (m), yaw (rad), in the recorded frame.
     pub pose: [f64; 3],
     /// The uncertainty that the gate was given; `None` if the source reports none.
     pub spread: Option<Uncertainty>,
-    /// The recorded uncertainty.
+    /// The recorded uncertainty; `None` if there is none.
     pub recorded: Option<Uncertainty>,
     /// The estimate's age, seconds, if known.
     pub age: Option<f64>,
