@@ -63,7 +63,7 @@ pub struct Rule {
     pub task: u16,
     /// Tag of a look.
     pub tag: u32,
-    /// The next rule; a work rule refers to itself.
+    /// The next rule after a success; a work rule refers to itself.
     pub then: u16,
     /// The next rule after the last failed attempt; `None` gives up.
     pub otherwise: Option<u16>,
