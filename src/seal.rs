@@ -98,8 +98,7 @@ struct Part {
 /// Returns the file with its seal record filled in.
 ///
 /// # Errors
-/// [`SealError`] if the file has no valid image or not exactly one record; [`SealError::help`] says how to
-/// fix the problem.
+/// [`SealError`] if the file has no valid image or not exactly one record.
 pub fn seal(file: &[u8]) -> Result<Sealed, SealError> {
     let mut file = file.to_vec();
     let mut parts = parts(&file)?;

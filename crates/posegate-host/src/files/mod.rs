@@ -196,10 +196,10 @@ impl Files {
         })
     }
 
-    /// Reads a complete input, up to the limit of a file. Returns its bytes and its name for messages.
+    /// Reads a complete input of at most 256 MiB. Returns its bytes and its name for messages.
     ///
     /// # Errors
-    /// As [`Files::open`]; [`FileError::Unread`] also if the input is longer than the limit.
+    /// As [`Files::open`]; [`FileError::Unread`] also if the input is longer.
     pub fn read(&self, input: &Input) -> Result<(Vec<u8>, String), FileError> {
         let opened = self.open(input)?;
         match input::read_from(opened.reader, Limit::FILE) {
