@@ -723,8 +723,7 @@ typedef struct posegate_ros_pose {
      */
     double orientation[4];
     /**
-     * 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2. Only x, y and the
-     * rotation about z are used.
+     * 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2.
      */
     double covariance[36];
 } posegate_ros_pose;
@@ -796,7 +795,7 @@ typedef struct posegate_mavlink_vision {
 } posegate_mavlink_vision;
 
 /**
- * An estimate in nine numbers, in the report's frame, as in micro-ROS messages and CAN frames.
+ * An estimate in nine numbers, as in micro-ROS messages and CAN frames.
  */
 typedef struct posegate_compact {
     /**
@@ -1568,7 +1567,8 @@ posegate_status posegate_self_test(void);
  * and restore it, and no other code may ever write to it, not even before another
  * `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
  *
- * Errors: the first setting that would switch a check off, or with which the gate would never open. The storage then holds no gate, and its functions deny.
+ * Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
+ * gate, and its functions deny.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be

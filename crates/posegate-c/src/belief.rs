@@ -66,8 +66,7 @@ pub struct posegate_ros_pose {
     pub position: [f64; 3],
     /// `pose.orientation`: x, y, z, w.
     pub orientation: [f64; 4],
-    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2. Only x, y and the
-    /// rotation about z are used.
+    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2.
     pub covariance: [f64; 36],
 }
 
@@ -95,7 +94,7 @@ pub struct posegate_mavlink_vision {
     pub covariance: [f32; 21],
 }
 
-/// An estimate in nine numbers, in the report's frame, as in micro-ROS messages and CAN frames.
+/// An estimate in nine numbers, as in micro-ROS messages and CAN frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_compact {

@@ -369,7 +369,8 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 /// and restore it, and no other code may ever write to it, not even before another
 /// `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
 ///
-/// Errors: the first setting that would switch a check off, or with which the gate would never open. The storage then holds no gate, and its functions deny.
+/// Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
+/// gate, and its functions deny.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
