@@ -34,7 +34,7 @@
 #define POSEGATE_GATE_WORDS 60U
 
 /**
- * Pointers of a `posegate_gate`.
+ * Number of pointers of a `posegate_gate`.
  */
 #define POSEGATE_GATE_POINTERS 24U
 
@@ -44,7 +44,7 @@
 #define POSEGATE_JUDGE_WORDS 20U
 
 /**
- * Pointers of a `posegate_judge`.
+ * Number of pointers of a `posegate_judge`.
  */
 #define POSEGATE_JUDGE_POINTERS 12U
 
@@ -547,11 +547,12 @@ enum posegate_motion
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * It does not move, because other means ensure it, such as brakes that the same output releases. Its speeds are ignored.
+     * The robot does not move. Other means must ensure this, such as brakes that the same output releases. The source's
+     * speeds are ignored.
      */
     POSEGATE_MOTION_STANDS_STILL = 1,
     /**
-     * It moves within the speeds of the source.
+     * The robot moves within the speeds of the source.
      */
     POSEGATE_MOTION_MOVES = 2,
 };
@@ -576,11 +577,11 @@ enum posegate_heading
      */
     POSEGATE_HEADING_YAW = 1,
     /**
-     * `heading[0..2]` are roll, pitch, yaw about fixed axes, radians; a tilt above 5 degrees denies.
+     * `heading[0]` to `heading[2]` are roll, pitch, yaw about fixed axes, radians; a tilt above 5 degrees denies.
      */
     POSEGATE_HEADING_ROLL_PITCH_YAW = 2,
     /**
-     * `heading[0..3]` are x, y, z, w of a unit quaternion; a tilt above 5 degrees denies.
+     * `heading[0]` to `heading[3]` are x, y, z, w of a unit quaternion; a tilt above 5 degrees denies.
      */
     POSEGATE_HEADING_QUATERNION = 3,
 };
@@ -655,8 +656,8 @@ enum posegate_spread
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * `spread[0..8]` is the covariance of x, y, yaw by rows, in the axes of the report's frame: m^2, m rad,
-     * rad^2.
+     * `spread[0]` to `spread[8]` are the covariance of x, y, yaw by rows, in the axes of the report's frame: m^2,
+     * m rad, rad^2.
      */
     POSEGATE_SPREAD_GAUSSIAN = 1,
     /**
@@ -722,7 +723,7 @@ typedef struct posegate_ros_pose {
      */
     double orientation[4];
     /**
-     * 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z.
+     * 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2.
      */
     double covariance[36];
 } posegate_ros_pose;
@@ -762,7 +763,7 @@ typedef struct posegate_belief {
  */
 typedef struct posegate_mavlink_odometry {
     /**
-     * x, y, z, metres.
+     * x, y, z in the message's axes, metres.
      */
     float position[3];
     /**
@@ -770,7 +771,7 @@ typedef struct posegate_mavlink_odometry {
      */
     float q[4];
     /**
-     * Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+     * Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
      */
     float pose_covariance[21];
 } posegate_mavlink_odometry;
@@ -780,7 +781,7 @@ typedef struct posegate_mavlink_odometry {
  */
 typedef struct posegate_mavlink_vision {
     /**
-     * x, y, z, metres.
+     * x, y, z in the message's axes, metres.
      */
     float position[3];
     /**
@@ -788,7 +789,7 @@ typedef struct posegate_mavlink_vision {
      */
     float angles[3];
     /**
-     * Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+     * Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
      */
     float covariance[21];
 } posegate_mavlink_vision;
@@ -798,15 +799,15 @@ typedef struct posegate_mavlink_vision {
  */
 typedef struct posegate_compact {
     /**
-     * x, metres.
+     * x, metres, in the report's frame.
      */
     float x_m;
     /**
-     * y, metres.
+     * y, metres, in the report's frame.
      */
     float y_m;
     /**
-     * Yaw, radians.
+     * Yaw, radians, counter-clockwise.
      */
     float yaw_rad;
     /**
@@ -905,11 +906,11 @@ typedef struct posegate_source {
      */
     double along_m_s;
     /**
-     * The largest speed across the robot's axis, m/s.
+     * The largest speed across the robot's axis, m/s, in either direction.
      */
     double across_m_s;
     /**
-     * The largest turn rate, rad/s.
+     * The largest turn rate, rad/s, in either direction.
      */
     double turn_rad_s;
     /**
@@ -1001,7 +1002,7 @@ typedef struct posegate_report {
      */
     uint64_t frame;
     /**
-     * The index in the settings of the source that sent the report.
+     * The index, in `posegate_settings.sources`, of the source that sent the report.
      */
     uint32_t source;
     /**
@@ -1139,11 +1140,11 @@ typedef struct posegate_advice {
  */
 typedef struct posegate_pose {
     /**
-     * x, micrometres.
+     * x, micrometres, world frame.
      */
     int32_t x_um;
     /**
-     * y, micrometres.
+     * y, micrometres, world frame.
      */
     int32_t y_um;
     /**
@@ -1518,6 +1519,8 @@ posegate_status posegate_belief_from_ros(const struct posegate_ros_pose *message
 /**
  * Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
  *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if `axes` is not in its enum.
+ *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
  */
@@ -1528,6 +1531,8 @@ posegate_status posegate_belief_from_mavlink_odometry(const struct posegate_mavl
 /**
  * Converts a MAVLink `VISION_POSITION_ESTIMATE` to an estimate in axes with z up; `axes` is a
  * `posegate_axes`.
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if `axes` is not in its enum.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
@@ -1562,7 +1567,8 @@ posegate_status posegate_self_test(void);
  * and restore it, and no other code may ever write to it, not even before another
  * `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
  *
- * Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
+ * Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
+ * gate, and its functions deny.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
@@ -1983,6 +1989,8 @@ posegate_status posegate_request_judge(const struct posegate_request *request,
 
 /**
  * Encodes the body of a reply.
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the reply is not in its enum or out of its range.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.

@@ -65,7 +65,7 @@ pub fn radius_squared(epsilon: f64) -> Option<f64> {
     Some(high)
 }
 
-/// Returns the squared radius in the core's form, rounded up by the quantile's own error and to
+/// Returns [`radius_squared`] in the core's form, rounded up by the quantile's own error and to
 /// 2^-16. `None` if it is out of the core's range (epsilon below 0.199, or 1 to within 1e-15).
 #[must_use]
 pub fn core_radius(epsilon: f64) -> Option<RadiusSquared> {

@@ -48,10 +48,10 @@ pub enum SealError {
     /// No segment with bytes.
     #[error("the file loads nothing into flash")]
     Empty,
-    /// Two segments overlap.
+    /// Two segments overlap at this address.
     #[error("two segments are loaded to address {0:#x}")]
     Overlap(u32),
-    /// The file leaves a gap in the image.
+    /// Nothing is loaded from the first address to the second.
     #[error("nothing is loaded from {0:#x} to {1:#x}, so the contents of flash there are unknown")]
     Gap(u32, u32),
     /// The firmware has no seal record.
@@ -95,11 +95,10 @@ struct Part {
     header: usize,
 }
 
-/// Returns the file with its record filled in.
+/// Returns the file with its seal record filled in.
 ///
 /// # Errors
-/// [`SealError`] if the file has no valid image or not exactly one record; [`SealError::help`] says how to
-/// fix the problem.
+/// [`SealError`] if the file has no valid image or not exactly one record.
 pub fn seal(file: &[u8]) -> Result<Sealed, SealError> {
     let mut file = file.to_vec();
     let mut parts = parts(&file)?;

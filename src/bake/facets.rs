@@ -40,7 +40,7 @@ impl Effort {
 pub struct FacetPlan {
     /// Exponent k of the length unit, 2^k um.
     pub unit: u8,
-    /// An estimate farther from the goal than this on an axis is not inside, length units.
+    /// An estimate farther from the goal than this on a world axis is not inside, length units.
     pub reach: u16,
     /// The pieces.
     pub pieces: Vec<PiecePlan>,

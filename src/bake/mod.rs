@@ -68,7 +68,7 @@ pub struct BakeInput<'a> {
     pub success: &'a SuccessSet,
     /// Extent, step and layouts.
     pub spec: TableSpec,
-    /// The site's confidence.
+    /// The site's confidence, in (0, 1).
     pub epsilon: f64,
     /// SHA-256 of the site file.
     pub site_digest: [u8; 32],
@@ -137,7 +137,7 @@ pub struct Nearest {
     pub pose: [f64; 3],
     /// The constraint with the least slack.
     pub constraint: &'static str,
-    /// Its slack there, roughly metres or radians: below 0 if the pose is outside.
+    /// The constraint's slack there, roughly metres or radians: below 0 if the pose is outside.
     pub slack: f64,
 }
 
@@ -176,7 +176,7 @@ fn empty(order: &BakeInput<'_>, cells: &Cells) -> BakeError {
 /// Deterministic: the bytes do not depend on the number of threads.
 ///
 /// # Errors
-/// [`BakeError`] if the order cannot be baked, with the numbers.
+/// [`BakeError`] if the order cannot be baked.
 pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
@@ -190,7 +190,7 @@ pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u
 /// [`crate::verify::build`].)
 ///
 /// # Errors
-/// [`BakeError`] if the order cannot be baked, with the numbers.
+/// [`BakeError`] if the order cannot be baked.
 pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     if order.spec.layout == Layout::Grid {
         return grid(order, progress);
@@ -205,7 +205,7 @@ pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<
 /// some pieces may be empty ([`PiecePlan::is_empty`]).
 ///
 /// # Errors
-/// [`BakeError`] if the order has no facets, with the numbers.
+/// [`BakeError`] if the order has no facets.
 pub fn facets(order: &BakeInput<'_>, effort: Effort) -> Result<FacetPlan, BakeError> {
     facets::of_order(order, &check(order)?, effort)
 }
@@ -221,7 +221,7 @@ pub fn facets_alone(order: &BakeInput<'_>, plan: &FacetPlan) -> Result<Vec<u8>, 
 /// Returns the bytes of a table with these facets, and with a grid if the order asks for both.
 ///
 /// # Errors
-/// [`BakeError`] if the order cannot be baked, with the numbers.
+/// [`BakeError`] if the order cannot be baked.
 pub fn table_of(
     order: &BakeInput<'_>,
     plan: &FacetPlan,
@@ -238,7 +238,7 @@ pub fn table_of(
 /// Checks an order without baking it: everything that can be refused from the numbers alone.
 ///
 /// # Errors
-/// [`BakeError`] if the order is refused, with the numbers.
+/// [`BakeError`] if the order is refused.
 pub fn check(order: &BakeInput<'_>) -> Result<Cells, BakeError> {
     crate::confidence::core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     goal_frame(order.success)?;

@@ -8,9 +8,9 @@ use crate::table::{Cells, LARGEST_REACH_UM};
 /// The part of the goal frame that a table covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// `[lo, hi]`, metres.
+    /// `[lo, hi]`, metres, goal frame.
     pub x: [f64; 2],
-    /// `[lo, hi]`, metres.
+    /// `[lo, hi]`, metres, goal frame.
     pub y: [f64; 2],
     /// `[lo, hi]`, degrees: an arc, `lo < hi <= lo + 360`.
     pub yaw_deg: [f64; 2],

@@ -15,9 +15,9 @@ use crate::shape::{
 /// A closed block of poses in the goal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
-    /// Lower and upper end, micrometres.
+    /// Lower and upper end, micrometres, goal frame.
     pub x_um: [i64; 2],
-    /// Lower and upper end, micrometres.
+    /// Lower and upper end, micrometres, goal frame.
     pub y_um: [i64; 2],
     /// Lower and upper end, 2^-32 turn; any number of turns. For footprints and visibility less than a quarter turn
     /// wide.

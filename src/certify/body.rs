@@ -51,7 +51,7 @@ const CORNERS: u32 = 12;
 const WIDEST: f64 = 0.35;
 
 impl Body {
-    /// Creates the body of all poses within a radius of a centre and an angle of its yaw.
+    /// Creates the body of all poses within `radius` (m) of a centre and `yaw` (rad) of its heading.
     #[must_use]
     pub const fn cylinder(centre: [f64; 3], radius: f64, yaw: f64) -> Self {
         Self {

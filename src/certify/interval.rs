@@ -66,7 +66,7 @@ impl Interval {
         Self::radians(i64::from(angle.0))
     }
 
-    /// Returns the smallest interval that contains both.
+    /// Returns the smallest interval that contains both intervals.
     #[must_use]
     pub const fn hull(self, other: Self) -> Self {
         Self {

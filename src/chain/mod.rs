@@ -94,7 +94,7 @@ pub struct BeliefState {
 }
 
 impl BeliefState {
-    /// Returns the set that must lie in a task's success set.
+    /// Returns the set that must lie in a task's success set; `None` if it is 268 m or more.
     #[must_use]
     pub fn set(&self) -> Option<PoseSet> {
         self.knowledge.about(self.pose, self.spread)
@@ -106,7 +106,7 @@ impl BeliefState {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Failure {
-    /// The set before it is not proven inside the task's success set.
+    /// The set before the step is not proven inside the task's success set.
     NotContained(Cause),
     /// The drive may begin outside of its path's start tolerance.
     StartTooFar,
@@ -149,7 +149,7 @@ impl Failure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StepEvaluation {
-    /// Margin of a task's set; zero if the set is outside.
+    /// Margin of a task's set; zero if the set is outside. `None` for a drive.
     pub margin: Option<Margin>,
     /// The reason if the step fails.
     pub failure: Option<Failure>,
@@ -171,7 +171,7 @@ pub struct Evaluation<const N: usize> {
 }
 
 impl<const N: usize> Evaluation<N> {
-    /// Returns the number of the first step that fails, and the reason.
+    /// Returns the index of the first step that fails, and the reason; `None` if no step fails.
     #[must_use]
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
         let mut steps = self.steps.iter().enumerate();

@@ -114,7 +114,7 @@ impl<'a> Filter<'a> {
         }
     }
 
-    /// Returns the decision if the filter is certain. [`Filter::decide`] uses the integer code in all other cases.
+    /// Returns the decision if the filter is certain, else `None`. [`Filter::decide`] uses the integer code in all other cases.
     #[inline]
     #[must_use]
     pub fn certain(&self, pose: [f64; 3], covariance: &[[f64; 3]; 3]) -> Option<Decision> {

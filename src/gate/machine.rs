@@ -110,7 +110,7 @@ impl<'a> Gate<'a> {
     /// that reason: a controller with damaged flash must still answer.
     ///
     /// # Errors
-    /// [`InvalidParameter`] if a parameter would switch a check off.
+    /// [`InvalidParameter`] if a parameter would switch a check off, or keep the gate closed for ever.
     pub fn new(
         table: &'a [u8],
         settings: &'a Settings<'a>,

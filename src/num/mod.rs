@@ -52,8 +52,7 @@ pub(crate) const ANGLE_UNITS_PER_Q24: i64 = 256;
 
 /// A heading as a fraction of a turn: unit 2^-32 turn, counter-clockwise, modulo one turn.
 ///
-/// Addition and subtraction wrap by construction, so a heading never leaves its range and +-180 degrees
-/// needs no special case.
+/// Addition and subtraction wrap, so +-180 degrees needs no special case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BinaryAngle(pub u32);

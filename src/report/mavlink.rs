@@ -37,7 +37,7 @@ pub struct VisionPositionEstimate {
     pub position: [f32; 3],
     /// Roll, pitch, yaw as in the message, radians.
     pub angles: [f32; 3],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub covariance: [f32; 21],
 }
 

@@ -98,7 +98,7 @@ impl PoseEstimate {
         Self::new(estimate, Uncertainty::Gaussian(covariance))
     }
 
-    /// Returns the pose as integers.
+    /// Returns the pose in micrometres and 2^-32 turn.
     ///
     /// # Errors
     /// The [`InputError`] of an estimate or an orientation.

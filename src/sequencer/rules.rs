@@ -63,9 +63,9 @@ pub struct Rule {
     pub task: u16,
     /// Tag of a look.
     pub tag: u32,
-    /// The next rule; a work rule refers to itself.
+    /// The next rule after a success; a work rule refers to itself.
     pub then: u16,
-    /// The next rule after the last failed attempt.
+    /// The next rule after the last failed attempt; `None` gives up.
     pub otherwise: Option<u16>,
     /// Pose where the step begins.
     pub place: Pose,
@@ -112,7 +112,7 @@ pub struct Rules<'a> {
 }
 
 impl<'a> Rules<'a> {
-    /// Parses a rule table and checks all of its contents.
+    /// Parses and checks a rule table.
     ///
     /// # Errors
     /// [`RulesError`] if the length, header, checksum, a name or a rule is invalid.
@@ -190,7 +190,7 @@ impl<'a> Rules<'a> {
         self.digest
     }
 
-    /// Returns a task's name.
+    /// Returns a task's name; `None` beyond the last.
     #[must_use]
     pub fn name(&self, number: u16) -> Option<&'a str> {
         let bytes = self.names.get(usize::from(number))?;
@@ -202,7 +202,7 @@ impl<'a> Rules<'a> {
         core::str::from_utf8(name).ok()
     }
 
-    /// Returns a rule.
+    /// Returns a rule; `None` beyond the last.
     #[must_use]
     pub fn get(&self, number: u16) -> Option<Rule> {
         let mut bytes = Reader(self.rules.get(usize::from(number))?);

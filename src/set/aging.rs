@@ -2,7 +2,7 @@
 
 use super::Inflation;
 
-/// The largest number of steps.
+/// The largest number of steps of [`Aging`].
 pub const MOST_AGES: usize = 4;
 
 /// The unit of an age in a step, as a power of two of milliseconds.

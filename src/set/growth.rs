@@ -76,7 +76,7 @@ impl Growth {
         self.yaw_q24
     }
 
-    /// Returns both movements one after the other.
+    /// Returns the sum of both movements.
     #[must_use]
     #[inline(always)]
     pub const fn plus(self, other: Self) -> Self {

@@ -51,9 +51,9 @@ mod trust;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// x, metres.
+    /// x, metres, world frame.
     pub x_m: f64,
-    /// y, metres.
+    /// y, metres, world frame.
     pub y_m: f64,
     /// Yaw, radians, counter-clockwise; any number of turns below 16,384 rad.
     pub yaw_rad: f64,
@@ -138,7 +138,7 @@ pub enum Uncertainty {
 pub struct RadiusSquared(u32);
 
 impl RadiusSquared {
-    /// The largest radius.
+    /// The largest squared radius: just below 256.
     pub const LARGEST: Self = Self((1 << 24) - 1);
 
     /// Returns the squared radius `raw / 65536`, or `None` unless it is at least 1 and below 256.
@@ -434,7 +434,7 @@ pub(crate) fn factor_of(
     }
 }
 
-/// Returns an estimate as integers.
+/// Returns an estimate in micrometres and 2^-32 turn.
 ///
 /// # Errors
 /// The [`InputError`]s that concern the estimate.

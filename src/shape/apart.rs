@@ -47,7 +47,7 @@ pub enum Exclusion {
 const DIRECTIONS: u32 = 48;
 
 impl Exclusion {
-    /// Returns the name of its slack.
+    /// Returns the name of the set's slack.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Obstacle(_) => "obstacle",

@@ -8,11 +8,11 @@ use super::Tolerance;
 /// `lo <= hi <= lo + 360`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxSet {
-    /// `[lo, hi]`, metres.
+    /// `[lo, hi]`, metres, goal frame.
     pub x: [f64; 2],
-    /// `[lo, hi]`, metres.
+    /// `[lo, hi]`, metres, goal frame.
     pub y: [f64; 2],
-    /// `[lo, hi]`, degrees.
+    /// `[lo, hi]`, degrees, goal frame.
     pub yaw_deg: [f64; 2],
 }
 

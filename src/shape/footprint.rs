@@ -32,7 +32,6 @@ impl Footprint {
     /// point. The side of an edge on which a corner lies is decided exactly.
     ///
     /// # Errors
-    ///
     /// The first problem of the footprint, or else of the region.
     pub fn new(footprint: Vec<[f64; 2]>, region: Vec<[f64; 2]>) -> Result<Self, PolygonError> {
         Self::check_footprint(&footprint)?;
@@ -48,7 +47,6 @@ impl Footprint {
     /// Checks that [`Footprint::new`] accepts these corners as a footprint.
     ///
     /// # Errors
-    ///
     /// The first problem of the corners.
     pub fn check_footprint(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
         match corners {
@@ -61,7 +59,6 @@ impl Footprint {
     /// Checks that [`Footprint::new`] accepts these corners as a region.
     ///
     /// # Errors
-    ///
     /// The first problem of the corners.
     pub fn check_region(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
         if corners.len() < 3 {
@@ -73,7 +70,6 @@ impl Footprint {
     /// Checks that two polygons together have few enough corners.
     ///
     /// # Errors
-    ///
     /// [`PolygonError::TooManyPairs`] if there are more pairs than [`Self::MOST_PAIRS`].
     pub(super) const fn check_pairs(
         footprint: &[[f64; 2]],

@@ -28,7 +28,7 @@ impl<S: Scalar> Planar<S> {
         [self.cos * dx + self.sin * dy, self.cos * dy - self.sin * dx]
     }
 
-    /// Transforms a point of the robot frame to the goal frame.
+    /// Transforms a point of the robot frame to the goal frame, metres.
     pub fn to_goal(self, [px, py]: [S; 2]) -> [S; 2] {
         [
             self.x + self.cos * px - self.sin * py,

@@ -73,7 +73,7 @@ pub enum Binds {
 /// must be at least zero.
 #[derive(Clone, Debug)]
 pub struct Line<S> {
-    /// The points that it constrains.
+    /// The points that the line constrains.
     pub binds: Binds,
     /// The points P, metres: of the robot, or of the goal frame.
     pub points: Vec<[S; 2]>,

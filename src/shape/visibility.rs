@@ -42,7 +42,7 @@ pub struct Visibility {
     pub tag_tolerance: Tolerance,
     /// The largest error of the camera's calibrated pose on the robot; the rotation error is about any axis.
     pub mount_tolerance: Tolerance,
-    /// The resolution at which the tag must be seen. `f b cos psi / d`, with the smaller focal length and the width b
+    /// The resolution at which the tag must be seen; `None` for any. `f b cos psi / d`, with the smaller focal length and the width b
     /// of a bit, is no more than the width of any bit at the tag's centre in a pinhole's image.
     pub sharpness: Option<Sharpness>,
     /// The part of the allowed error r of S_l(r) that is left for the error that tolerances add to an observation

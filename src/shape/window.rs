@@ -23,7 +23,7 @@ impl Window {
         Self { planes, count: 1 }
     };
 
-    /// Creates the window of the points on the right side of every plane. Empty if there are no planes
+    /// Creates the window of the points with `a x + b y + c >= 0` for every plane. Empty if there are no planes
     /// or too many, or if one of their numbers is not finite.
     #[must_use]
     pub fn of_planes(planes: &[[f64; 3]]) -> Self {

@@ -109,8 +109,7 @@ pub struct Pixel {
 
 /// The view of a tag from a pose.
 ///
-/// The answer is a bound. The other fields are for telemetry, each within the stated error of its true value. None of
-/// them is used in the answer.
+/// The answer is a bound. The other fields are for telemetry only, each within the stated error of its true value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use]
@@ -132,6 +131,6 @@ pub struct Sighting {
     /// Cosine of the angle between the optical axis and the ray to the tag, 2^-30, within `11 um / d` and 2^-28. 0 if
     /// there is no angle: the tag is in the camera's centre, or more than 110 m away.
     pub cos_phi_q30: i32,
-    /// Cosine of the angle between the tag's normal and the ray to the camera, likewise.
+    /// Cosine of the angle between the tag's normal and the ray to the camera, as [`Self::cos_phi_q30`].
     pub cos_psi_q30: i32,
 }

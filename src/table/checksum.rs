@@ -28,7 +28,7 @@ const fn of_four_bits() -> [u32; 16] {
     table
 }
 
-/// Returns the checksum of a table: the CRC-32C of the bytes.
+/// Returns the CRC-32C of bytes. A table ends with that of its other bytes.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {
     checksum_continued(0, bytes)

@@ -235,7 +235,7 @@ impl<'a> Facets<'a> {
         self.unit
     }
 
-    /// Returns the reach, length units: an estimate farther than this from the goal on an axis is not
+    /// Returns the reach, length units: an estimate farther than this from the goal on a world axis is not
     /// inside.
     #[must_use]
     pub const fn reach(&self) -> u16 {

@@ -176,7 +176,7 @@ impl PoseErrorSet {
     }
 
     /// Creates the knowledge that the error is normally distributed with this covariance (world axes; m^2, m rad,
-    /// rad^2).
+    /// rad^2). `risk` is one minus the confidence of the radius.
     ///
     /// # Errors
     /// Those of [`PoseSet::gaussian`] that concern the covariance.

@@ -73,7 +73,7 @@ impl Increment {
         })
     }
 
-    /// Returns the times of its beginning and its end, milliseconds of the controller's clock.
+    /// Returns the times of the movement's beginning and end, milliseconds of the controller's clock.
     #[must_use]
     pub const fn span_ms(&self) -> [u32; 2] {
         [self.begins_ms, self.step.stamp_ms]

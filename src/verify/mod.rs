@@ -68,7 +68,7 @@ pub struct ExpectedTable<'a> {
     pub task: &'a str,
     /// The task's success set and goal.
     pub success: &'a SuccessSet,
-    /// The site's confidence.
+    /// The site's confidence, in (0, 1).
     pub epsilon: f64,
     /// SHA-256 of the site file.
     pub site_digest: [u8; 32],

@@ -10,13 +10,13 @@ use rayon::prelude::*;
 const HEADINGS: i64 = 720;
 const LINES: i32 = 1_500;
 
-/// The volumes that a table's cells and its facets cover, m^2 rad. For the grid it is the sum of its cells;
-/// for facets an integral over lines, accurate to about 1 in 10,000.
+/// The volumes of a table's cells and facets. The cells are summed; the facets are integrated over lines, accurate to
+/// about 1 in 10,000.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
-    /// Volume of the grid, if there is one.
+    /// Volume of the grid, m^2 rad; `None` without a grid.
     pub cells: Option<f64>,
-    /// Volume of the facets, if there are any.
+    /// Volume of the facets, m^2 rad; `None` without facets.
     pub facets: Option<f64>,
 }
 

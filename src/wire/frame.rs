@@ -6,7 +6,7 @@ use crate::table::checksum;
 use heapless::Vec;
 
 /// Returns the frame of a body of at most [`LONGEST_BODY`] bytes, with the closing zero. For a longer body
-/// it is empty.
+/// the frame is empty.
 #[must_use]
 pub fn encode(body: &[u8]) -> Frame {
     // The body is not cut, because the checksum can hold for a cut body: after four bytes 0xff it does not

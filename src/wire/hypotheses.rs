@@ -18,7 +18,7 @@ const COUNTED: u8 = 0x20;
 const OTHERS: usize = MOST_HYPOTHESES - 1;
 
 /// Returns the body of the message that carries hypothesis `number`, from 1 to 7: the report with the hypothesis as its estimate. Send
-/// them in order, before the report. `None` for another number.
+/// hypotheses in order, before the report. `None` for another number.
 #[must_use]
 pub fn hypothesis_body(number: u8, report: &Report) -> Option<Vec<u8, LONGEST_BODY>> {
     typed(HYPOTHESIS, number, report)

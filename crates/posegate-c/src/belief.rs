@@ -11,9 +11,9 @@ use posegate::set::Uncertainty;
 pub enum posegate_heading {
     /// `heading[0]` is the yaw, radians, counter-clockwise.
     Yaw = 1,
-    /// `heading[0..2]` are roll, pitch, yaw about fixed axes, radians; a tilt above 5 degrees denies.
+    /// `heading[0]` to `heading[2]` are roll, pitch, yaw about fixed axes, radians; a tilt above 5 degrees denies.
     RollPitchYaw = 2,
-    /// `heading[0..3]` are x, y, z, w of a unit quaternion; a tilt above 5 degrees denies.
+    /// `heading[0]` to `heading[3]` are x, y, z, w of a unit quaternion; a tilt above 5 degrees denies.
     Quaternion = 3,
 }
 
@@ -21,8 +21,8 @@ pub enum posegate_heading {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_spread {
-    /// `spread[0..8]` is the covariance of x, y, yaw by rows, in the axes of the report's frame: m^2, m rad,
-    /// rad^2.
+    /// `spread[0]` to `spread[8]` are the covariance of x, y, yaw by rows, in the axes of the report's frame: m^2,
+    /// m rad, rad^2.
     Gaussian = 1,
     /// `spread[0]` bounds the distance, metres; `spread[1]` the yaw, radians.
     Bounded = 2,
@@ -66,7 +66,7 @@ pub struct posegate_ros_pose {
     pub position: [f64; 3],
     /// `pose.orientation`: x, y, z, w.
     pub orientation: [f64; 4],
-    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z.
+    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2.
     pub covariance: [f64; 36],
 }
 
@@ -74,11 +74,11 @@ pub struct posegate_ros_pose {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_mavlink_odometry {
-    /// x, y, z, metres.
+    /// x, y, z in the message's axes, metres.
     pub position: [f32; 3],
     /// The orientation: a quaternion w, x, y, z.
     pub q: [f32; 4],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub pose_covariance: [f32; 21],
 }
 
@@ -86,11 +86,11 @@ pub struct posegate_mavlink_odometry {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_mavlink_vision {
-    /// x, y, z, metres.
+    /// x, y, z in the message's axes, metres.
     pub position: [f32; 3],
     /// Roll, pitch, yaw, radians.
     pub angles: [f32; 3],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw; NaN in the first entry means unknown.
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub covariance: [f32; 21],
 }
 
@@ -98,11 +98,11 @@ pub struct posegate_mavlink_vision {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_compact {
-    /// x, metres.
+    /// x, metres, in the report's frame.
     pub x_m: f32,
-    /// y, metres.
+    /// y, metres, in the report's frame.
     pub y_m: f32,
-    /// Yaw, radians.
+    /// Yaw, radians, counter-clockwise.
     pub yaw_rad: f32,
     /// Covariance of x with x, m^2.
     pub xx: f32,
@@ -251,6 +251,8 @@ pub unsafe extern "C" fn posegate_belief_from_ros(
 
 /// Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
 ///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if `axes` is not in its enum.
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -273,6 +275,8 @@ pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
 
 /// Converts a MAVLink `VISION_POSITION_ESTIMATE` to an estimate in axes with z up; `axes` is a
 /// `posegate_axes`.
+///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if `axes` is not in its enum.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.

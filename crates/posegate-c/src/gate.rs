@@ -20,7 +20,7 @@ use posegate::table::checksum_continued;
 
 /// Number of 64-bit words of a `posegate_gate`.
 pub const POSEGATE_GATE_WORDS: usize = 60;
-/// Pointers of a `posegate_gate`.
+/// Number of pointers of a `posegate_gate`.
 pub const POSEGATE_GATE_POINTERS: usize = 24;
 
 /// Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.
@@ -369,7 +369,8 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 /// and restore it, and no other code may ever write to it, not even before another
 /// `posegate_gate_init`. Table and counter must not share memory with an argument of any later call.
 ///
-/// Errors: the setting that would switch a check off. The storage then holds no gate, and its functions deny.
+/// Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
+/// gate, and its functions deny.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be

@@ -10,7 +10,7 @@ use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncerta
 
 /// Number of 64-bit words of a `posegate_judge`.
 pub const POSEGATE_JUDGE_WORDS: usize = 20;
-/// Pointers of a `posegate_judge`.
+/// Number of pointers of a `posegate_judge`.
 pub const POSEGATE_JUDGE_POINTERS: usize = 12;
 
 /// For recordings and benches only. A controller that drives an interlock uses a `posegate_gate`: a judge does not wait

@@ -42,8 +42,8 @@ pub enum posegate_model {
     Holds = 0,
     /// The logarithm of the evidence has reached half of the limit for a contradiction: check camera and tags soon.
     InDoubt = 1,
-    /// It is contradicted: keep the gate closed (`posegate_gate_inhibit` with `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until
-    /// the cause was removed and `posegate_monitor_reset` was called.
+    /// The fixes contradict the model: keep the gate closed (`posegate_gate_inhibit` with
+    /// `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until the cause was removed and `posegate_monitor_reset` was called.
     Contradicted = 2,
 }
 

@@ -51,9 +51,9 @@ impl posegate_permission {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct posegate_pose {
-    /// x, micrometres.
+    /// x, micrometres, world frame.
     pub x_um: i32,
-    /// y, micrometres.
+    /// y, micrometres, world frame.
     pub y_um: i32,
     /// Yaw, 2^-32 turn, counter-clockwise from the x axis.
     pub yaw_turn_q32: u32,

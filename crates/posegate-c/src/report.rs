@@ -13,7 +13,7 @@ pub struct posegate_report {
     pub belief: posegate_belief,
     /// The frame of the estimate, from `posegate_frame_id`.
     pub frame: u64,
-    /// The index in the settings of the source that sent the report.
+    /// The index, in `posegate_settings.sources`, of the source that sent the report.
     pub source: u32,
     /// The source's count of its reports: one more each time, wrapping.
     pub sequence: u32,

@@ -40,9 +40,10 @@ pub enum posegate_restart {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum posegate_motion {
-    /// It does not move, because other means ensure it, such as brakes that the same output releases. Its speeds are ignored.
+    /// The robot does not move. Other means must ensure this, such as brakes that the same output releases. The source's
+    /// speeds are ignored.
     StandsStill = 1,
-    /// It moves within the speeds of the source.
+    /// The robot moves within the speeds of the source.
     Moves = 2,
 }
 
@@ -81,9 +82,9 @@ pub struct posegate_source {
     /// The largest speed along the robot's axis, m/s, in either direction. Every possible movement counts, also without a
     /// command.
     pub along_m_s: f64,
-    /// The largest speed across the robot's axis, m/s.
+    /// The largest speed across the robot's axis, m/s, in either direction.
     pub across_m_s: f64,
-    /// The largest turn rate, rad/s.
+    /// The largest turn rate, rad/s, in either direction.
     pub turn_rad_s: f64,
     /// Smaller inflations for estimates soon after a fix (`posegate_evidence.since_fix_ms`), the youngest first; all zero if one factor is
     /// used. A tracker does not use them.

@@ -318,6 +318,8 @@ pub unsafe extern "C" fn posegate_request_judge(
 
 /// Encodes the body of a reply.
 ///
+/// Errors: `POSEGATE_STATUS_BAD_VALUE` if a number of the reply is not in its enum or out of its range.
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]

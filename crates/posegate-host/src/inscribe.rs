@@ -19,9 +19,9 @@ use posegate::shape::SuccessSet;
 /// A box in the frame of the goal. It contains the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InscribedBox {
-    /// `[lo, hi]`, metres: multiples of 0.1 mm.
+    /// `[lo, hi]` in the goal frame, metres: multiples of 0.1 mm.
     pub x: [f64; 2],
-    /// `[lo, hi]`, metres: multiples of 0.1 mm.
+    /// `[lo, hi]` in the goal frame, metres: multiples of 0.1 mm.
     pub y: [f64; 2],
     /// `[lo, hi]`, degrees: multiples of 0.01 degrees.
     pub yaw_deg: [f64; 2],

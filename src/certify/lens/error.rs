@@ -15,13 +15,13 @@ pub enum LensError {
     /// The region of interest reaches beyond the image.
     #[error("the roi reaches to ({right} px, {bottom} px), the image to ({width} px, {height} px)")]
     Roi {
-        /// Column of its end.
+        /// Right end of the region, pixels.
         right: f64,
-        /// Row of its end.
+        /// Lower end of the region, pixels.
         bottom: f64,
-        /// The image's width.
+        /// The image's width, pixels.
         width: f64,
-        /// The image's height.
+        /// The image's height, pixels.
         height: f64,
     },
     /// The border is as large as the image.
@@ -42,9 +42,9 @@ pub enum LensError {
         "the distortion folds at {fold_px:.1} px from the optical axis, the image reaches {image_px:.1} px"
     )]
     Folds {
-        /// Distance of the fold from the optical axis towards that corner, pixels.
+        /// Distance of the fold from the optical axis, pixels.
         fold_px: f64,
-        /// Distance of the corner from the optical axis, pixels.
+        /// Largest distance of the image's border from the optical axis, pixels.
         image_px: f64,
     },
     /// The detector's image contains no point that the lens maps into the raw image.
@@ -52,7 +52,7 @@ pub enum LensError {
         "the image shows nothing that is within {field:.3} of the optical axis (the tangent of the angle)"
     )]
     Nothing {
-        /// The field's radius.
+        /// Radius of the field: a tangent.
         field: f64,
     },
     /// No window was proven.

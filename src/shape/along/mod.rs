@@ -27,7 +27,7 @@ const EACH: u32 = 4096;
 /// A line segment of positions in the goal frame: `from + t way`, t from 0 to `length`.
 #[derive(Clone, Copy, Debug)]
 pub struct LineSegment {
-    /// Start, metres.
+    /// Start, metres, goal frame.
     pub from: [f64; 2],
     /// Direction; `t` is in units of its length.
     pub way: [f64; 2],

@@ -6,11 +6,11 @@ pub const OPEN: u32 = u32::MAX;
 /// An interval of a line, in units of the line's direction vector, and the constraints that end it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineInterval {
-    /// Least `t`.
+    /// Least `t`, in units of the direction vector.
     pub from: f64,
     /// Largest `t`.
     pub to: f64,
-    /// Numbers of the constraints at its ends, or [`OPEN`].
+    /// Numbers of the constraints at the interval's ends, or [`OPEN`].
     pub ended_by: [u32; 2],
 }
 

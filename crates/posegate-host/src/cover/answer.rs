@@ -9,7 +9,7 @@ use crate::site::{Site, SiteTag};
 /// Options of a cover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoverOptions {
-    /// The start chain of tasks without a `from`.
+    /// The start chain of tasks without a `from`; `None` if each task has one.
     pub from: Option<String>,
     /// `true` if every task must keep a plan when any single tag is not seen.
     pub survive_a_lost_tag: bool,
@@ -17,7 +17,7 @@ pub struct CoverOptions {
     pub method: Method,
     /// Allowed relative gap between the cost and the bound, at least 0.
     pub gap: f64,
-    /// The search ends after this time, seconds, but not before the greedy choice is complete. (With a limit, the
+    /// The search ends after this time, seconds, but not before the greedy choice is complete; `None` for no limit. (With a limit, the
     /// answer may depend on the machine.)
     pub time_limit: Option<f64>,
     /// The looks of a task's chain are from places at most this far from the straight line between its start and its
@@ -73,7 +73,7 @@ pub struct Incumbent {
     pub cost: f64,
     /// A proven lower bound of the cost of any choice.
     pub bound: f64,
-    /// Seconds since the beginning.
+    /// Seconds since the search began.
     pub seconds: f64,
 }
 
@@ -166,7 +166,7 @@ pub struct TaskCoverage {
     pub alone: usize,
     /// The plan on the site with the chosen tags, or the reason why there is none.
     pub planned: PlanResult,
-    /// The reason why the task is not served.
+    /// The reason why the task is not served; `None` if it is.
     pub reason: Option<String>,
 }
 

@@ -53,7 +53,7 @@ pub struct TagFinding {
     pub name: String,
     /// The tag's number, size and pose.
     pub tag: Tag,
-    /// The heading of its face, degrees in (-180, 180], and its elevation.
+    /// The direction of the tag's face in the world: heading, in (-180, 180], and elevation; degrees.
     pub faces_deg: [f64; 2],
     /// The views of the tag, from the goal of every task by every camera.
     pub looks: Vec<Look>,
@@ -80,9 +80,9 @@ pub struct CameraFinding {
     pub name: String,
     /// The camera's pose on the robot.
     pub mount: Pose3Deg,
-    /// The camera's viewing direction on the robot: the heading, degrees in (-180, 180], and the elevation.
+    /// The camera's viewing direction on the robot: heading, in (-180, 180], and elevation; degrees.
     pub looks_deg: [f64; 2],
-    /// The z components of the camera's unit axes forward, left and up.
+    /// The z components, in the robot's frame, of the camera's unit axes forward, left and up.
     pub rises: [f64; 3],
 }
 

@@ -39,7 +39,7 @@ impl PoseSetF64 {
         }
     }
 
-    /// Returns the set's extents along x, y and yaw: m, m, rad.
+    /// Returns the set's half extents along x, y and yaw, world axes: m, m, rad.
     #[must_use]
     pub fn extents(&self) -> [f64; 3] {
         match self.spread {
@@ -57,8 +57,8 @@ impl PoseSetF64 {
         f64::from(self.radius_squared.q16()) / 65_536.0
     }
 
-    /// Returns the border of the section at a heading of the world, counter-clockwise; `None` if the set
-    /// does not contain that heading.
+    /// Returns the border of the section at a world heading (rad): points in the world, metres, counter-clockwise. `None`
+    /// if the set does not contain that heading.
     #[must_use]
     pub fn section(&self, yaw: f64) -> Option<Vec<[f64; 2]>> {
         let turn = core::f64::consts::TAU;
@@ -94,7 +94,7 @@ impl PoseSetF64 {
         }
     }
 
-    /// Returns poses of the set: its estimate, its border, and rings between them.
+    /// Returns poses of the set (world; m, m, rad): the estimate, the border, and rings between them.
     #[must_use]
     pub fn poses(&self) -> Vec<[f64; 3]> {
         let mut poses = std::vec![self.estimate];
@@ -108,7 +108,7 @@ impl PoseSetF64 {
         poses
     }
 
-    /// Returns poses on the set's border.
+    /// Returns poses on the set's border (world; m, m, rad).
     #[must_use]
     pub fn border(&self) -> Vec<[f64; 3]> {
         let [x, y, yaw] = self.estimate;

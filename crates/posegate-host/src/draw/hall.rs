@@ -21,7 +21,7 @@ const LOOK: Style = Style::outlined("#0072b2", 1.4)
     .dashed("4 2");
 const SIGHT: Style = Style::outlined("#444444", 1.0).dashed("1 3");
 
-/// Returns the success set of a task or of a look that the planner made.
+/// Returns the success set of a task or of a look that the planner made; `None` for another name.
 pub fn success_of<'s>(site: &'s Site, name: &str) -> Option<&'s SuccessSet> {
     let made = site.planner.looks.get(name).map(|look| &look.success);
     let own = site.tasks.get(name).map(|task| &task.success);

@@ -16,7 +16,7 @@ use posegate::shape::{PoseDeg, SuccessSet, Visibility};
 /// A tag at a place.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// The heading of the column.
+    /// The title of the column.
     pub heading: String,
     /// The success set with the tag there.
     pub set: SuccessSet,

@@ -24,7 +24,7 @@ pub struct Subject<'a> {
     pub task: &'a Task,
     /// The task's set, prepared for evaluation.
     pub depth: SlackEvaluator,
-    /// The task's table.
+    /// The task's table; `None` if none was added.
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
     pub beliefs: Vec<PoseSetF64>,
@@ -191,7 +191,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Returns the border of the set at a heading of the goal frame, degrees.
+    /// Returns the border of the set at a heading of the goal frame (degrees): polygons in that frame, metres, found on
+    /// a lattice of `spacing` metres.
     #[must_use]
     pub fn section(&self, yaw_deg: f64, window: &Window, spacing: f64) -> Vec<Vec<[f64; 2]>> {
         let yaw = (self.goal().yaw_deg + yaw_deg).to_radians();
@@ -208,7 +209,7 @@ impl<'a> Subject<'a> {
         self.task.success.goal
     }
 
-    /// Converts a point of the goal frame to the world.
+    /// Converts a point of the goal frame to the world, metres.
     #[must_use]
     pub fn in_world(&self, point: [f64; 2]) -> [f64; 2] {
         let PoseDeg { x, y, yaw_deg } = self.goal();
@@ -216,14 +217,14 @@ impl<'a> Subject<'a> {
         Planar { x, y, cos, sin }.to_goal(point)
     }
 
-    /// Converts a point of the world to the goal frame.
+    /// Converts a point of the world to the goal frame, metres.
     #[must_use]
     pub fn in_goal(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [x, y, _] = self.task.success.to_goal([x, y, 0.0]);
         [x, y]
     }
 
-    /// Returns the window of the goal frame to draw, and the range of headings in degrees: the extent of
+    /// Returns the window of the goal frame to draw (metres), and the range of headings in degrees: the extent of
     /// the task's table, limited to the set, and widened for the pose-sets.
     ///
     /// # Errors

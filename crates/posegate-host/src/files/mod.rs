@@ -91,8 +91,8 @@ impl Files {
     /// Declares an argument that will be read.
     ///
     /// # Errors
-    /// [`FileError::ReplacesInput`] if it is a declared output, [`FileError::StandardInputTwice`] if it is the second
-    /// standard input.
+    /// [`FileError::ReplacesInput`] if the input is a declared output, [`FileError::StandardInputTwice`] if it is the
+    /// second standard input.
     pub fn declare_input(&self, input: &Input) -> Result<(), FileError> {
         if input.is_standard() {
             let mut known = self.known.borrow_mut();
@@ -107,7 +107,7 @@ impl Files {
     /// Declares an argument that will be written.
     ///
     /// # Errors
-    /// [`FileError::ReplacesInput`] if it is an input, [`FileError::OneForTwo`] if it is another output.
+    /// [`FileError::ReplacesInput`] if the output is an input, [`FileError::OneForTwo`] if it is another output.
     pub fn declare_output(&self, output: &Output) -> Result<(), FileError> {
         let output = target(output.as_path());
         self.check(&output)?;
@@ -196,10 +196,10 @@ impl Files {
         })
     }
 
-    /// Reads a complete input, up to the limit of a file. Returns its bytes and its name for messages.
+    /// Reads a complete input of at most 256 MiB. Returns its bytes and its name for messages.
     ///
     /// # Errors
-    /// As [`Files::open`].
+    /// As [`Files::open`]; [`FileError::Unread`] also if the input is longer.
     pub fn read(&self, input: &Input) -> Result<(Vec<u8>, String), FileError> {
         let opened = self.open(input)?;
         match input::read_from(opened.reader, Limit::FILE) {

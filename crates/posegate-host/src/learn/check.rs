@@ -55,7 +55,7 @@ pub struct BoundCheck {
     pub held: f64,
     /// The largest value of the bet against the bound.
     pub e_value: f64,
-    /// The number of rows after which this bet alone contradicts the bound.
+    /// The number of rows after which this bet alone contradicts the bound; `None` if it does not.
     pub after_rows: Option<u64>,
     /// The row at which a change is most likely, from 1; `None` if the bet never won.
     pub since_row: Option<u64>,
@@ -72,7 +72,7 @@ pub struct RegionCheck {
     pub translation: BoundCheck,
     /// The bound on the yaw.
     pub yaw: BoundCheck,
-    /// The kind of change, if one of its bounds is contradicted.
+    /// The kind of change; `None` if neither bound of the region is contradicted.
     pub looks_like: Option<Change>,
 }
 
@@ -87,7 +87,7 @@ pub struct DetectionCheck {
     pub expected: f64,
     /// The largest value of the bet against the expected share.
     pub e_value: f64,
-    /// The number of rows after which the share is contradicted.
+    /// The number of rows after which the share is contradicted; `None` if it is not.
     pub after_rows: Option<u64>,
 }
 

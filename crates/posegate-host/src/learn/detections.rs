@@ -61,7 +61,7 @@ impl Detections {
     /// The bounds are valid for that pose, in a gate that uses both poses as hypotheses.
     ///
     /// # Errors
-    /// The first invalid field, with its line and column; a file without rows.
+    /// A missing column; the first invalid field, with its line and column; a file without rows.
     pub fn read(bytes: &[u8], file: &str) -> Result<Self, LearnError> {
         Self::drawn(bytes, file, usize::MAX, 0)
     }
@@ -176,7 +176,7 @@ fn errors(line: &Line<'_>, [translation, yaw]: [Column; 2]) -> Result<[f64; 2], 
 /// Reads the places `d_m, phi_deg, psi_deg` for which a model is evaluated ([`Detection::at`]).
 ///
 /// # Errors
-/// The first invalid field, with its line and column.
+/// A missing column; the first invalid field, with its line and column.
 pub fn places(bytes: &[u8], file: &str) -> Result<Vec<[f64; 3]>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
     let mut columns = Vec::new();

@@ -254,7 +254,7 @@ impl ErrorModel {
         self.document.data.of_better_pose
     }
 
-    /// Returns the number of rows in the file if the views were drawn from more rows.
+    /// Returns the number of rows in the file; `None` if no rows were left out by drawing.
     #[must_use]
     pub fn drawn_of(&self) -> Option<u64> {
         self.document.data.drawn_of
@@ -283,7 +283,7 @@ impl ErrorModel {
         })
     }
 
-    /// Returns the index of the region at a distance (m) and angles (degrees).
+    /// Returns the index of the region at a distance (m) and angles (degrees); `None` if it is in no region.
     #[must_use]
     pub fn region_deg(&self, at: [f64; 3]) -> Option<usize> {
         let coarse = self.cells.coarse_of(self.cells.cell(at)?);

@@ -32,7 +32,7 @@ pub struct Scored {
     pub condition: f64,
     /// The run of the row, of one robot or source. Rows of a run are consecutive in time.
     pub run: u32,
-    /// The index of its group in [`ScoredEstimates::groups`].
+    /// The index of the row's group in [`ScoredEstimates::groups`].
     pub group: u32,
 }
 
@@ -41,7 +41,7 @@ pub struct Scored {
 pub struct ScoredEstimates {
     /// Rows with a possible covariance: run by run, each in order of time, or of the file if it has no times.
     pub rows: Vec<Scored>,
-    /// The lines of rows with an impossible covariance.
+    /// The lines of rows with an impossible covariance, or with a condition that is not finite.
     pub impossible: Vec<u64>,
     /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     pub condition: String,
@@ -65,7 +65,7 @@ impl ScoredEstimates {
     /// `t_s`. The groups are the robots, or else the runs.
     ///
     /// # Errors
-    /// The first invalid field, with its line and column; a file without rows.
+    /// A missing column; the first invalid field, with its line and column; a file without rows.
     pub fn read(bytes: &[u8], file: &str, condition: Option<&str>) -> Result<Self, LearnError> {
         let mut sheet = Sheet::new(bytes, file)?;
         let all: Vec<&str> = POSES.iter().chain(&COVARIANCE).copied().collect();
@@ -160,7 +160,7 @@ impl ScoredEstimates {
 /// the file has no column for it.
 ///
 /// # Errors
-/// The first invalid field, with its line and column.
+/// A missing column; the first invalid field, with its line and column.
 pub fn conditions(
     bytes: &[u8],
     file: &str,

@@ -7,7 +7,7 @@ use super::sheet::Sheet;
 /// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` if that column exists.
 ///
 /// # Errors
-/// The first invalid field, with its line and column; a file without rows.
+/// A missing column; the first invalid field, with its line and column; a file without rows.
 pub fn outcomes(bytes: &[u8], file: &str) -> Result<Vec<bool>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
     let success = sheet.needed("success", &["success"])?;
@@ -41,9 +41,10 @@ pub struct OutcomesReport {
     pub limits: [f64; 2],
     /// The value of the bet against the claim after the last docking.
     pub e_value: f64,
-    /// The largest value of the bet.
+    /// The largest value of the bet against the claim.
     pub largest_e_value: f64,
-    /// The number of dockings after which the bet first reached `1 / alpha`: the claim is contradicted.
+    /// The number of dockings after which the bet first reached `1 / alpha`: the claim is contradicted. `None` if
+    /// it never did.
     pub contradicted_at: Option<u64>,
 }
 

@@ -54,19 +54,20 @@ pub struct OffsetReport {
     pub kind: Surveyed,
     /// The object's name.
     pub name: String,
-    /// Dockings with it.
+    /// Number of dockings with the object.
     pub dockings: u64,
     /// The true place minus that of the site file: x, y (m, world axes), yaw (rad). `None` if there are too few dockings.
     pub offset: Option<[f64; 3]>,
-    /// Half the extent of the confidence region of the offset along each of x, y and yaw. `None` if there are too few dockings, or if their
-    /// offsets do not scatter independently in x, y and yaw: such numbers are not measurements, and the offset is not tested.
+    /// Half the extent of the confidence region of the offset along each of x, y (m, world axes) and yaw (rad). `None`
+    /// if there are too few dockings, or if their offsets do not scatter independently in x, y and yaw: such numbers are
+    /// not measurements, and the offset is not tested.
     pub region: Option<[f64; 3]>,
-    /// Hotelling's statistic of the offset over the limit beyond which it is significant; above 1 if it is.
+    /// Hotelling's statistic of the offset over the limit beyond which the offset is significant: significant above 1.
     pub significance: f64,
     /// `true` if the object must be surveyed again: its offset is significant, and explains the looks better than any
     /// other.
     pub stale: bool,
-    /// Other objects whose offset explains the looks equally well, because they were only seen together.
+    /// Other objects whose offset explains the looks equally well, because the objects were only seen together.
     pub or: Vec<(Surveyed, String)>,
 }
 
@@ -75,7 +76,7 @@ pub struct OffsetReport {
 /// look at that tag.
 ///
 /// # Errors
-/// The first invalid field, with its line and column; a dock or a tag that the site does not have; a file without rows.
+/// A missing column; the first invalid field, with its line and column; a dock or a tag that the site does not have; a file without rows.
 pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>, LearnError> {
     const ALL: [&str; 6] = ["run", "dock", "tag", "x_m", "y_m", "yaw_rad"];
     let mut sheet = Sheet::new(bytes, file)?;
@@ -124,7 +125,7 @@ pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>,
 /// file, any object is stale with a probability of at most 1 - `confidence`.
 ///
 /// A dock's offset in a docking is the mean over its looks of the localized pose minus the goal. A tag's offset is
-/// the displacement of the tag, in its own frame, that explains the difference. Each is tested by Hotelling's
+/// the displacement of the tag, in world axes, that explains the difference. Each is tested by Hotelling's
 /// T-squared test over dockings, with the error divided by the number of docks and tags. This assumes independent
 /// dockings, whose errors are normal and have no mean: neither a bias of the camera, nor play on one side of the
 /// dock.

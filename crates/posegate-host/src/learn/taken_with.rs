@@ -9,22 +9,22 @@ pub struct TakenWith {
     /// The camera's name, for people. Not compared: another site may give it another name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
-    /// The focal length along a row, pixels.
+    /// The focal length along a row, pixels; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fx: Option<f64>,
-    /// The focal length along a column, pixels.
+    /// The focal length along a column, pixels; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fy: Option<f64>,
-    /// Width and height of the image, pixels.
+    /// Width and height of the image, pixels; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<[f64; 2]>,
-    /// The model of the lens, as ROS names it; `none` without distortion.
+    /// The model of the lens, as ROS names it; `none` without distortion. `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<String>,
-    /// The width of the tags, metres: of the border that detectors measure.
+    /// The width of the tags, metres: of the border that detectors measure. `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_size: Option<f64>,
-    /// The family of the tags, as detectors name it.
+    /// The family of the tags, as detectors name it; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub family: Option<String>,
 }

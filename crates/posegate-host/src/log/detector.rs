@@ -64,13 +64,13 @@ pub struct CameraInfo {
     pub height: u32,
     /// `plumb_bob`, `rational_polynomial` or `equidistant`; empty without distortion.
     pub distortion_model: String,
-    /// The coefficients of the model.
+    /// The coefficients of the model, in ROS's order.
     pub d: Vec<f64>,
-    /// The raw camera's matrix by rows.
+    /// The raw camera's matrix by rows, pixels.
     pub k: [f64; 9],
     /// The rectification matrix by rows; zeros for the identity.
     pub r: [f64; 9],
-    /// The rectified image's projection matrix by rows; zeros if it is that of the raw image.
+    /// The rectified image's projection matrix by rows, pixels; zeros if it is that of the raw image.
     pub p: [f64; 12],
     /// Columns and rows that are combined into one pixel; 0 means 1.
     pub binning: [u32; 2],

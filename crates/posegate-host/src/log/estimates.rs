@@ -23,17 +23,17 @@ pub enum Columns {
 /// One row of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Time in seconds; `None` if there is no such column.
+    /// Time of the estimate, seconds; `None` if there is no such column.
     pub t_s: Option<f64>,
-    /// Time at which the estimate is used, seconds.
+    /// Time at which the estimate is used, seconds; `None` if there is no such column.
     pub now_s: Option<f64>,
     /// The estimate.
     pub estimate: Estimate,
-    /// Covariance of (x, y, yaw) by rows; all NaN if it was not read.
+    /// Covariance of (x, y, yaw) by rows, world axes: m^2, m rad, rad^2. All NaN if it was not read.
     pub covariance: [[f64; 3]; 3],
-    /// The true pose (m, m, rad), if given.
+    /// The true pose in the world (m, m, rad), if given.
     pub truth: Option<[f64; 3]>,
-    /// The number of the row within its report; `None` if there is no such column.
+    /// The number of the row within its report, from 0; `None` if there is no such column.
     pub hypothesis: Option<u64>,
     /// The time since the last fix, seconds; `None` if the reader has no column for it or the field is empty.
     pub since_fix_s: Option<f64>,

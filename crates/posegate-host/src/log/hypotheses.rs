@@ -6,7 +6,7 @@
 use super::{LogError, Row};
 use std::ops::Range;
 
-/// Largest number of hypotheses of a report.
+/// Largest number of hypotheses of a report, its own estimate included.
 pub const MOST_HYPOTHESES: usize = 8;
 
 /// Returns the rows of each report. Without a column `hypothesis` every row is a report of its own. With it a report

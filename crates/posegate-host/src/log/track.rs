@@ -53,7 +53,7 @@ impl Trajectory {
         track
     }
 
-    /// Adds a pose. A pose that is not finite, or not later than the last, is left out and counted.
+    /// Adds a pose: x, y (m), yaw (rad). A pose that is not finite, or not later than the last, is left out and counted.
     pub fn push(&mut self, t_s: f64, pose: [f64; 3]) {
         let later = self.poses.back().is_none_or(|(last, _)| t_s > *last);
         if !(later && t_s.is_finite() && pose.iter().all(|value| value.is_finite())) {

@@ -68,7 +68,8 @@ impl Gaussian {
     /// Creates a pose-set from the standard deviations of x, y (metres) and yaw (radians), and its confidence.
     ///
     /// # Errors
-    /// An error if a sigma is not above zero, epsilon is not between 0 and 1, or the headings cover too many turns.
+    /// An error if a sigma is not above zero, epsilon is not between 0 and 1, or the headings cover more
+    /// than 64 turns.
     pub fn of_sigmas(sigmas: [f64; 3], epsilon: f64) -> Result<Self, GaussianError> {
         for (axis, sigma) in ["x", "y", "yaw"].into_iter().zip(sigmas) {
             if !(sigma > 0.0 && (sigma * sigma).is_normal()) {

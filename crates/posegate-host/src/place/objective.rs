@@ -63,7 +63,7 @@ pub trait ViewCost: Sync {
     /// as a miss, in the mean and in the probability of a miss.
     fn of_view(&self, view: [f64; 3]) -> f64;
 
-    /// The cost of a pose outside S.
+    /// Returns the cost of a pose outside S.
     fn of_miss(&self) -> f64;
 
     /// Returns `true` if the cost of every view is known to be finite.

@@ -5,11 +5,11 @@
 pub struct Quadrature {
     /// The relative error to reach.
     pub accuracy: f64,
-    /// Largest number of headings evaluated. If it is not enough, the reported error is larger than the one to
+    /// Largest number of headings evaluated. If they are not enough, the reported error is larger than the one to
     /// reach.
     pub headings: u32,
     /// The number of evaluated views after which no more headings or rays are added; those that were started are
-    /// finished. If it is not enough, the reported error is larger than the requested one.
+    /// finished. If the views are not enough, the reported error is larger than the requested one.
     pub views: u64,
 }
 

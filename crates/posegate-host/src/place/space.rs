@@ -92,10 +92,10 @@ impl Space {
         Ok(space)
     }
 
-    /// Creates the space of a wall, for a tag that is `whole` wide with its white border
-    /// ([`Family`](posegate::shape::Family)). A wall of two corners is used on the side of the point `front`, a block
+    /// Creates the space of a wall, for a tag of edge `size` (m), `whole` (m) wide with its white border
+    /// ([`Family`](posegate::shape::Family)). A wall of two corners is used on the side of the world point `front` (m), a block
     /// on every face. The complete tag is on one face, and on no keep-out. `heights` limits the heights of the tag's
-    /// centre.
+    /// centre, `[lo, hi]` in metres.
     ///
     /// # Errors
     /// [`SpaceError::NoSpace`] if the tag fits nowhere.

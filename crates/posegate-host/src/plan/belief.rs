@@ -19,7 +19,7 @@ pub struct BeliefStateF64 {
     pub certain: [f64; 2],
     /// The probability that the error exceeds `certain`.
     pub doubt: f64,
-    /// The normally distributed part of the error.
+    /// The normally distributed part of the error; `None` if there is no such part.
     pub random: Option<Random>,
 }
 
@@ -60,7 +60,7 @@ impl BeliefStateF64 {
         }
     }
 
-    /// Returns the cylinder that encloses the complete error: translation, yaw.
+    /// Returns the cylinder that encloses the complete error: translation (m), yaw (rad).
     #[must_use]
     pub fn enclosing(&self) -> [f64; 2] {
         let [rho, alpha] = self.certain;
@@ -82,7 +82,7 @@ impl BeliefStateF64 {
         self.doubt + self.random.as_ref().map_or(0.0, |r| 1.0 - r.epsilon)
     }
 
-    /// Returns the belief after a localization with this error bound.
+    /// Returns the belief after a localization with this error bound: translation (m), yaw (rad).
     #[must_use]
     pub fn localized(&self, [translation, yaw]: [f64; 2]) -> Self {
         let [rho, alpha] = self.enclosing();
@@ -98,7 +98,7 @@ impl BeliefStateF64 {
         }
     }
 
-    /// Returns the belief after a drive. The drive begins up to `off` (translation, yaw) from its path and ends
+    /// Returns the belief after a drive. The drive begins up to `off` (m, rad) from its path and ends
     /// within the controller's tolerance of the path's end. The added error is bounded for every such drive.
     #[must_use]
     pub fn driven(

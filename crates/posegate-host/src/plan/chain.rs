@@ -34,7 +34,7 @@ pub struct StepReport {
     pub after: BeliefStateF64,
     /// The belief before the step, in the core's integers.
     pub standing: BeliefState,
-    /// The margin in the task's success set.
+    /// The margin in the task's success set; `None` for a drive.
     pub margin: Option<Margin>,
     /// The reason of the failure, if the step fails.
     pub failure: Option<Failure>,
@@ -74,7 +74,7 @@ impl ChainReport {
     }
 }
 
-/// Evaluates a chain of a site file. Builds and proves the tables that it needs.
+/// Evaluates a chain of a site file; errors call it `name`. Builds and proves the tables that the chain needs.
 ///
 /// Decisions are those of [`posegate::chain`], with the margins of [`posegate::contain::examine`].
 ///

@@ -38,7 +38,7 @@ pub struct Viewpoint {
     pub pose: [f64; 3],
     /// The viewpoint's name: the look's name and a number.
     pub name: String,
-    /// The look's number in the library.
+    /// The look's index in [`Library::looks`].
     pub look: usize,
 }
 
@@ -55,8 +55,9 @@ impl Library {
     /// Creates the library of a site: its localization tasks, and the looks that `[planner]` makes for every tag.
     ///
     /// # Errors
-    /// [`PlanError::NoLooks`] if the site has no look, [`PlanError::Table`] if a set has no table, and
-    /// [`PlanError::BoundTooLarge`] if a look's error bound does not fit into its own success set.
+    /// [`PlanError::NoLooks`] if the site has no look; [`PlanError::Table`], [`PlanError::Unbounded`] or
+    /// [`PlanError::Epsilon`] if a set has no table; [`PlanError::BoundTooLarge`] if a look's error bound does not fit
+    /// into its own success set.
     pub fn of(site: &Site) -> Result<Self, PlanError> {
         Self::with(site, false, &|_| true)
     }

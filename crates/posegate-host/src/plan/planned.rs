@@ -13,7 +13,8 @@ pub struct Options {
     pub survive_a_lost_tag: bool,
     /// The number of labels that a search may expand.
     pub limit: usize,
-    /// Costs of drives by the places' names; `start` and the work task's name are places too.
+    /// Costs of drives by the places' names; `start` and the work task's name are places too. Other drives
+    /// cost [`Planner::metre`](crate::site::Planner::metre) per metre.
     pub costs: BTreeMap<(String, String), f64>,
     /// Ends the search early.
     pub stop: StopSignal,
@@ -70,7 +71,7 @@ pub struct Plan {
 /// The plan to follow if a look fails.
 #[derive(Clone, Debug)]
 pub struct Contingency {
-    /// The look's number in the plan.
+    /// The index of the look among the plan's steps, from 0.
     pub step: usize,
     /// The tags that the look needs. `plan` uses none of them.
     pub tags: Vec<String>,
@@ -87,7 +88,7 @@ pub struct Nearest {
     pub scale: f64,
     /// The set: translation, yaw (m, rad), the estimate's spread included.
     pub set: [f64; 2],
-    /// The look before the arrival.
+    /// The name of the look before the arrival; `None` if there is none.
     pub after: Option<String>,
 }
 
@@ -96,9 +97,10 @@ pub struct Nearest {
 pub struct PlanResult {
     /// The end of the search.
     pub status: Status,
-    /// The plan.
+    /// The plan; `None` if there is none.
     pub plan: Option<Plan>,
-    /// A lower bound of the cost of every chain of the library.
+    /// A lower bound of the cost of every chain of the library; `None` if no search found a
+    /// plan.
     pub bound: Option<f64>,
     /// A lower bound of the cost of every chain, with looks from any places: the straight path, and the least number
     /// of looks that any chain needs.

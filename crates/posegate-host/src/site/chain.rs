@@ -138,7 +138,7 @@ pub enum DriveModel {
 /// The driving of the site's robots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Navigation {
-    /// The model of drives without a model of their own.
+    /// The model of drives without a model of their own; `None` if the file has none.
     pub model: Option<DriveModel>,
     /// The largest distance of the estimate from a drive's end when the controller stops.
     pub controller: Tolerance,

@@ -202,7 +202,8 @@ impl Site {
         chosen_table(&task.success, &task.wish)
     }
 
-    /// Returns the extent, step and layout of a task's table: those of the task, else the site's default.
+    /// Returns the extent, step and layout of a task's table: those of the task, else the site's default. `None` if
+    /// neither is complete.
     #[must_use]
     pub fn table_spec<'a>(&'a self, task: &'a Task) -> Option<&'a TableSpec> {
         task.table.as_ref().or(self.table.as_ref())
@@ -293,13 +294,13 @@ pub struct Task {
 /// The table settings in a site file; the rest is chosen ([`Site::chosen_table`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TableOverrides {
-    /// The poses to cover.
+    /// The poses to cover; `None` if the file has none.
     pub extent: Option<Extent>,
-    /// The cell size.
+    /// The cell size; `None` if the file has none.
     pub step: Option<Step>,
-    /// The layouts to write.
+    /// The layouts to write; `None` if the file has none.
     pub layout: Option<Layout>,
-    /// The bounded pose-set, about the goal, in which the robot is expected.
+    /// The bounded pose-set, about the goal, in which the robot is expected; `None` if the file has none.
     pub expected: Option<Tolerance>,
 }
 

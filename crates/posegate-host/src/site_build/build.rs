@@ -29,8 +29,8 @@ pub struct BuildOptions {
     pub shard: Shard,
     /// If `true`, valid existing pieces are kept.
     pub resume: bool,
-    /// Number of pieces that are made in parallel, each on one thread; by default one per core. The results do not
-    /// depend on it.
+    /// Number of pieces that are made in parallel, each on one thread; `None` for one per core. The results do not
+    /// depend on this number.
     pub threads: Option<NonZeroUsize>,
 }
 
@@ -49,7 +49,7 @@ pub struct BuildSummary {
 /// the site, at most one piece per thread and, if plans are made, the planner's library of the site.
 ///
 /// # Errors
-/// [`SiteBuildError`]. Finished pieces remain, and a later build with `resume` has_valid_file them. If some pieces cannot be
+/// [`SiteBuildError`]. Finished pieces remain, and a later build with `resume` keeps them. If some pieces cannot be
 /// made, all others are made ([`SiteBuildError::Refused`]).
 pub fn build(
     site: &Site,

@@ -46,7 +46,7 @@ pub struct MergeSummary {
     pub tables: usize,
     /// Number of plans, including results that state that there is no plan.
     pub plans: usize,
-    /// Chains and work tasks without a plan.
+    /// Chains and work tasks without a plan, as `CHAIN: TASK`.
     pub without_plan: Vec<String>,
     /// Number of files, without the manifest.
     pub files: usize,

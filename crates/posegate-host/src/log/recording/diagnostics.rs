@@ -69,7 +69,7 @@ pub struct ReaderDiagnostics {
     /// Schemas, channels and messages that were left out: too long, or with a wrong length in them.
     pub bad_records: u64,
     /// Where and how a bag is damaged: the place where reading stopped, else the first part that was left out. All
-    /// undamaged parts were read.
+    /// undamaged parts were read. `None` if there is no damage.
     pub damage: Option<String>,
     /// `true` if a bag has an index; `None` for other files, and for bags that end before it.
     pub indexed: Option<bool>,

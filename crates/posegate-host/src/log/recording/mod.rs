@@ -62,11 +62,11 @@ pub struct Sample {
     pub exact_ns: Option<Exact>,
     /// The frame of the estimate; `None` means the world frame, for files without frames.
     pub frame: Option<Arc<str>>,
-    /// Height, metres. Not part of the estimate, but messages have it.
+    /// Height in the frame of the estimate, metres. Not part of the estimate, but messages have it.
     pub z_m: f64,
     /// The estimate's pose and uncertainty.
     pub belief: PoseEstimate,
-    /// The true pose (m, m, rad), if it is in the same row.
+    /// The true pose in the world (m, m, rad), if it is in the same row.
     pub truth: Option<[f64; 3]>,
     /// The time since the last fix of the source, milliseconds, rounded up; `None` if it is not known.
     pub since_fix_ms: Option<u32>,
@@ -103,9 +103,9 @@ pub struct TruePose {
     pub t_s: f64,
     /// The frame of the pose.
     pub frame: Arc<str>,
-    /// x, y, z, metres.
+    /// x, y, z in `frame`, metres.
     pub position: [f64; 3],
-    /// The quaternion x, y, z, w.
+    /// The orientation in `frame`: a quaternion x, y, z, w.
     pub orientation: [f64; 4],
 }
 

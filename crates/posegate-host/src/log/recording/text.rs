@@ -49,7 +49,7 @@ impl<R: Read> Text<R> {
     /// `covariance` is `false`, for bounded sets. `file` names it in errors.
     ///
     /// # Errors
-    /// A column is missing.
+    /// [`RecordingError::Csv`] if a column is missing or repeated, or the header cannot be read.
     pub fn csv(input: R, file: &str, covariance: bool) -> Result<Self, RecordingError> {
         let (input, bytes) = counted(input);
         let columns = if covariance {

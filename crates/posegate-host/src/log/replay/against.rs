@@ -14,7 +14,8 @@ pub struct TruthComparison {
     pub scale: Option<f64>,
     /// `true` if the true pose is in the pose-set: the scale is at most 1.
     pub held: Option<bool>,
-    /// `e' P^-1 e` with the covariance as recorded; `None` if there is none, or it is not positive definite.
+    /// `e' P^-1 e` with the error e (x, y, yaw) and the covariance P that the gate was given, before inflation. `None`
+    /// without a covariance, if P is not positive definite, or if the source is not declared.
     pub nees: Option<f64>,
     /// Distance of the positions, metres.
     pub error_m: f64,

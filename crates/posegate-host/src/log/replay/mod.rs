@@ -117,7 +117,8 @@ pub struct ReplayConfig<'a> {
     pub settings: &'a Settings<'a>,
     /// The success set itself, for the comparison with the truth.
     pub success: &'a SuccessSet,
-    /// A bounded set around each estimate instead of its covariance: metres, radians.
+    /// A bounded set around each estimate instead of its covariance: metres, radians. `None` uses the
+    /// covariances.
     pub bounded: Option<[f64; 2]>,
     /// The world frame's name.
     pub world: &'a str,
@@ -247,6 +248,9 @@ impl<'a> Replay<'a> {
 
     /// Takes estimates in the order in which they were recorded. Calls `out` with each row once its truth is known. A
     /// batch of about a thousand keeps every core busy.
+    ///
+    /// # Errors
+    /// The first error of `out`.
     pub fn estimates<E>(
         &mut self,
         samples: &[Sample],
@@ -272,6 +276,9 @@ impl<'a> Replay<'a> {
     }
 
     /// Ends the recording: rows that wait for a true pose are passed to `out` without one.
+    ///
+    /// # Errors
+    /// The first error of `out`.
     pub fn finish<E>(&mut self, out: &mut impl FnMut(&Row) -> Result<(), E>) -> Result<(), E> {
         if let Some(track) = &mut self.track {
             track.complete();
@@ -601,13 +608,13 @@ impl<'a> Replay<'a> {
         self.counts.tallies(&self.setup.thresholds)
     }
 
-    /// Returns the number of permitted estimates, and of all estimates.
+    /// Returns the number of estimates whose verdict is a permit, and of all estimates.
     #[must_use]
     pub const fn permits(&self) -> [u64; 2] {
         [self.counts.verdicts.permits, self.next]
     }
 
-    /// Returns the count of each reason that was given.
+    /// Returns the number of denied verdicts for each reason; reasons that were not given are omitted.
     #[must_use]
     pub fn reasons(&self) -> Vec<(Reason, u64)> {
         self.counts.reasons()

@@ -19,11 +19,11 @@ pub struct Row {
     pub t_s: f64,
     /// Time at which the estimate was recorded, seconds, if the gate uses that clock.
     pub logged_s: Option<f64>,
-    /// The estimated pose: x, y (m), yaw (rad), as recorded.
+    /// The estimated pose: x, y (m), yaw (rad), in the recorded frame.
     pub pose: [f64; 3],
-    /// The uncertainty that the gate was given.
+    /// The uncertainty that the gate was given; `None` if the source reports none.
     pub spread: Option<Uncertainty>,
-    /// The recorded uncertainty.
+    /// The recorded uncertainty; `None` if there is none.
     pub recorded: Option<Uncertainty>,
     /// The estimate's age, seconds, if known.
     pub age: Option<f64>,
@@ -41,11 +41,11 @@ pub struct Row {
     pub state: State,
     /// The result of the gate's step.
     pub step: Result<(), Reason>,
-    /// The true pose (m, m, rad), if known.
+    /// The true pose in the world (m, m, rad), if known.
     pub truth: Option<[f64; 3]>,
     /// The time since the last fix of the source, milliseconds, if known.
     pub since_fix_ms: Option<u32>,
-    /// The comparison with the truth.
+    /// The comparison with the truth; `None` if the truth is not known.
     pub against: Option<TruthComparison>,
     /// The results of the rules in [`super::RULES`]. `None` if a rule lacks its input.
     pub rules: [Option<bool>; 3],

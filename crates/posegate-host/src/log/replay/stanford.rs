@@ -14,7 +14,7 @@ use super::Row;
 
 /// Number of steps of each axis. One more step holds everything beyond the end.
 pub const STEPS: usize = 48;
-/// The end of both axes.
+/// The end of both axes, in units of the alert limit.
 pub const END: f64 = 2.4;
 
 /// The region of a point.

@@ -22,7 +22,7 @@ pub struct Cmaes {
     /// Points of a generation of the first runs; `None` derives it from the number of dimensions.
     pub population: Option<usize>,
     /// `true` if the covariance also learns from the worse half of a generation (the tutorial's negative weights), and
-    /// step and covariance adapt faster than by its table: for few evaluations.
+    /// step and covariance adapt faster than by the tutorial's table: for few evaluations.
     pub active: bool,
     /// `true` if the problem's initial guesses are evaluated first.
     pub hinted: bool,

@@ -101,11 +101,11 @@ pub struct Import {
     /// The pose of the file's frame in the world. For a bundle: the pose of one of our tags mounted at the
     /// bundle's origin. A bundle needs it; other maps are at the world's origin without it.
     pub pose: Option<Pose3Deg>,
-    /// The prefix of names: before a tag's number (default `t`) or a dock's name (default empty).
+    /// The prefix of names. `None` is `t` before a tag's number, and nothing before a dock's name.
     pub prefix: Option<String>,
     /// The bundle or single tag to read, if the file has several.
     pub part: Option<String>,
-    /// The tolerance of the tags' poses.
+    /// The tolerance of the tags' poses; `None` for none.
     pub tolerance: Option<Tolerance>,
 }
 
