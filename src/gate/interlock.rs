@@ -226,12 +226,13 @@ impl<P: OutputPin, R: InputPin, H: OutputPin> Interlock<P, R, H> {
     /// Drives the output low, independently of the gate.
     ///
     /// # Errors
-    /// [`InterlockFault::Output`] if the pin reports an error; the fault is then latched.
+    /// [`InterlockFault::Output`] if the pin reports an error; it is then latched, unless another fault is.
     pub fn close(&mut self) -> Result<(), InterlockFault> {
         let now_ms = self.last_ms.unwrap_or_default();
         self.drive(now_ms, &Permission::DENIED)
             .inspect_err(|fault| {
-                self.fault = Some(*fault);
+                // The first fault is the cause.
+                self.fault = self.fault.or(Some(*fault));
             })
     }
 

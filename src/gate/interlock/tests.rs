@@ -126,6 +126,23 @@ fn a_pin_that_cannot_be_closed_is_latched() {
     asked.done();
 }
 
+/// The first fault stays: it is the cause.
+#[test]
+fn failed_close_keeps_the_latched_fault() {
+    let (output, mut asked) = pin(&[low(), low(), fails(low()), low()]);
+    let (input, mut read) = pin(&[fails(Transaction::get(State::Low))]);
+    let mut interlock = Interlock::new(output)
+        .unwrap()
+        .with_read_back(input, 30)
+        .unwrap();
+    assert_eq!(interlock.apply_shown(0, OPEN), Err(InterlockFault::Input));
+    assert_eq!(interlock.close(), Err(InterlockFault::Output));
+    assert_eq!(interlock.fault(), Some(InterlockFault::Input));
+    drop(interlock);
+    asked.done();
+    read.done();
+}
+
 /// Applies permissions at times to a contact with scripted levels, and checks the call in which the interlock
 /// reports the fault.
 fn follow(shown: &[(u32, Shown, bool)], fault_at: Option<usize>) {

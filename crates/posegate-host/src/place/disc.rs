@@ -57,7 +57,7 @@ impl<'a> Disc<'a> {
     fn ray(&self, angle: f64) -> Ray {
         let walk = LineSegment {
             from: self.middle,
-            way: self.white.to_metres([libm::cos(angle), libm::sin(angle)]),
+            way: self.white.in_metres([libm::cos(angle), libm::sin(angle)]),
             length: BEYOND * self.radius,
         };
         Ray::cast(self.headed, self.views, walk, self.radius)

@@ -28,7 +28,7 @@ impl Costs {
 /// Reads lines of `from,to,cost` with names of places. A look's name means all of its places.
 ///
 /// # Errors
-/// [`PlanError::Costs`] with file and line if the header or a cost is wrong.
+/// [`PlanError::Costs`] with file and line if the header or a cost is wrong, or a drive has two costs.
 pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>, PlanError> {
     let wrong = |line: u64, what: &str| PlanError::Costs(format!("{file}:{line}: {what}"));
     let mut reader = csv::ReaderBuilder::new()
@@ -57,7 +57,14 @@ pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>,
                     &format!("`{}` is not a cost; write a number, at least 0", &record[2]),
                 )
             })?;
-        costs.insert((record[0].into(), record[1].into()), cost);
+        if costs
+            .insert((record[0].into(), record[1].into()), cost)
+            .is_some()
+        {
+            let [from, to] = [0, 1].map(|at| &record[at]);
+            let what = format!("the drive from `{from}` to `{to}` has a cost already");
+            return Err(wrong(line, &what));
+        }
     }
     Ok(costs)
 }
@@ -65,4 +72,18 @@ pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>,
 /// Returns the straight distance between two places, in metres.
 pub(super) fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     libm::hypot(a[0] - b[0], a[1] - b[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn second_cost_of_a_drive_is_refused() {
+        let found = costs(b"from,to,cost\na,b,1\nb,a,2\n", "costs.csv").unwrap();
+        assert_eq!(found.len(), 2);
+        let twice = costs(b"from,to,cost\na,b,1\na,b,2\n", "costs.csv");
+        let words = "costs.csv:3: the drive from `a` to `b` has a cost already";
+        assert_eq!(twice, Err(PlanError::Costs(words.into())));
+    }
 }

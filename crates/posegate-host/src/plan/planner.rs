@@ -535,7 +535,7 @@ impl<'a> Prepared<'a> {
             ends: &map.ends,
             seen: &map.seen,
             successors,
-            predecessors: predecessors,
+            predecessors,
             limit: options.limit,
             stop: &options.stop,
             prunes_dominated: true,
