@@ -26,7 +26,6 @@ const LIBRARY: &[&str] = &[
     "build.rs",
     "cbindgen.toml",
     "memory.x",
-    "benches/",
     "docs/",
     "examples/",
     "include/",
