@@ -40,6 +40,7 @@ pub use self::task_table::TaskTable;
 #[doc = include_str!("language.md")]
 pub mod language {}
 
+mod attempt;
 mod backward;
 mod belief;
 mod bound;
@@ -59,6 +60,7 @@ mod planner;
 mod plans;
 mod proofs;
 mod rescue;
+mod route_graph;
 mod rule_bytes;
 mod rules;
 mod search;
