@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::backward::Horizons;
 use super::costs::Costs;
+use super::horizons::Horizons;
 use super::library::Library;
+use super::problem::SearchProblem;
 use super::rescue::Rescues;
 use super::route_graph::RouteGraph;
-use super::search::{Action, Answer, NearMiss, SearchGoal, SearchOutcome, SearchProblem};
+use super::search::{Action, Answer, NearMiss, SearchGoal, SearchOutcome};
 use super::walk::{Walk, world};
 use super::{
     BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,

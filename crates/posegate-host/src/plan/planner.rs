@@ -5,15 +5,15 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::attempt::Attempt;
-use super::backward::Horizons;
 use super::bound::EveryChain;
 use super::costs::Costs;
 use super::fewer::FewerLooks;
+use super::horizons::Horizons;
 use super::library::Library;
 use super::map::{self, Roadmap};
+use super::problem::SearchProblem;
 use super::proofs::{Proofs, Sharpness};
 use super::route_graph::RouteGraph;
-use super::search::SearchProblem;
 use super::walk::world;
 use super::{
     Options, Plan, PlanError, PlanResult, Status, StepKind, StopSignal, TaskTable, Viewpoint,
