@@ -1,7 +1,7 @@
 //! The integral over the disc of one heading, by rays from its centre.
 
+use super::accuracy::AccuracyTarget;
 use super::gaussian::WhitenedPoseSet;
-use super::headings::AccuracyTarget;
 use super::quadrature::{Approximate, Panel, Smooth, Sum, panel, refine};
 use super::rays::{Ray, Rule};
 use core::cell::Cell;
