@@ -10,6 +10,7 @@ use super::document::{self, Document};
 use super::error_model::ErrorModel;
 use super::family::{Family, LEAST_RATIO};
 use super::runs::{self, Tally};
+use super::sample::{FEWEST, FEWEST_RUNS, LEAST_ERROR, Sample};
 use super::smooth::{Lattice, Target, capped, errors_around, fit, floored, share_of};
 use super::split::{Drawn, FITTED, split};
 use super::taken_with::TakenWith;
@@ -39,16 +40,10 @@ impl Default for BoundsSettings {
     }
 }
 
-/// The smallest error that is used, metres and radians; smaller ones are replaced by it.
-pub(super) const LEAST_ERROR: f64 = 1e-7;
 /// A coarse cell gets this many times the fewest rows for a bound.
 const ROOMY: f64 = 3.0;
 /// The fewest rows of a coarse cell for which its parts are filled.
 const FULL: f64 = 100.0;
-/// The fewest rows of a cell with a bound.
-pub(super) const FEWEST: f64 = 10.0;
-/// The fewest runs in a region with a bound.
-pub(super) const FEWEST_RUNS: f64 = 10.0;
 /// The number of coarse cells of the shape with which the dependence within runs is measured.
 const COARSE: f64 = 8.0;
 /// The fewest rows of a cell for the share of detected views.
@@ -66,14 +61,6 @@ const FEWEST_BEYOND: f64 = 10.0;
 const SLOPE: f64 = 0.02;
 /// The smallest psi at which a mirrored solution is recognised, degrees.
 const HEAD_ON: f64 = 10.0;
-
-/// A detection on one side of the split.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
-    pub(super) at: [f64; 3],
-    pub(super) errors: [f64; 2],
-    pub(super) run: u32,
-}
 
 /// Learns bounds and the share of detected views.
 ///
@@ -141,7 +128,7 @@ pub fn learn_bounds(
     let [Some(translation), Some(yaw)] = [0, 1].map(|which| Family::new(&shapes[which])) else {
         return Err(too_few(0));
     };
-    let mut learnt = Calibration::new(&cells, settings, &places, runs.is_some());
+    let mut learnt = Calibration::new(&cells, [quantile, confidence], &places, runs.is_some());
     learnt.run(&fitted, &calibrated, &[translation, yaw], effect);
     if !learnt.has_bounds() {
         let error = too_few((seen.len() as f64 / effect) as u64);

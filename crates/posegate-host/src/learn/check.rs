@@ -550,7 +550,7 @@ fn change(rows: &[(f64, f64, f64)], which: usize) -> Option<Change> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::split::mixed;
+    use crate::learn::random::mixed;
 
     /// Returns the largest value of a bet over 10,000 looks at misses of a given probability.
     fn most(seed: u64, probability: f64, allowed: f64) -> f64 {

@@ -451,7 +451,7 @@ impl InflationModel {
     /// # Errors
     /// The text is not a model of this kind: another version, an unknown or a missing key, or parts that do not match.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
-        Self::new(super::kind::of(text, file)?, file)
+        Self::new(super::model_file::parse(text, file)?, file)
     }
 
     /// Returns the text of its file.
@@ -459,7 +459,7 @@ impl InflationModel {
     /// # Errors
     /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
     pub fn write(&self) -> Result<String, LearnError> {
-        super::kind::write(&self.document)
+        super::model_file::write(&self.document)
     }
 
     fn new(document: Document, file: &str) -> Result<Self, LearnError> {
