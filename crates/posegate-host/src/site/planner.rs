@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use toml::de::DeTable;
 
 use super::error::{SiteError, Source};
+use super::names::Names;
 use super::reader::{Node, Table};
-use super::success::{self, Names};
-use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
+use super::syntax::syntax;
+use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt, success};
 use posegate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
 
 /// The planner's settings.
@@ -171,8 +172,7 @@ fn looks(
                 file: look.file(),
                 text: &text,
             };
-            let document = DeTable::parse(&text)
-                .map_err(|fault| wrong(super::parse::syntax(source, &fault)))?;
+            let document = DeTable::parse(&text).map_err(|fault| wrong(syntax(source, &fault)))?;
             let root = Table::root(source, &document);
             let set = root.required(&keys::SUCCESS).map_err(wrong)?;
             let shape = match made(&set, names, of).map_err(wrong)? {

@@ -1,26 +1,16 @@
 //! Success sets from TOML.
 
-use std::collections::BTreeMap;
-
 use super::error::SiteError;
 use super::families::{FAMILIES, family_bits};
 use super::learnt;
+use super::names::{Names, named};
 use super::places::SiteModel;
 use super::reader::{Node, Table};
 use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use posegate::shape::{
-    BoxSet, Clear, ErrorLimit, Exclusion, Footprint, Intrinsics, Lens, PolygonError, PoseDeg,
-    Shape, Sharpness, Visibility, Wall, is_arc,
+    BoxSet, Clear, ErrorLimit, Exclusion, Footprint, Intrinsics, Lens, PolygonError, Shape,
+    Sharpness, Visibility, Wall, is_arc,
 };
-
-/// The entries that a success set can refer to by name.
-pub(super) struct Names<'a> {
-    pub cameras: &'a BTreeMap<String, SiteCamera>,
-    pub tags: &'a BTreeMap<String, SiteTag>,
-    pub walls: &'a BTreeMap<String, Wall>,
-    pub error_models: &'a BTreeMap<String, SiteModel>,
-    pub goals: &'a BTreeMap<String, PoseDeg>,
-}
 
 /// Deepest nesting of `any` and `all`.
 const DEEPEST: u32 = 16;
@@ -256,7 +246,7 @@ fn view(
         Some(node) => {
             let model = named(&node, "error_model", names.error_models)?;
             let limit = table.required(&keys::ERROR_LIMIT)?;
-            let [translation, yaw_deg] = largest(&limit)?;
+            let [translation, yaw_deg] = learnt::largest(&limit)?;
             match model {
                 SiteModel::Formula(model) => {
                     let psi_max_deg = view.psi_max_deg;
@@ -320,15 +310,6 @@ fn view(
         Ok([only]) => only,
         Err(sets) => Shape::All(sets),
     })
-}
-
-/// Returns the largest error `r` of a success set, `[metres, degrees]`.
-pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
-    let table = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
-    Ok([
-        table.number(&keys::BOUND_TRANSLATION)?,
-        table.number(&keys::BOUND_YAW)?,
-    ])
 }
 
 /// Returns the smallest number of pixels per bit at which the tag must be seen.
@@ -412,20 +393,4 @@ fn blur(node: &Node<'_>, off: Intrinsics, view: &mut Visibility) -> Result<(), S
     let near = pixels * arm / (cosine * (most - pixels / (cosine * cosine)));
     view.z_near = view.z_near.max(near * (1.0 + 1e-9));
     Ok(())
-}
-
-/// Returns the entry that a name refers to.
-pub(super) fn named<'m, T>(
-    node: &Node<'_>,
-    what: &str,
-    known: &'m BTreeMap<String, T>,
-) -> Result<&'m T, SiteError> {
-    let name = node.text()?;
-    known.get(name).ok_or_else(|| {
-        let error = node.error(format!("there is no {what} `{name}`"));
-        match suggest::similar(name, known.keys().map(String::as_str)) {
-            Some(similar) => error.help(format!("did you mean `{similar}`?")),
-            None => error.help(format!("add a table [{what}.{name}]")),
-        }
-    })
 }
