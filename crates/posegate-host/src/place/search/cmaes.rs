@@ -263,14 +263,8 @@ impl Rates {
 
     /// Returns the weights of the worse half, with the tutorial's bounds.
     fn worse_weights(&self) -> Vec<f64> {
-        let Self {
-            of_n,
-            population,
-            effective,
-            c_1,
-            c_mu,
-            ..
-        } = *self;
+        let (population, effective) = (self.population, self.effective);
+        let (of_n, c_1, c_mu) = (self.of_n, self.c_1, self.c_mu);
         let worse = population / 2..population;
         let raw = |i: usize| raw_weight(population, i);
         let below = |power: i32| -> f64 {
@@ -419,26 +413,15 @@ impl<'a> Evolution<'a> {
         self.mean += &step * self.sigma;
         let h = self.adapt_paths(generation, &step, number);
         self.adapt_covariance(generation, h);
-        let Rates {
-            c_sigma,
-            damping,
-            usual,
-            ..
-        } = self.rates;
-        self.sigma *= libm::exp((c_sigma / damping) * (self.path_sigma.norm() / usual - 1.0));
+        let longer = self.path_sigma.norm() / self.rates.usual - 1.0;
+        self.sigma *= libm::exp((self.rates.c_sigma / self.rates.damping) * longer);
         self.sigma = self.sigma.min(1.0);
     }
 
     /// Adapts the paths to the mean's step. Returns 1, or 0 if the path of the step size is too long.
     fn adapt_paths(&mut self, generation: &Generation, step: &DVector<f64>, number: i32) -> f64 {
-        let Rates {
-            of_n,
-            effective,
-            c_sigma,
-            c_c,
-            usual,
-            ..
-        } = self.rates;
+        let (of_n, effective, usual) = (self.rates.of_n, self.rates.effective, self.rates.usual);
+        let (c_sigma, c_c) = (self.rates.c_sigma, self.rates.c_c);
         let axes = &generation.axes;
         let whitened = axes * generation.shrinking() * axes.transpose() * step;
         self.path_sigma = &self.path_sigma * (1.0 - c_sigma)
@@ -454,15 +437,8 @@ impl<'a> Evolution<'a> {
 
     /// Adapts the covariance to its path and to the steps of a generation.
     fn adapt_covariance(&mut self, generation: &Generation, h: f64) {
-        let Rates {
-            ref weights,
-            ref worse,
-            of_n,
-            c_c,
-            c_1,
-            c_mu,
-            ..
-        } = self.rates;
+        let (weights, worse) = (&self.rates.weights, &self.rates.worse);
+        let (c_c, c_1, c_mu) = (self.rates.c_c, self.rates.c_1, self.rates.c_mu);
         let n = self.mean.len();
         let mut spread = DMatrix::<f64>::zeros(n, n);
         for (weight, step) in generation.weighted(weights, 0) {
@@ -472,7 +448,7 @@ impl<'a> Evolution<'a> {
         for (weight, step) in generation.weighted(worse, weights.len()) {
             // No longer than a usual step, so that the covariance remains positive definite.
             let whitened = &whitening * step;
-            let scale = of_n / whitened.norm_squared().max(f64::MIN_POSITIVE);
+            let scale = self.rates.of_n / whitened.norm_squared().max(f64::MIN_POSITIVE);
             spread += step * step.transpose() * (weight * scale);
         }
         let of_all: f64 = 1.0 + worse.iter().sum::<f64>();
