@@ -105,25 +105,14 @@ fn chosen(
         .map(|seconds| begun + Duration::from_secs_f64(seconds));
     let stop = StopSignal::new(watch.stop.clone(), until);
     let starts = checked(site, order)?;
-    let names: Vec<&String> = site.candidates.keys().collect();
     let costs: Vec<f64> = site.candidates.values().map(|found| found.cost).collect();
-    let number: BTreeMap<String, usize> = names.iter().copied().cloned().zip(0..).collect();
-    let options = order.options();
+    let number: BTreeMap<String, usize> = site.candidates.keys().cloned().zip(0..).collect();
 
     tick(Stage::Tables, None);
     let library = Library::with_candidates(site)?;
-    let mut oracles: Vec<Oracle<'_>> = starts
-        .par_iter()
-        .map(|(task, from)| {
-            let start = &site.chains[*from].start;
-            let endpoint = TaskPlanner::of(site, &library, start, task, Some(from), order.beside)?;
-            let mut oracle = Oracle::of((task, from), endpoint, &number, options.clone());
-            oracle.ask_singles()?;
-            tick(Stage::Reach, Some(starts.len()));
-            Ok(oracle)
-        })
-        .collect::<Result<_, PlanError>>()?;
-    let mut lost = unserved(&mut oracles, site)?;
+    let oracles = oracles(site, order, (&library, &number), &starts, &|| {
+        tick(Stage::Reach, Some(starts.len()));
+    })?;
     let terms = Terms {
         costs: &costs,
         kind: if order.survive_a_lost_tag {
@@ -142,89 +131,15 @@ fn chosen(
             });
         },
     };
-    let (mut served, mut gone) = apart(oracles, &lost);
-    let mut cuts = first_cuts(&mut served, terms.demand())?;
-    let none = Tags::none(costs.len());
-    let mut chosen = completed(&mut served, &none, &terms)?;
-    let also = unreinforced(&mut served, &chosen, &terms)?;
-    if !also.is_empty() {
-        lost.extend(also);
-        let (rest, more) = apart(served, &lost);
-        (served, gone) = (rest, gone.into_iter().chain(more).collect());
-        cuts = first_cuts(&mut served, terms.demand())?;
-        chosen = completed(&mut served, &none, &terms)?;
-    }
-    let mut at = Progress {
-        chosen,
-        bound: 0.0,
-        checked: 0.0,
-        cuts,
-        rounds: 0,
-        is_finished: true,
-    };
-    match order.method {
-        Method::Exact => {
-            // The greedy choice is complete from here on, so the search may end at any time.
-            for oracle in &mut served {
-                oracle.stop_on(stop.clone());
-            }
-            at = search(&mut served, at, &terms)?;
-            for oracle in &mut served {
-                oracle.stop_on(StopSignal::default());
-            }
-        }
-        Method::Greedy => {
-            bounded(&mut at, &costs)?;
-            (terms.improved)(at.chosen.cost(&costs), at.bound);
-        }
-    }
-
-    let chosen_tags = mounted_tags(site, &names, &at.chosen)?;
-    let tag = |(number, (name, tag)): (&usize, &(String, SiteTag))| ChosenTag {
-        name: name.clone(),
-        tag: tag.clone(),
-        cost: costs[*number],
-        looked_at_by: vec![],
-        needed_by: vec![],
-        second_of: vec![],
-        polished: None,
-    };
-    let tags = chosen_tags.iter().map(tag).collect();
-    let site = with_tags(site, &chosen_tags);
-    let plans = served.iter().chain(&gone).map(|oracle| oracle.asked).sum();
-    let mut cover = Cover {
-        tags,
-        tasks: Vec::new(),
-        cost: at.chosen.cost(&costs),
-        bound: at.bound,
-        bound_checked: at.checked,
-        beside: order.beside,
-        is_finished: at.is_finished,
-        rounds: at.rounds,
-        cuts: at.cuts.sure.len(),
-        plans,
-        site,
-    };
+    let choice = Choice::greedy(oracles, site, &terms)?.improved(order.method, &terms)?;
+    let mut cover = choice.cover(site, order, &terms)?;
     let count = starts.len();
-    cover.tasks = final_plans(&cover.site, &served, &terms, &options, &|| {
+    cover.tasks = choice.tasks(&cover.site, &terms, &order.options(), &|| {
         tick(Stage::Check, Some(count));
     })?;
-    for oracle in &gone {
-        cover.tasks.push(TaskCoverage {
-            reason: lost.get(&oracle.task).cloned(),
-            ..coverage(oracle, oracle.plan(&oracle.reach, terms.kind)?)
-        });
-    }
-    cover.tasks.sort_by(|a, b| a.task.cmp(&b.task));
-    value(&mut cover, &options, terms.kind)?;
+    value(&mut cover, &order.options(), terms.kind)?;
     if order.survive_a_lost_tag {
-        for tag in &cover.tags {
-            for task in &mut cover.tasks {
-                if task.reason.is_none() && tag.needed_by.contains(&task.task) {
-                    task.reason = Some(format!("there is no plan without the tag `{}`", tag.name));
-                }
-            }
-        }
+        name_missing_alternatives(&mut cover);
     }
     if cover.serves_all() && cover.bound > cover.cost * (1.0 + 1e-6) {
         return Err(CoverError::Bound {
@@ -233,6 +148,159 @@ fn chosen(
         });
     }
     Ok(cover)
+}
+
+/// Prepares every work task with its start, and asks which candidates serve it alone.
+fn oracles<'a>(
+    site: &'a Site,
+    order: &CoverOptions,
+    (library, number): (&Library, &'a BTreeMap<String, usize>),
+    starts: &[(&str, &str)],
+    tick: &(dyn Fn() + Sync),
+) -> Result<Vec<Oracle<'a>>, PlanError> {
+    starts
+        .par_iter()
+        .map(|(task, from)| {
+            let start = &site.chains[*from].start;
+            let endpoint = TaskPlanner::of(site, library, start, task, Some(from), order.beside)?;
+            let mut oracle = Oracle::of((task, from), endpoint, number, order.options());
+            oracle.ask_singles()?;
+            tick();
+            Ok(oracle)
+        })
+        .collect()
+}
+
+/// A choice of candidates.
+struct Choice<'a> {
+    /// The tasks that it serves.
+    served: Vec<Oracle<'a>>,
+    /// The tasks that no choice serves.
+    gone: Vec<Oracle<'a>>,
+    /// The names of `gone`, with the reasons.
+    lost: BTreeMap<String, String>,
+    at: Progress,
+}
+
+impl<'a> Choice<'a> {
+    /// Returns the greedy choice.
+    fn greedy(
+        mut oracles: Vec<Oracle<'a>>,
+        site: &Site,
+        terms: &Terms<'_>,
+    ) -> Result<Self, PlanError> {
+        let mut lost = unserved(&mut oracles, site)?;
+        let (mut served, mut gone) = apart(oracles, &lost);
+        let mut cuts = first_cuts(&mut served, terms.demand())?;
+        let none = Tags::none(terms.costs.len());
+        let mut chosen = completed(&mut served, &none, terms)?;
+        let also = unreinforced(&mut served, &chosen, terms)?;
+        if !also.is_empty() {
+            lost.extend(also);
+            let (rest, more) = apart(served, &lost);
+            (served, gone) = (rest, gone.into_iter().chain(more).collect());
+            cuts = first_cuts(&mut served, terms.demand())?;
+            chosen = completed(&mut served, &none, terms)?;
+        }
+        Ok(Self {
+            served,
+            gone,
+            lost,
+            at: Progress {
+                chosen,
+                bound: 0.0,
+                checked: 0.0,
+                cuts,
+                rounds: 0,
+                is_finished: true,
+            },
+        })
+    }
+
+    /// Improves the choice and its bound by a method.
+    fn improved(mut self, method: Method, terms: &Terms<'_>) -> Result<Self, CoverError> {
+        match method {
+            Method::Exact => {
+                // The greedy choice is complete from here on, so the search may end at any time.
+                for oracle in &mut self.served {
+                    oracle.stop_on(terms.stop.clone());
+                }
+                self.at = search(&mut self.served, self.at, terms)?;
+                for oracle in &mut self.served {
+                    oracle.stop_on(StopSignal::default());
+                }
+            }
+            Method::Greedy => {
+                bounded(&mut self.at, terms.costs)?;
+                (terms.improved)(self.at.chosen.cost(terms.costs), self.at.bound);
+            }
+        }
+        Ok(self)
+    }
+
+    /// Returns the cover without its tasks, and without the values of its tags.
+    fn cover(
+        &self,
+        site: &Site,
+        order: &CoverOptions,
+        terms: &Terms<'_>,
+    ) -> Result<Cover, CoverError> {
+        let names: Vec<&String> = site.candidates.keys().collect();
+        let chosen_tags = mounted_tags(site, &names, &self.at.chosen)?;
+        let tag = |(number, (name, tag)): (&usize, &(String, SiteTag))| ChosenTag {
+            name: name.clone(),
+            tag: tag.clone(),
+            cost: terms.costs[*number],
+            looked_at_by: vec![],
+            needed_by: vec![],
+            second_of: vec![],
+            polished: None,
+        };
+        let oracles = self.served.iter().chain(&self.gone);
+        Ok(Cover {
+            tags: chosen_tags.iter().map(tag).collect(),
+            tasks: Vec::new(),
+            cost: self.at.chosen.cost(terms.costs),
+            bound: self.at.bound,
+            bound_checked: self.at.checked,
+            beside: order.beside,
+            is_finished: self.at.is_finished,
+            rounds: self.at.rounds,
+            cuts: self.at.cuts.sure.len(),
+            plans: oracles.map(|oracle| oracle.asked).sum(),
+            site: with_tags(site, &chosen_tags),
+        })
+    }
+
+    /// Returns the tasks by name: with the plans on the site with the chosen tags, or the reason why there is none.
+    fn tasks(
+        &self,
+        site: &Site,
+        terms: &Terms<'_>,
+        options: &Options,
+        tick: &dyn Fn(),
+    ) -> Result<Vec<TaskCoverage>, PlanError> {
+        let mut tasks = final_plans(site, &self.served, terms, options, tick)?;
+        for oracle in &self.gone {
+            tasks.push(TaskCoverage {
+                reason: self.lost.get(&oracle.task).cloned(),
+                ..coverage(oracle, oracle.plan(&oracle.reach, terms.kind)?)
+            });
+        }
+        tasks.sort_by(|a, b| a.task.cmp(&b.task));
+        Ok(tasks)
+    }
+}
+
+/// Adds the reason to every task that needs a tag for which there is no alternative.
+fn name_missing_alternatives(cover: &mut Cover) {
+    for tag in &cover.tags {
+        for task in &mut cover.tasks {
+            if task.reason.is_none() && tag.needed_by.contains(&task.task) {
+                task.reason = Some(format!("there is no plan without the tag `{}`", tag.name));
+            }
+        }
+    }
 }
 
 /// Returns a chosen tag that overlaps another chosen or a mounted tag: of two chosen tags the more expensive one, or

@@ -1,7 +1,7 @@
 //! Checks that the controller has enough time for a decision on each task's table.
 
 use super::Warning;
-use super::faults::warn;
+use super::warning::warn;
 use crate::site::{Core, Site};
 use posegate::bake::{self, BakeError, BakeInput};
 use posegate::table::Table;

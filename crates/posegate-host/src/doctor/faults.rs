@@ -1,35 +1,17 @@
 //! Warnings about likely wrong conventions, or mistakes, in a site.
 
 use super::collisions::meet;
-use super::mounting::mounted;
+use super::mounting::{SIZES, mounted};
+use super::warning::{Warning, warn};
 use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
 use crate::cover::overlap;
 use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use crate::site::{ErrorBound, Site, SiteTag, Task, line_of, stated_views};
 use posegate::shape::{Exclusion, Pose3Deg, Shape, Tag, Visibility};
 
-/// A warning about a likely mistake.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Warning {
-    /// The kind of warning: a word for scripts.
-    pub code: &'static str,
-    /// The subject: `tag t7`.
-    pub about: String,
-    /// The keys of the subject in the site file: `["tag", "t7", "size"]`.
-    pub at: Vec<String>,
-    /// The finding.
-    pub message: String,
-    /// Advice on what to check.
-    pub help: String,
-    /// `true` if, because of this problem, the success set is empty in the range in which the task searches it.
-    pub empties: bool,
-}
-
 /// The code of a warning about a stated error that no view can satisfy.
 pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
-/// The usual range of tag sizes, metres.
-pub(super) const SIZES: [f64; 2] = [0.02, 2.0];
 /// The sine of 45 degrees: a direction with a larger elevation looks up or down.
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// A wall that begins higher is above the robot, metres.
@@ -131,18 +113,6 @@ fn bound_without_survey(shape: &Shape, bound: ErrorBound, about: [&str; 2]) -> O
         "a stated error is the whole error: include the survey's error, lower `d_max`, or give the set an `error_model`, to \
          whose bounds the tolerances are added",
     ))
-}
-
-/// Returns a warning about an entry of the site, given by its kind and its name.
-pub(super) fn warn(code: &'static str, about: [&str; 2], message: String, help: &str) -> Warning {
-    Warning {
-        code,
-        about: about.join(" "),
-        at: about.map(str::to_owned).to_vec(),
-        message,
-        help: help.into(),
-        empties: false,
-    }
 }
 
 fn of_tag(site: &Site, kind: &str, finding: &TagFinding, all: &mut Vec<Warning>) {

@@ -16,7 +16,8 @@
 
 pub use self::cost::decision_costs;
 pub use self::deepest::{Deepest, deepest};
-pub use self::faults::{IMPOSSIBLE_ERROR, Warning, stated_error, stated_errors};
+pub use self::faults::{IMPOSSIBLE_ERROR, stated_error, stated_errors};
+pub use self::warning::Warning;
 
 mod collisions;
 mod cost;
@@ -25,6 +26,7 @@ mod faults;
 mod mounting;
 #[cfg(test)]
 mod tests;
+mod warning;
 
 use crate::draw::ingredients::{Ingredients, axes, heading, radians};
 use crate::draw::{MinSlack, SlackEvaluator};

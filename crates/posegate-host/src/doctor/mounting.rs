@@ -1,12 +1,14 @@
 //! Warnings about the mounting of tags and candidates: walls, directions and families.
 
 use super::collisions::meet;
-use super::faults::{SIZES, Warning, warn};
+use super::warning::{Warning, warn};
 use crate::cover::on_a_keep_out;
 use crate::draw::ingredients::{Eye, axes, radians};
 use crate::site::{FAMILIES, Site, SiteTag, question};
 use posegate::shape::{Family, Tag, Wall};
 
+/// The usual range of tag sizes, metres.
+pub(super) const SIZES: [f64; 2] = [0.02, 2.0];
 /// A wall closer than this in front of a tag's face hides the tag from all poses, metres.
 const NEAR: f64 = 0.05;
 /// The wall on which a tag is mounted is at most this far behind its centre, metres.

@@ -5,11 +5,11 @@ use super::depth::SlackEvaluator;
 use super::hall::{hall, hall_legend};
 use super::legend::{Sample, legend};
 use super::palette;
-use super::panel::{Panel, Window, tick_at_scale};
+use super::panel::{Inside, Panel, Window, tick_at_scale};
 use super::section::border;
 use super::svg::{Font, Picture, Style, literal};
 use crate::log::factor_text;
-use crate::plan::{ChainReport, StepKind, StepReport};
+use crate::plan::{BeliefStateF64, ChainReport, StepKind, StepReport};
 use crate::site::Site;
 use posegate::shape::SuccessSet;
 
@@ -96,6 +96,7 @@ pub fn chain_picture<'s>(
     picture.finish()
 }
 
+/// Draws a step: its panel, and two lines below it.
 fn panel(
     picture: &mut Picture,
     [left, top]: [f64; 2],
@@ -103,26 +104,12 @@ fn panel(
     step: &StepReport,
     success: Option<&SuccessSet>,
 ) {
-    let drive = step.kind == StepKind::Navigation;
-    let (from, to) = (&step.before, &step.after);
-    let shown = if drive { to } else { from };
-    let whole = |belief: &crate::plan::BeliefStateF64| {
-        let [rho, alpha] = belief.enclosing();
-        [rho + belief.spread[0], alpha + belief.spread[1]]
-    };
-    let length = libm::hypot(to.pose[0] - from.pose[0], to.pose[1] - from.pose[1]);
-    let half = if drive {
-        0.5 * length + whole(from)[0].max(whole(to)[0]) + 0.1
-    } else {
-        2.2 * whole(shown)[0] + 0.05
-    };
-    let middle = if drive {
-        [
-            0.5 * (from.pose[0] + to.pose[0]),
-            0.5 * (from.pose[1] + to.pose[1]),
-        ]
-    } else {
-        [shown.pose[0], shown.pose[1]]
+    let half = half_width(step);
+    let middle = match step.kind {
+        StepKind::Navigation => {
+            [0, 1].map(|axis| 0.5 * (step.before.pose[axis] + step.after.pose[axis]))
+        }
+        _ => position(shown(step)),
     };
     let window = Window {
         x: [middle[0] - half, middle[0] + half],
@@ -139,62 +126,98 @@ fn panel(
     let what = match (&step.task, step.kind) {
         (Some(task), StepKind::Localization) => format!("{}. look: {}", index + 1, literal(task)),
         (Some(task), _) => format!("{}. work: {}", index + 1, literal(task)),
-        (None, _) => format!("{}. navigate, {length:.2} m", index + 1),
+        (None, _) => format!("{}. navigate, {:.2} m", index + 1, length(step)),
     };
-    let heading = shown.pose[2];
     panel.draw(picture, &what, tick_at_scale(scale, 60.0), |inside| {
         if let Some(set) = success {
             let depth = SlackEvaluator::of(set);
+            let heading = shown(step).pose[2];
             let holds = |[x, y]: [f64; 2]| depth.holds([x, y, heading]);
             let area: Vec<Vec<[f64; 2]>> = border(&holds, &window, 1.5 / scale);
             inside.polygons(&area, &palette::AREA);
             inside.polygons(&area, &palette::BORDER);
         }
-        if drive {
-            let start = [from.pose[0], from.pose[1]];
-            inside.disc(start, from.enclosing()[0], &palette::EXTENT);
-            inside.disc(start, whole(from)[0], &NEEDED);
-            inside.arrow(
-                start,
-                [to.pose[0], to.pose[1]],
-                &Style::outlined(palette::INK, 1.6),
-            );
-        }
-        let at = [shown.pose[0], shown.pose[1]];
-        inside.disc(at, whole(shown)[0], &NEEDED);
-        inside.disc(
-            at,
-            shown.enclosing()[0],
-            &palette::of_set(step.failure.is_none()),
-        );
-        let nose = 0.16 * half;
-        let ahead = [
-            at[0] + nose * libm::cos(heading),
-            at[1] + nose * libm::sin(heading),
-        ];
-        inside.arrow(at, ahead, &Style::outlined(palette::INK, 2.0));
+        draw_sets(inside, step, 0.16 * half);
     });
-    let [m, rad] = shown.enclosing();
+    draw_words(picture, [left, top + EDGE], step);
+}
+
+/// Returns the belief that a panel shows: after a drive, before any other step.
+fn shown(step: &StepReport) -> &BeliefStateF64 {
+    match step.kind {
+        StepKind::Navigation => &step.after,
+        _ => &step.before,
+    }
+}
+
+/// Returns the position of a belief's pose.
+fn position(belief: &BeliefStateF64) -> [f64; 2] {
+    [belief.pose[0], belief.pose[1]]
+}
+
+/// Returns the largest distance of the robot from a belief's pose, metres.
+fn reach(belief: &BeliefStateF64) -> f64 {
+    belief.enclosing()[0] + belief.spread[0]
+}
+
+/// Returns the distance between the poses before and after a step, metres.
+fn length(step: &StepReport) -> f64 {
+    let [from, to] = [step.before.pose, step.after.pose];
+    libm::hypot(to[0] - from[0], to[1] - from[1])
+}
+
+/// Returns half of the width of a step's panel, metres.
+fn half_width(step: &StepReport) -> f64 {
+    match step.kind {
+        StepKind::Navigation => {
+            0.5 * length(step) + reach(&step.before).max(reach(&step.after)) + 0.1
+        }
+        _ => 2.2 * reach(&step.before) + 0.05,
+    }
+}
+
+/// Draws the beliefs of a step. The arrow at the shown pose has a length of `nose` metres.
+fn draw_sets(inside: &mut Inside<'_>, step: &StepReport, nose: f64) {
+    let (from, shown) = (&step.before, shown(step));
+    if step.kind == StepKind::Navigation {
+        let start = position(from);
+        inside.disc(start, from.enclosing()[0], &palette::EXTENT);
+        inside.disc(start, reach(from), &NEEDED);
+        let way = Style::outlined(palette::INK, 1.6);
+        inside.arrow(start, position(&step.after), &way);
+    }
+    let at = position(shown);
+    inside.disc(at, reach(shown), &NEEDED);
+    let style = palette::of_set(step.failure.is_none());
+    inside.disc(at, shown.enclosing()[0], &style);
+    let heading = shown.pose[2];
+    let ahead = [
+        at[0] + nose * libm::cos(heading),
+        at[1] + nose * libm::sin(heading),
+    ];
+    inside.arrow(at, ahead, &Style::outlined(palette::INK, 2.0));
+}
+
+/// Draws the uncertainty and the result of a step below its panel.
+fn draw_words(picture: &mut Picture, [left, bottom]: [f64; 2], step: &StepReport) {
+    let [m, rad] = shown(step).enclosing();
     let known = format!(
         "{:.1} cm, yaw {:.1}° about the estimate",
         100.0 * m,
         rad.to_degrees()
     );
     let font = Font::new(12.0, palette::INK);
-    picture.text([left, top + EDGE + 46.0], &known, &font);
+    picture.text([left, bottom + 46.0], &known, &font);
     let verdict = match (step.margin, step.failure) {
         (Some(margin), None) => format!("inside, margin {}", factor_text(margin)),
         (Some(margin), Some(_)) => format!("not inside, margin {}", factor_text(margin)),
         (None, Some(_)) => "no growth for this start".into(),
         (None, None) => format!(
             "from within {:.1} cm of its beginning",
-            100.0 * from.spread[0]
+            100.0 * step.before.spread[0]
         ),
     };
     let colour = palette::of_words(step.failure.is_none());
-    picture.text(
-        [left, top + EDGE + 62.0],
-        &verdict,
-        &Font::new(12.0, colour),
-    );
+    let font = Font::new(12.0, colour);
+    picture.text([left, bottom + 62.0], &verdict, &font);
 }

@@ -5,12 +5,12 @@ use super::floor::Labels;
 use super::ingredients::{Eye, Ingredients, radians};
 use super::legend::{LINE, Sample, legend};
 use super::palette;
-use super::panel::{Panel, tick_at_scale};
+use super::panel::{Inside, Panel, tick_at_scale};
 use super::svg::{Picture, Style, literal};
 use super::task_plan::about;
 use crate::plan::{ChainReport, StepKind, StepReport};
 use crate::site::{Site, Task};
-use posegate::shape::SuccessSet;
+use posegate::shape::{PoseDeg, SuccessSet};
 
 const CAMERA: Style = Style::outlined("#8a6d00", 1.8).dashed("5 2");
 const GOAL: Style = Style::outlined(palette::INK, 2.2);
@@ -86,70 +86,128 @@ pub(super) fn hall(
         scale,
         y_title: true,
     };
-    let goals = || site.tasks.values().map(|task| task.success.goal);
+    let hall = Hall {
+        site,
+        routes,
+        scale,
+    };
     panel.draw(picture, title, tick_at_scale(scale, 60.0), |inside| {
-        site.walls.iter().for_each(|wall| inside.wall(wall));
-        for task in site.tasks.values() {
+        hall.draw_bodies(inside);
+        hall.draw_steps(inside);
+        hall.draw_goals_and_tags(inside);
+        let mut labels = Labels::default();
+        hall.avoid_drawn(inside, &mut labels);
+        hall.label_tasks_and_tags(inside, &mut labels);
+        hall.label_starts(inside, &mut labels);
+        for wall in &site.walls {
+            // At a corner of the hall, a name would be next to two walls.
+            if let Some(at) = inside.middle(&wall.corners) {
+                labels.place(inside, at, &literal(&wall.name));
+            }
+        }
+    });
+    panel
+}
+
+/// The drawn parts of a hall.
+struct Hall<'a> {
+    site: &'a Site,
+    routes: &'a [&'a ChainReport],
+    /// Pixels per metre.
+    scale: f64,
+}
+
+impl Hall<'_> {
+    /// Yields the goals of the tasks.
+    fn goals(&self) -> impl Iterator<Item = PoseDeg> {
+        self.site.tasks.values().map(|task| task.success.goal)
+    }
+
+    /// Yields the steps of all routes.
+    fn steps(&self) -> impl Iterator<Item = &StepReport> {
+        self.routes.iter().flat_map(|report| &report.steps)
+    }
+
+    /// Draws the walls, and the robots at the goals.
+    fn draw_bodies(&self, inside: &mut Inside<'_>) {
+        self.site.walls.iter().for_each(|wall| inside.wall(wall));
+        for task in self.site.tasks.values() {
             for outline in Ingredients::of(&task.success.shape).outlines {
                 inside.robot(&outline, radians(task.success.goal));
             }
         }
-        for step in looks(routes) {
+    }
+
+    /// Draws the looks with their lines of sight, and the drives.
+    fn draw_steps(&self, inside: &mut Inside<'_>) {
+        for step in looks(self.routes) {
             let (at, reach) = place(step);
             inside.disc(at, reach, &LOOK);
-            let set = step.task.as_deref().and_then(|name| success_of(site, name));
+            let name = step.task.as_deref();
+            let set = name.and_then(|name| success_of(self.site, name));
             for tag in set.map(SuccessSet::tags).unwrap_or_default() {
                 inside.line(&[at, [tag.pose.x, tag.pose.y]], &SIGHT);
             }
         }
-        for step in routes.iter().flat_map(|report| &report.steps) {
+        for step in self.steps() {
             if step.kind == StepKind::Navigation {
                 let ends = [step.before.pose, step.after.pose].map(|[x, y, _]| [x, y]);
                 inside.arrow(ends[0], ends[1], &ROUTE);
             }
         }
-        if routes.is_empty() {
-            for goal in goals() {
-                for camera in site.cameras.values() {
+    }
+
+    /// Draws the goals and the tags; without routes, also the cameras at the goals.
+    fn draw_goals_and_tags(&self, inside: &mut Inside<'_>) {
+        if self.routes.is_empty() {
+            for goal in self.goals() {
+                for camera in self.site.cameras.values() {
                     let eye = Eye::of(&camera.mount, radians(goal));
                     let ([x, y, _], [fx, fy, _]) = (eye.centre, eye.axes[0]);
-                    let ahead = 24.0 / scale;
+                    let ahead = 24.0 / self.scale;
                     inside.arrow([x, y], [x + ahead * fx, y + ahead * fy], &CAMERA);
                 }
             }
         }
-        goals().for_each(|goal| inside.pose(goal, &GOAL));
-        site.tags.values().for_each(|tag| inside.tag(&tag.tag));
-        let mut labels = Labels::default();
-        for step in looks(routes) {
+        self.goals().for_each(|goal| inside.pose(goal, &GOAL));
+        let tags = self.site.tags.values();
+        tags.for_each(|tag| inside.tag(&tag.tag));
+    }
+
+    /// Reserves the area of looks, drives, goals and tags, so that no label covers them.
+    fn avoid_drawn(&self, inside: &mut Inside<'_>, labels: &mut Labels) {
+        for step in looks(self.routes) {
             let (at, reach) = place(step);
-            labels.avoid(inside, at, reach * scale);
+            labels.avoid(inside, at, reach * self.scale);
         }
-        for step in routes.iter().flat_map(|report| &report.steps) {
+        for step in self.steps() {
             let [from, to] = [step.before.pose, step.after.pose];
             let between = |t: f64| [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]));
-            let length = libm::hypot(to[0] - from[0], to[1] - from[1]) * scale;
+            let length = libm::hypot(to[0] - from[0], to[1] - from[1]) * self.scale;
             let count = libm::ceil(length / 14.0).min(100.0) as u32;
             for k in 0..=count {
                 let t = f64::from(k) / f64::from(count.max(1));
                 labels.avoid(inside, between(t), 3.0);
             }
         }
-        for goal in goals() {
+        for goal in self.goals() {
             let yaw = goal.yaw_deg.to_radians();
-            let ahead = 13.0 / scale;
+            let ahead = 13.0 / self.scale;
             let middle = [
                 goal.x + ahead * libm::cos(yaw),
                 goal.y + ahead * libm::sin(yaw),
             ];
             labels.avoid(inside, middle, 9.0);
         }
-        for tag in site.tags.values() {
+        for tag in self.site.tags.values() {
             labels.avoid(inside, [tag.tag.pose.x, tag.tag.pose.y], 6.0);
         }
-        // Tasks that share a goal share a label.
+    }
+
+    /// Labels tasks at their goals, and tags. Tasks that share a goal share a label.
+    fn label_tasks_and_tags(&self, inside: &mut Inside<'_>, labels: &mut Labels) {
         let mut tasks: Vec<([f64; 2], String)> = Vec::new();
-        for (name, task) in &site.tasks {
+        for (name, task) in &self.site.tasks {
             let at = [task.success.goal.x, task.success.goal.y];
             match tasks.iter_mut().find(|(known, _)| *known == at) {
                 Some((_, text)) => *text += &format!(", {}", literal(name)),
@@ -159,31 +217,28 @@ pub(super) fn hall(
         for (at, text) in &tasks {
             labels.place(inside, *at, text);
         }
-        for (name, tag) in &site.tags {
+        for (name, tag) in &self.site.tags {
             let text = format!("{}, id {}", literal(name), tag.tag.id);
             labels.place(inside, [tag.tag.pose.x, tag.tag.pose.y], &text);
         }
-        for (number, report) in routes.iter().enumerate() {
+    }
+
+    /// Draws the starts of the routes. Routes that share a start share a label.
+    fn label_starts(&self, inside: &mut Inside<'_>, labels: &mut Labels) {
+        for (number, report) in self.routes.iter().enumerate() {
             let Some(first) = report.steps.first() else {
                 continue;
             };
             let ([x, y], _) = place(first);
             inside.disc([x, y], 0.0, &Style::filled("#0072b2"));
-            let begun = routes[..number]
+            let begun = self.routes[..number]
                 .iter()
                 .filter_map(|other| other.steps.first());
             if !begun.map(place).any(|(other, _)| other == [x, y]) {
                 labels.place(inside, [x, y], "start");
             }
         }
-        for wall in &site.walls {
-            // At a corner of the hall, a name would be next to two walls.
-            if let Some(at) = inside.middle(&wall.corners) {
-                labels.place(inside, at, &literal(&wall.name));
-            }
-        }
-    });
-    panel
+    }
 }
 
 /// Draws the legend of a hall in two columns, with an entry for each kind of drawn part; the point is the upper left

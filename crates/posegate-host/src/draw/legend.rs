@@ -2,7 +2,6 @@
 
 use super::palette;
 use super::panel::hatching;
-use super::study::Answer;
 use super::svg::{Font, Picture, Style};
 
 /// The sample next to a legend's text.
@@ -55,28 +54,6 @@ pub fn legend(picture: &mut Picture, [left, top]: [f64; 2], entries: &[(Sample, 
         }
         let font = Font::new(12.0, palette::INK);
         picture.text([left + 32.0, middle + 4.0], words, &font);
-    }
-}
-
-/// Returns the text of an answer in a picture: `1 m / 2° inside S_l, margin 1.366`.
-#[must_use]
-pub fn words(answer: &Answer, set_name: &str) -> String {
-    format!(
-        "{} {} {set_name}, margin {}",
-        answer.known,
-        answer.holds_text(),
-        answer.margin_text()
-    )
-}
-
-/// Draws the heading of a row of panels, its baseline at `top`, followed by the row's answers.
-pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, answers: &[(&Answer, &str)]) {
-    let font = Font::new(15.0, palette::INK).bold();
-    picture.text([24.0, top], heading, &font);
-    for (index, (answer, set_name)) in answers.iter().enumerate() {
-        let font = Font::new(13.0, palette::of_words(answer.holds())).bold();
-        let at = [560.0 + 310.0 * index as f64, top];
-        picture.text(at, &words(answer, set_name), &font);
     }
 }
 

@@ -1,6 +1,4 @@
-//! Text in SVG: subscripts, and literal names.
-
-use super::svg::number;
+//! Text in SVG: subscripts, literal names, and numbers.
 
 /// Replaces an underscore that does not begin a subscript.
 pub(super) const UNDERSCORE: char = '\u{1}';
@@ -48,6 +46,14 @@ pub(super) fn lowered(text: &str, size: f64) -> String {
     out.replace(UNDERSCORE, "_")
 }
 
+/// Formats a number with at most two decimals, without trailing zeros.
+#[must_use]
+pub fn number(value: f64) -> String {
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0" } else { text }.into()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,5 +80,19 @@ mod tests {
         let text = picture.finish();
         assert!(text.contains("<title>a_b</title>"));
         assert!(text.contains(">see_t7\u{fffd}</text>"));
+    }
+
+    #[test]
+    fn numbers_have_at_most_two_decimals() {
+        for (value, text) in [
+            (1.0, "1"),
+            (-0.001, "0"),
+            (0.5, "0.5"),
+            (10.0, "10"),
+            (-3.456, "-3.46"),
+            (100.0, "100"),
+        ] {
+            assert_eq!(number(value), text);
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Fig. 3 of the paper: the pose-sets inside S_l (seeing the tag) and S_w (docking).
 
-use super::legend::{Sample, legend, row_heading, verdict, words};
+use super::answers::{row_heading, words};
+use super::legend::{Sample, legend, verdict};
 use super::multiple::Row;
 use super::palette;
 use super::panel::{Inside, Panel, Window, signed};

@@ -36,6 +36,7 @@ pub use self::task_image::{SeenFrom, task_image};
 pub use self::task_plan::task_plan;
 pub use self::task_sections::task_sections;
 
+mod answers;
 mod belief;
 mod borders;
 mod chain;
@@ -71,6 +72,7 @@ pub mod study;
 mod subject;
 mod svg;
 mod tag_image;
+mod tag_places;
 mod task_image;
 mod task_plan;
 mod task_sections;

@@ -1,8 +1,8 @@
 //! A panel: a rectangle of the floor at equal scale in x and y, with axes in metres.
 
+use super::letters::number;
 use super::palette;
-use super::section::Cell;
-use super::svg::{Anchor, Font, Picture, Style, number, points_path, rectangle_path};
+use super::svg::{Anchor, Font, Picture, Style, points_path, rectangle_path};
 
 /// A rectangle of the floor, metres: x forward, y left.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +10,15 @@ pub struct Window {
     /// `[lo, hi]`, metres.
     pub x: [f64; 2],
     /// `[lo, hi]`, metres.
+    pub y: [f64; 2],
+}
+
+/// A rectangle of covered cells in the goal frame, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// `[lo, hi]`.
+    pub x: [f64; 2],
+    /// `[lo, hi]`.
     pub y: [f64; 2],
 }
 

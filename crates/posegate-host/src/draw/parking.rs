@@ -1,6 +1,7 @@
 //! Fig. 1 of the paper: a car in a parking space, and the poses at which the car is inside.
 
-use super::legend::{Sample, legend, row_heading, verdict, words};
+use super::answers::{row_heading, words};
+use super::legend::{Sample, legend, verdict};
 use super::multiple::Row;
 use super::palette;
 use super::panel::{Panel, Window};

@@ -1,6 +1,7 @@
 //! The floor plan of Fig. 3: the camera's view at the goal, and the robot's pose-sets.
 
-use super::legend::{Sample, legend, verdict, words};
+use super::answers::words;
+use super::legend::{Sample, legend, verdict};
 use super::localization::tag;
 use super::palette;
 use super::panel::{Inside, Panel, Window};

@@ -2,12 +2,13 @@
 //! diagram if the truth is known.
 
 use super::legend::{LINE, Sample, legend};
+use super::letters::number;
 use super::palette;
 use super::replay_lanes::{
     Axis, DENIAL, HEIGHT, LEFT, PERMIT, SHUT, SPARSE, WIDTH, WRONG, lanes, shades,
 };
 use super::stanford;
-use super::svg::{Anchor, Font, Picture, Style, literal, number};
+use super::svg::{Anchor, Font, Picture, Style, literal};
 use crate::log::replay::Replay;
 
 const TOP: f64 = 52.0;

@@ -1,7 +1,8 @@
 //! The lanes of a replay's picture: the states of the gate, the interlock and the rules in use today over time.
 
+use super::letters::number;
 use super::palette;
-use super::svg::{Anchor, Font, Picture, Style, number};
+use super::svg::{Anchor, Font, Picture, Style};
 use crate::log::replay::{Bucket, Replay, RuleCounts, Thresholds};
 use posegate::gate::Reason;
 

@@ -1,19 +1,10 @@
 //! Sections of success sets and of tables at one heading.
 
-use super::panel::Window;
+use super::panel::{Cell, Window};
 use posegate::num::BinaryAngle;
 use posegate::shape::{Scalar, SuccessSet};
 use posegate::table::{Run, Slab, Table};
 use std::collections::BTreeMap;
-
-/// A rectangle of covered cells in the goal frame, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
-    /// `[lo, hi]`.
-    pub x: [f64; 2],
-    /// `[lo, hi]`.
-    pub y: [f64; 2],
-}
 
 /// Returns the border of a set's section at a heading of the goal frame, as closed polygons in the
 /// goal frame.

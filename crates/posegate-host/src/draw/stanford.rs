@@ -1,7 +1,8 @@
 //! The Stanford diagram: error versus protection level, in units of the alert limit.
 
+use super::letters::number;
 use super::palette;
-use super::svg::{Anchor, Font, Picture, Style, number, points_path};
+use super::svg::{Anchor, Font, Picture, Style, points_path};
 use crate::log::replay::{Region, STANFORD_END, STANFORD_STEPS, Stanford};
 
 /// Side of the diagram, pixels.

@@ -11,8 +11,8 @@
 //! # Ok::<(), posegate_host::draw::study::StudyError>(())
 //! ```
 
-use super::fig4;
 use super::placement::Column;
+use super::tag_places::{self, NoPlaces};
 use crate::log::{coordinates, factor, factor_text};
 use crate::site::{Site, SiteError, Task, UnknownTask};
 use posegate::bake::{self, BakeError, BakeInput, Layout};
@@ -273,7 +273,7 @@ impl CaseStudy {
             // Each slab is baked once and proven once.
             steps += 2 * u64::from(cells.slabs);
         }
-        Ok(steps + fig4::STEPS)
+        Ok(steps + tag_places::STEPS)
     }
 
     /// Bakes and proves every table and answers every question. `progress` is called for every slab
@@ -286,7 +286,7 @@ impl CaseStudy {
         let mut study = Self {
             tables: Vec::new(),
             answers: Vec::new(),
-            places: fig4::places(&site, progress)?,
+            places: places(&site, progress)?,
             site,
         };
         for (name, task) in &study.site.tasks {
@@ -348,6 +348,15 @@ impl CaseStudy {
 
 fn site() -> Result<Site, StudyError> {
     Ok(Site::parse(SITE, "site.toml")?)
+}
+
+/// Returns the tag's places of Fig. 4.
+fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Column>, StudyError> {
+    let set = &site.task(SEE)?.success;
+    tag_places::places(set, site.epsilon, progress).map_err(|why| match why {
+        NoPlaces::Shape => StudyError::Shape(SEE.into()),
+        NoPlaces::Search(why) => StudyError::Place(why),
+    })
 }
 
 fn order<'a>(site: &Site, name: &'a str, task: &'a Task) -> Result<BakeInput<'a>, StudyError> {

@@ -5,7 +5,7 @@
 
 pub use super::letters::literal;
 
-use super::letters::{UNDERSCORE, escaped, lowered};
+use super::letters::{UNDERSCORE, escaped, lowered, number};
 use std::fmt::Write;
 
 /// The style of an outline and its inside.
@@ -312,31 +312,9 @@ pub fn rectangle_path([left, top, width, height]: [f64; 4]) -> String {
     format!("M{left} {top}h{width}v{height}h-{width}z")
 }
 
-/// Formats a number with at most two decimals, without trailing zeros.
-#[must_use]
-pub fn number(value: f64) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0" } else { text }.into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_have_at_most_two_decimals() {
-        for (value, text) in [
-            (1.0, "1"),
-            (-0.001, "0"),
-            (0.5, "0.5"),
-            (10.0, "10"),
-            (-3.456, "-3.46"),
-            (100.0, "100"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-    }
 
     #[test]
     fn paths_are_compact() {

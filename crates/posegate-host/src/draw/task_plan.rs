@@ -6,7 +6,7 @@ use super::legend::{Sample, legend, verdict};
 use super::palette;
 use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
 use super::section::border;
-use super::subject::{DrawError, Subject};
+use super::subject::{ContainmentResult, DrawError, Subject};
 use super::svg::{Font, Picture, Style, literal};
 use super::task_sections::name_of;
 use posegate::shape::Tag;
@@ -39,99 +39,118 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
     let height = (panel.bottom() + 46.0).max(360.0);
     let mut picture = Picture::new(side + 330.0, height, &title);
     picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
-    let heading = radians(goal)[2];
-    let area = border(
-        &|[x, y]| subject.depth.holds([x, y, heading]),
-        &window,
-        SPACING / scale,
-    );
-    let views: Vec<_> = own
-        .views
-        .iter()
-        .map(|view| seen(view, radians(goal), &window, SPACING / scale))
-        .collect();
     let held: Vec<_> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
     let shown = format!("S at the goal's heading, {}°", signed(goal.yaw_deg));
     panel.draw(&mut picture, &shown, tick_at_scale(scale, 60.0), |inside| {
-        inside.polygons(&area, &palette::AREA);
-        views
-            .iter()
-            .for_each(|view| inside.polygons(view, &palette::VIEW));
-        inside.polygons(&area, &palette::BORDER);
-        let world = |polygon: &Vec<[f64; 2]>| -> Vec<[f64; 2]> {
-            polygon.iter().map(|p| subject.in_world(*p)).collect()
-        };
-        let regions: Vec<_> = own.regions.iter().map(world).collect();
-        inside.polygons(&regions, &REGION);
-        for obstacle in own.obstacles.iter().map(world) {
-            inside.hatched(&obstacle, &palette::WALL);
-        }
-        subject.site.walls.iter().for_each(|wall| inside.wall(wall));
-        for outline in &own.outlines {
-            inside.robot(outline, radians(goal));
-        }
+        draw_areas(inside, subject, &own, &panel);
+        draw_bodies(inside, subject, &own);
+        let heading = radians(goal)[2];
         for (belief, held) in subject.beliefs.iter().zip(&held) {
             if let Some(section) = belief.section(heading) {
                 inside.polygons(&[section], &palette::of_set(held.inside));
             }
         }
-        let shown =
-            |inside: &Inside<'_>, tag: &Tag| inside.shows([tag.pose.x, tag.pose.y], 0.5 * tag.size);
-        for tag in subject.site.tags.values() {
-            if shown(inside, &tag.tag) {
-                inside.tag(&tag.tag);
-            }
-        }
-        inside.pose(goal, &Style::outlined(palette::INK, 2.2));
-        for view in &own.views {
-            let eye = Eye::of(&view.mount, radians(goal));
-            let [x, y, _] = eye.centre;
-            inside.in_pixels(|picture, panel| {
-                let [x, y] = panel.at([x, y]);
-                let box_of = [x - 3.5, y - 3.5, 7.0, 7.0];
-                picture.rectangle(
-                    box_of,
-                    &Style::filled("#ffffff").with_outline(palette::INK, 1.5),
-                );
-            });
-        }
-        inside.name([goal.x, goal.y], [-14.0, 18.0], "goal");
-        if let Some(view) = own.views.first() {
-            let [x, y, _] = Eye::of(&view.mount, radians(goal)).centre;
-            inside.name([x, y], [8.0, 4.0], "camera");
-        }
-        for (name, tag) in &subject.site.tags {
-            let tag = tag.tag;
-            let text = format!("{}, id {}", literal(name), tag.id);
-            if shown(inside, &tag) {
-                inside.name([tag.pose.x, tag.pose.y], [8.0, -8.0], &text);
-            }
-        }
-        for wall in &subject.site.walls {
-            if let Some(middle) = inside.middle(&wall.corners) {
-                inside.name(middle, [6.0, 4.0], &literal(&wall.name));
-            }
-        }
+        draw_tags_and_cameras(inside, subject, &own);
+        draw_names(inside, subject, &own);
     });
-    let mut top = 76.0;
-    if let ([belief], [held]) = (subject.beliefs.as_slice(), held.as_slice()) {
-        let bold = format!("{}:", name_of(belief));
-        verdict(&mut picture, [side, top], held.inside, &bold, &held.words);
-        top += 48.0;
-    } else if !held.is_empty() {
-        let within = held.iter().filter(|held| held.inside).count();
-        let bold = format!("{within} of {} pose-sets", held.len());
-        verdict(
-            &mut picture,
-            [side, top],
-            within == held.len(),
-            &bold,
-            "are inside",
-        );
-        top += 48.0;
-    }
+    let top = 76.0 + draw_verdict(&mut picture, [side, 76.0], subject, &held);
     legend(&mut picture, [side, top], &entries(subject, &own));
     Ok(picture.finish())
+}
+
+/// Draws S at the goal's heading, and what the cameras see from the goal.
+fn draw_areas(inside: &mut Inside<'_>, subject: &Subject<'_>, own: &Ingredients, panel: &Panel) {
+    let at_goal = radians(subject.goal());
+    let spacing = SPACING / panel.scale;
+    let holds = |[x, y]: [f64; 2]| subject.depth.holds([x, y, at_goal[2]]);
+    let area = border(&holds, &panel.window, spacing);
+    inside.polygons(&area, &palette::AREA);
+    for view in &own.views {
+        let seen = seen(view, at_goal, &panel.window, spacing);
+        inside.polygons(&seen, &palette::VIEW);
+    }
+    inside.polygons(&area, &palette::BORDER);
+}
+
+/// Draws regions, obstacles, walls, and the robot at the goal.
+fn draw_bodies(inside: &mut Inside<'_>, subject: &Subject<'_>, own: &Ingredients) {
+    let world = |polygon: &Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+        polygon.iter().map(|p| subject.in_world(*p)).collect()
+    };
+    let regions: Vec<_> = own.regions.iter().map(world).collect();
+    inside.polygons(&regions, &REGION);
+    for obstacle in own.obstacles.iter().map(world) {
+        inside.hatched(&obstacle, &palette::WALL);
+    }
+    subject.site.walls.iter().for_each(|wall| inside.wall(wall));
+    for outline in &own.outlines {
+        inside.robot(outline, radians(subject.goal()));
+    }
+}
+
+/// Returns `true` if a tag is in the panel.
+fn shows(inside: &Inside<'_>, tag: &Tag) -> bool {
+    inside.shows([tag.pose.x, tag.pose.y], 0.5 * tag.size)
+}
+
+/// Draws the tags, the goal, and the cameras at the goal.
+fn draw_tags_and_cameras(inside: &mut Inside<'_>, subject: &Subject<'_>, own: &Ingredients) {
+    for tag in subject.site.tags.values() {
+        if shows(inside, &tag.tag) {
+            inside.tag(&tag.tag);
+        }
+    }
+    inside.pose(subject.goal(), &Style::outlined(palette::INK, 2.2));
+    for view in &own.views {
+        let [x, y, _] = Eye::of(&view.mount, radians(subject.goal())).centre;
+        inside.in_pixels(|picture, panel| {
+            let [x, y] = panel.at([x, y]);
+            let white = Style::filled("#ffffff").with_outline(palette::INK, 1.5);
+            picture.rectangle([x - 3.5, y - 3.5, 7.0, 7.0], &white);
+        });
+    }
+}
+
+/// Names the goal, the first camera, the tags and the walls.
+fn draw_names(inside: &mut Inside<'_>, subject: &Subject<'_>, own: &Ingredients) {
+    let goal = subject.goal();
+    inside.name([goal.x, goal.y], [-14.0, 18.0], "goal");
+    if let Some(view) = own.views.first() {
+        let [x, y, _] = Eye::of(&view.mount, radians(goal)).centre;
+        inside.name([x, y], [8.0, 4.0], "camera");
+    }
+    for (name, tag) in &subject.site.tags {
+        let tag = tag.tag;
+        let text = format!("{}, id {}", literal(name), tag.id);
+        if shows(inside, &tag) {
+            inside.name([tag.pose.x, tag.pose.y], [8.0, -8.0], &text);
+        }
+    }
+    for wall in &subject.site.walls {
+        if let Some(middle) = inside.middle(&wall.corners) {
+            inside.name(middle, [6.0, 4.0], &literal(&wall.name));
+        }
+    }
+}
+
+/// Draws whether the pose-sets are inside, if there are any. Returns the height, pixels.
+fn draw_verdict(
+    picture: &mut Picture,
+    at: [f64; 2],
+    subject: &Subject<'_>,
+    held: &[ContainmentResult],
+) -> f64 {
+    if let ([belief], [held]) = (subject.beliefs.as_slice(), held) {
+        let bold = format!("{}:", name_of(belief));
+        verdict(picture, at, held.inside, &bold, &held.words);
+    } else if held.is_empty() {
+        return 0.0;
+    } else {
+        let within = held.iter().filter(|held| held.inside).count();
+        let bold = format!("{within} of {} pose-sets", held.len());
+        verdict(picture, at, within == held.len(), &bold, "are inside");
+    }
+    48.0
 }
 
 /// Regions in which the robot must stay.

@@ -166,8 +166,8 @@ pub(super) fn name_of(belief: &PoseSetF64) -> String {
             yaw_rad,
         } => format!(
             "{} m / {}° about the goal",
-            super::svg::number(translation_m),
-            super::svg::number(yaw_rad.to_degrees())
+            super::letters::number(translation_m),
+            super::letters::number(yaw_rad.to_degrees())
         ),
         Uncertainty::Gaussian(_) => "the estimate".into(),
     }

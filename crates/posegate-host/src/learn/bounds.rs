@@ -10,6 +10,7 @@ use super::document::{self, Document};
 use super::error_model::ErrorModel;
 use super::family::{Family, LEAST_RATIO};
 use super::runs::{self, Tally};
+use super::sample::{FEWEST, FEWEST_RUNS, LEAST_ERROR, Sample};
 use super::smooth::{Lattice, Target, capped, errors_around, fit, floored, share_of};
 use super::split::{Drawn, FITTED, split};
 use super::taken_with::TakenWith;
@@ -39,16 +40,10 @@ impl Default for BoundsSettings {
     }
 }
 
-/// The smallest error that is used, metres and radians; smaller ones are replaced by it.
-pub(super) const LEAST_ERROR: f64 = 1e-7;
 /// A coarse cell gets this many times the fewest rows for a bound.
 const ROOMY: f64 = 3.0;
 /// The fewest rows of a coarse cell for which its parts are filled.
 const FULL: f64 = 100.0;
-/// The fewest rows of a cell with a bound.
-pub(super) const FEWEST: f64 = 10.0;
-/// The fewest runs in a region with a bound.
-pub(super) const FEWEST_RUNS: f64 = 10.0;
 /// The number of coarse cells of the shape with which the dependence within runs is measured.
 const COARSE: f64 = 8.0;
 /// The fewest rows of a cell for the share of detected views.
@@ -67,14 +62,6 @@ const SLOPE: f64 = 0.02;
 /// The smallest psi at which a mirrored solution is recognised, degrees.
 const HEAD_ON: f64 = 10.0;
 
-/// A detection on one side of the split.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
-    pub(super) at: [f64; 3],
-    pub(super) errors: [f64; 2],
-    pub(super) run: u32,
-}
-
 /// Learns bounds and the share of detected views.
 ///
 /// # Errors
@@ -84,126 +71,198 @@ pub fn learn_bounds(
     detections: &Detections,
     settings: &BoundsSettings,
 ) -> Result<ErrorModel, LearnError> {
-    let BoundsSettings {
-        quantile,
-        confidence,
-        seed,
-        ref taken_with,
-    } = *settings;
-    if let Some(what) = taken_with.as_ref().and_then(TakenWith::fault) {
-        return Err(LearnError::TakenWith { what });
-    }
-    for (name, value) in [("quantile", quantile), ("confidence", confidence)] {
-        if !(value > 0.0 && value < 1.0) {
-            return Err(LearnError::Share { name, value });
-        }
-    }
-    let rows = split(detections, seed);
-    let seen: Vec<Drawn> = rows
-        .iter()
-        .filter(|drawn| drawn.row.errors.is_some())
-        .copied()
-        .collect();
-    let runs = detections.runs.count();
-    let too_few = |found: u64| LearnError::TooFew {
-        found,
-        of: match runs {
-            None => "detections",
-            Some(_) => "detections that are independent of each other",
-        },
-        needed: (libm::ceil(libm::log(1.0 - confidence) / libm::log(quantile)) / (1.0 - FITTED)
-            + 1.0) as u64,
-    };
-    let places: Vec<[f64; 3]> = seen.iter().map(|drawn| drawn.row.at).collect();
-    if places.is_empty() {
-        return Err(too_few(0));
-    }
-    if let Some(found) = runs
-        && (found as f64) * (1.0 - FITTED) < FEWEST_RUNS
-    {
-        return Err(LearnError::TooFewRuns {
-            found: found as u64,
-            needed: libm::ceil(FEWEST_RUNS / (1.0 - FITTED)) as u64,
-        });
-    }
+    settings.check()?;
+    let learner = Learner::new(detections, settings);
+    learner.check_counts()?;
+    let quantile = settings.quantile;
+    let Learner { seen, places, .. } = &learner;
+    let in_runs = learner.runs.is_some();
     let each_cell = (ROOMY * quantile / (1.0 - quantile)).max(FULL);
-    let effect = match runs {
-        None => 1.0,
-        Some(_) => design_effect(&seen, &places, quantile),
+    let effect = if in_runs {
+        design_effect(seen, places, quantile)
+    } else {
+        1.0
     };
-    let cells = Cells::fine_over(&places, each_cell * effect).ok_or_else(|| too_few(0))?;
-    let [fitted, calibrated] = [true, false].map(|side| samples(&seen, &cells, side));
+    let cells = Cells::fine_over(places, each_cell * effect).ok_or_else(|| learner.too_few(0))?;
+    let [fitted, calibrated] = [true, false].map(|side| samples(seen, &cells, side));
     if (fitted.len() as f64) < FEWEST * effect {
-        return Err(too_few((seen.len() as f64 / effect) as u64));
+        return Err(learner.too_few(learner.independent(effect)));
     }
     let steps = steps(quantile, fitted.len() as f64 / effect);
-    let shapes = [0, 1].map(|which| shapes(&cells, &fitted, which, &steps, runs.is_some()));
+    let shapes = [0, 1].map(|which| shapes(&cells, &fitted, which, &steps, in_runs));
     let [Some(translation), Some(yaw)] = [0, 1].map(|which| Family::new(&shapes[which])) else {
-        return Err(too_few(0));
+        return Err(learner.too_few(0));
     };
-    let mut learnt = Calibration::new(&cells, settings, &places, runs.is_some());
+    let given = [quantile, settings.confidence];
+    let mut learnt = Calibration::new(&cells, given, places, in_runs);
     learnt.run(&fitted, &calibrated, &[translation, yaw], effect);
     if !learnt.has_bounds() {
-        let error = too_few((seen.len() as f64 / effect) as u64);
-        return Err(match error {
+        return Err(learner.no_bounds(&learnt, effect));
+    }
+    let data = learner.data([fitted.len(), calibrated.len()], learnt.effect());
+    let document = learner.document(&cells, &shapes, data, learnt);
+    ErrorModel::new(document, "the learnt model")
+}
+
+impl BoundsSettings {
+    /// Checks the settings.
+    fn check(&self) -> Result<(), LearnError> {
+        if let Some(what) = self.taken_with.as_ref().and_then(TakenWith::fault) {
+            return Err(LearnError::TakenWith { what });
+        }
+        for (name, value) in [("quantile", self.quantile), ("confidence", self.confidence)] {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(LearnError::Share { name, value });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The detections from which bounds are learnt.
+struct Learner<'d> {
+    detections: &'d Detections,
+    settings: &'d BoundsSettings,
+    /// All views.
+    rows: Vec<Drawn>,
+    /// The detected ones, and their places.
+    seen: Vec<Drawn>,
+    places: Vec<[f64; 3]>,
+    /// The number of runs, if rows depend on each other.
+    runs: Option<usize>,
+}
+
+impl<'d> Learner<'d> {
+    /// Splits the detections.
+    fn new(detections: &'d Detections, settings: &'d BoundsSettings) -> Self {
+        let rows = split(detections, settings.seed);
+        let seen = rows.iter().filter(|drawn| drawn.row.errors.is_some());
+        let seen: Vec<Drawn> = seen.copied().collect();
+        Self {
+            detections,
+            settings,
+            places: seen.iter().map(|drawn| drawn.row.at).collect(),
+            rows,
+            seen,
+            runs: detections.runs.count(),
+        }
+    }
+
+    /// Returns the error for too few detections.
+    fn too_few(&self, found: u64) -> LearnError {
+        let BoundsSettings {
+            quantile,
+            confidence,
+            ..
+        } = *self.settings;
+        LearnError::TooFew {
+            found,
+            of: match self.runs {
+                None => "detections",
+                Some(_) => "detections that are independent of each other",
+            },
+            needed: (libm::ceil(libm::log(1.0 - confidence) / libm::log(quantile)) / (1.0 - FITTED)
+                + 1.0) as u64,
+        }
+    }
+
+    /// Refuses data without a detection, or with too few runs.
+    fn check_counts(&self) -> Result<(), LearnError> {
+        if self.places.is_empty() {
+            return Err(self.too_few(0));
+        }
+        match self.runs {
+            Some(found) if (found as f64) * (1.0 - FITTED) < FEWEST_RUNS => {
+                Err(LearnError::TooFewRuns {
+                    found: found as u64,
+                    needed: libm::ceil(FEWEST_RUNS / (1.0 - FITTED)) as u64,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the number of independent detections for a design effect.
+    fn independent(&self, effect: f64) -> u64 {
+        (self.seen.len() as f64 / effect) as u64
+    }
+
+    /// Returns the error for a calibration in which no cell has a bound.
+    fn no_bounds(&self, learnt: &Calibration<'_>, effect: f64) -> LearnError {
+        match self.too_few(self.independent(effect)) {
             LearnError::TooFew { found, needed, .. } if found >= needed => LearnError::Nowhere {
-                found: seen.len() as u64,
+                found: self.seen.len() as u64,
                 why: learnt.reasons(),
             },
-            _ => error,
-        });
+            error => error,
+        }
     }
-    let independent = match runs {
-        None => rows.len() as u64,
-        Some(_) => libm::floor(rows.len() as f64 / learnt.effect()) as u64,
-    };
 
-    let oblique = seen.iter().filter(|drawn| drawn.row.at[2] >= HEAD_ON);
-    let flips = oblique
-        .clone()
-        .filter(|drawn| {
-            let errors = drawn.row.errors.unwrap_or_default();
-            errors[1].to_degrees() > drawn.row.at[2]
-        })
-        .count();
-    let shape_of = |step: usize| document::Shape {
-        translation_m: nested(&cells, &shapes[0][step]),
-        yaw_rad: nested(&cells, &shapes[1][step]),
-    };
-    let (narrower, shape, wider) = match steps.len() {
-        1 => (None, shape_of(0), None),
-        _ => (Some(shape_of(0)), shape_of(1), Some(shape_of(2))),
-    };
-    let document = Document {
-        posegate_model: document::VERSION,
-        kind: "bounds".into(),
-        quantile,
-        confidence,
-        seed,
-        parts: (cells.parts != PARTS).then_some(cells.parts),
-        taken_with: taken_with.clone(),
-        data: document::Data {
+    /// Returns the description of the data, with the numbers of fitted and calibrated detections, and the design
+    /// effect.
+    fn data(&self, [fitted, calibrated]: [usize; 2], effect: f64) -> document::Data {
+        let Self {
+            detections, rows, ..
+        } = self;
+        let oblique = self.seen.iter().filter(|drawn| drawn.row.at[2] >= HEAD_ON);
+        let flips = oblique
+            .clone()
+            .filter(|drawn| {
+                let errors = drawn.row.errors.unwrap_or_default();
+                errors[1].to_degrees() > drawn.row.at[2]
+            })
+            .count();
+        document::Data {
             sha256: hexadecimal(&detections.sha256),
             views: rows.len() as u64,
             drawn_of: detections.drawn_of,
-            detections: seen.len() as u64,
-            fitted: fitted.len() as u64,
-            calibrated: calibrated.len() as u64,
+            detections: self.seen.len() as u64,
+            fitted: fitted as u64,
+            calibrated: calibrated as u64,
             flips: flips as u64,
             flip_share: flips as f64 / oblique.count().max(1) as f64,
             of_better_pose: detections.of_better_pose,
-            runs: runs.map(|runs| runs as u64),
-            independent: runs.map(|_| independent),
-        },
-        edges: cells.edges(),
-        narrower,
-        shape,
-        wider,
-        cell: learnt.cells(),
-        region: learnt.regions,
-        p_detect: share(&rows, runs.is_some()),
-    };
-    ErrorModel::new(document, "the learnt model")
+            runs: self.runs.map(|runs| runs as u64),
+            independent: self
+                .runs
+                .map(|_| libm::floor(rows.len() as f64 / effect) as u64),
+        }
+    }
+
+    /// Returns the model's file.
+    fn document(
+        &self,
+        cells: &Cells,
+        shapes: &[Vec<Vec<f64>>; 2],
+        data: document::Data,
+        learnt: Calibration<'_>,
+    ) -> Document {
+        let shape_of = |step: usize| document::Shape {
+            translation_m: nested(cells, &shapes[0][step]),
+            yaw_rad: nested(cells, &shapes[1][step]),
+        };
+        let (narrower, shape, wider) = match shapes[0].len() {
+            1 => (None, shape_of(0), None),
+            _ => (Some(shape_of(0)), shape_of(1), Some(shape_of(2))),
+        };
+        Document {
+            posegate_model: document::VERSION,
+            kind: "bounds".into(),
+            quantile: self.settings.quantile,
+            confidence: self.settings.confidence,
+            seed: self.settings.seed,
+            parts: (cells.parts != PARTS).then_some(cells.parts),
+            taken_with: self.settings.taken_with.clone(),
+            data,
+            edges: cells.edges(),
+            narrower,
+            shape,
+            wider,
+            cell: learnt.cells(),
+            region: learnt.regions,
+            p_detect: share(&self.rows, self.runs.is_some()),
+        }
+    }
 }
 
 /// Returns the detections of one side of the split, within the cells.

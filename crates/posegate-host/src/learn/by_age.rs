@@ -108,7 +108,7 @@ mod tests {
         let mut rows = Vec::new();
         for (condition, scale) in conditions {
             for _ in 0..600 {
-                random = crate::learn::split::mixed(random);
+                random = crate::learn::random::mixed(random);
                 let even = (random >> 11) as f64 / (1u64 << 53) as f64;
                 rows.push(Scored {
                     squared_distance: scale * 6.25 * even / 0.9,

@@ -1,13 +1,12 @@
 //! Regions of cells, calibrated on detections to which the shape was not fitted.
 
-use super::BoundsSettings;
 use super::axis::{GAP, narrow};
 use super::binomial::{at_most, conformal_rank, order_statistic, rank};
-use super::bounds::{FEWEST, FEWEST_RUNS, LEAST_ERROR, Sample};
 use super::cells::{Cells, each, numbered};
 use super::document;
 use super::family::Family;
 use super::runs::{self, for_few_runs};
+use super::sample::{FEWEST, FEWEST_RUNS, LEAST_ERROR, Sample};
 use super::smooth::Lattice;
 use super::split::FITTED;
 use std::collections::BTreeSet;
@@ -74,11 +73,10 @@ impl<'a> Calibration<'a> {
     /// Returns the state before the calibration, for cells over the places of all detections.
     pub(super) fn new(
         cells: &'a Cells,
-        settings: &BoundsSettings,
+        [quantile, confidence]: [f64; 2],
         places: &[[f64; 3]],
         in_runs: bool,
     ) -> Self {
-        let quantile = settings.quantile;
         let fewest = (quantile / (1.0 - quantile)).max(FEWEST);
         let state = |(detections, refused)| CellState {
             detections,
@@ -91,9 +89,9 @@ impl<'a> Calibration<'a> {
             quantile,
             // The number of independent rows is itself an estimate. Half of the error keeps the confidence.
             confidence: if in_runs {
-                1.0 - 0.5 * (1.0 - settings.confidence)
+                1.0 - 0.5 * (1.0 - confidence)
             } else {
-                settings.confidence
+                confidence
             },
             in_runs,
             effect: 1.0,

@@ -2,7 +2,7 @@
 
 use super::LearnError;
 use super::detections::Detections;
-use super::error_model::ErrorModel;
+use super::error_model::{ErrorModel, RegionReport};
 use super::runs::RunSource;
 use std::collections::BTreeMap;
 
@@ -243,6 +243,17 @@ struct Urn {
 }
 
 impl Urn {
+    /// Returns the urn of a region's calibration.
+    fn of(region: &RegionReport) -> Self {
+        let (n, independent) = (region.detections as f64, region.independent as f64);
+        let kept = region.rank as f64 * independent / n.max(1.0);
+        Self {
+            missed: independent + 1.0 - kept,
+            all: independent + 1.0,
+            effect: (n / independent.max(1.0)).max(1.0),
+        }
+    }
+
     fn share(&self) -> f64 {
         self.missed / self.all
     }
@@ -290,6 +301,35 @@ pub fn check_bounds(
             value: settings.confidence,
         });
     }
+    check_poses(model, new)?;
+    let mut bets = ModelBets::new(model, alpha);
+    let order = order(new);
+    let batches = batches(model, new, &order, alpha * FOR_DETECTION / 2.0);
+    for batch in &batches {
+        bets.step(batch);
+    }
+    let (errors, without_bounds) = bets.count(new, &order);
+    Ok(CheckReport {
+        after_rows: bets.after_rows,
+        rows: new.rows.len() as u64,
+        bets: batches.len() as u64,
+        without_bounds,
+        overall: RegionCheck {
+            ends: model.reach(),
+            rows: errors.len() as u64,
+            translation: bets.overall[0].report(),
+            yaw: bets.overall[1].report(),
+            looks_like: bets
+                .after_rows
+                .and_then(|_| likely_change(&errors, &bets.overall, None)),
+        },
+        regions: bets.region_checks(&errors),
+        detection: bets.detection.report,
+    })
+}
+
+/// Refuses rows with the errors of one pose for a model of the better one of two, and vice versa.
+fn check_poses(model: &ErrorModel, new: &Detections) -> Result<(), LearnError> {
     let poses = [model.is_of_better_pose(), new.of_better_pose];
     let [of_model, of_rows] = poses.map(|better| {
         if better {
@@ -304,113 +344,141 @@ pub fn check_bounds(
             rows: of_rows,
         });
     }
-    let regions: Vec<_> = model.regions().collect();
-    let limit = 1.0 / (alpha * (1.0 - FOR_DETECTION));
-    let of_region = (1.0 - FOR_OVERALL) / (2 * regions.len().max(1)) as f64;
-    let stated = 1.0 - model.quantile();
-    let urn = |region: &super::RegionReport| {
-        let (n, independent) = (region.detections as f64, region.independent as f64);
-        let kept = region.rank as f64 * independent / n.max(1.0);
-        Urn {
-            missed: independent + 1.0 - kept,
-            all: independent + 1.0,
-            effect: (n / independent.max(1.0)).max(1.0),
+    Ok(())
+}
+
+/// The bets against a model.
+struct ModelBets<'m> {
+    model: &'m ErrorModel,
+    regions: Vec<RegionReport>,
+    /// The value from which bets contradict the model.
+    limit: f64,
+    /// The weight of a bet against one bound of one region.
+    of_region: f64,
+    /// The share of misses that the model states.
+    stated: f64,
+    urns: Vec<[Urn; 2]>,
+    bets: Vec<[BoundBet; 2]>,
+    overall: [BoundBet; 2],
+    detection: DetectionBet,
+    /// The number of rows after which the model was contradicted.
+    after_rows: Option<u64>,
+}
+
+impl<'m> ModelBets<'m> {
+    /// Returns the bets before the first row. `alpha` is the probability that a valid model is ever contradicted.
+    fn new(model: &'m ErrorModel, alpha: f64) -> Self {
+        let regions: Vec<_> = model.regions().collect();
+        Self {
+            model,
+            limit: 1.0 / (alpha * (1.0 - FOR_DETECTION)),
+            of_region: (1.0 - FOR_OVERALL) / (2 * regions.len().max(1)) as f64,
+            stated: 1.0 - model.quantile(),
+            urns: regions.iter().map(|region| [Urn::of(region); 2]).collect(),
+            bets: std::vec![Default::default(); regions.len()],
+            overall: Default::default(),
+            detection: DetectionBet::new(alpha * FOR_DETECTION),
+            after_rows: None,
+            regions,
         }
-    };
-    let mut urns: Vec<[Urn; 2]> = regions.iter().map(|region| [urn(region); 2]).collect();
-    let mut bets: Vec<[BoundBet; 2]> = std::vec![Default::default(); regions.len()];
-    let mut overall: [BoundBet; 2] = Default::default();
-    let mut detection = DetectionBet::new(alpha * FOR_DETECTION);
-    let mut report_after = None;
-    let order = order(new);
-    let batches = batches(model, new, &order, alpha * FOR_DETECTION / 2.0);
-    for batch in &batches {
+    }
+
+    /// Bets on a batch of rows.
+    fn step(&mut self, batch: &Batch) {
         let rows = [batch.first, batch.last];
         let (mut missed, mut expected, mut count) = ([0.0; 2], [0.0; 2], 0.0);
         for (region, [n, translation, yaw]) in &batch.regions {
             count += n;
             for (which, misses) in [*translation, *yaw].into_iter().enumerate() {
-                let allowed = urns[*region][which].share();
+                let urn = &mut self.urns[*region][which];
+                let allowed = urn.share();
                 missed[which] += misses;
                 expected[which] += n * allowed;
-                let bet = &mut bets[*region][which];
-                bet.step(misses / n, [stated, allowed], rows, of_region, limit);
-                urns[*region][which].add(misses, *n);
+                let bet = &mut self.bets[*region][which];
+                let shares = [self.stated, allowed];
+                bet.step(misses / n, shares, rows, self.of_region, self.limit);
+                urn.add(misses, *n);
             }
         }
         if count > 0.0 {
             for which in [0, 1] {
-                let allowed = [stated, expected[which] / count];
+                let allowed = [self.stated, expected[which] / count];
                 let weight = 0.5 * FOR_OVERALL;
-                overall[which].step(missed[which] / count, allowed, rows, weight, limit);
+                let missed = missed[which] / count;
+                self.overall[which].step(missed, allowed, rows, weight, self.limit);
             }
         }
-        detection.step(&batch.views, batch.last);
-        let sum = bets.iter().flatten().map(|bet| bet.value).sum::<f64>() * of_region
-            + overall.iter().map(|bet| bet.value).sum::<f64>() * 0.5 * FOR_OVERALL;
-        if report_after.is_none() && (sum >= limit || detection.report.after_rows.is_some()) {
-            report_after = Some(batch.last);
+        self.detection.step(&batch.views, batch.last);
+        let is_contradicted =
+            self.sum() >= self.limit || self.detection.report.after_rows.is_some();
+        if self.after_rows.is_none() && is_contradicted {
+            self.after_rows = Some(batch.last);
         }
     }
 
-    // Counts include rows without a bet.
-    let (mut without_bounds, mut all) = (0, 0);
-    let mut errors: Vec<RowErrors> = Vec::new();
-    for (index, row) in order.iter().map(|row| new.rows[*row]).enumerate() {
-        let Some(found) = row.errors else { continue };
-        let bounds = model.bounds_deg(row.at).zip(model.region_deg(row.at));
-        let Some((bounds, region)) = bounds else {
-            without_bounds += 1;
-            continue;
-        };
-        all += 1;
-        let bounds = [bounds.0, bounds.1];
-        for which in [0, 1] {
-            for bet in [&mut bets[region][which], &mut overall[which]] {
-                bet.rows += 1;
-                bet.held += u64::from(found[which] <= bounds[which]);
-            }
-        }
-        errors.push((index as u64 + 1, region, row.at, found, bounds));
+    /// Returns the weighted sum of the bets against bounds.
+    fn sum(&self) -> f64 {
+        self.bets.iter().flatten().map(|bet| bet.value).sum::<f64>() * self.of_region
+            + self.overall.iter().map(|bet| bet.value).sum::<f64>() * 0.5 * FOR_OVERALL
     }
-    let looks_like = |bets: &[BoundBet; 2], region: Option<usize>, contradicted: bool| {
-        if !contradicted {
-            return None;
+
+    /// Counts the errors within the bounds, also those of rows without a bet. Returns the rows with errors and bounds,
+    /// and the number of detections without bounds.
+    fn count(&mut self, new: &Detections, order: &[usize]) -> (Vec<RowErrors>, u64) {
+        let mut without_bounds = 0;
+        let mut errors: Vec<RowErrors> = Vec::new();
+        for (index, row) in order.iter().map(|row| new.rows[*row]).enumerate() {
+            let Some(found) = row.errors else { continue };
+            let model = self.model;
+            let bounds = model.bounds_deg(row.at).zip(model.region_deg(row.at));
+            let Some((bounds, region)) = bounds else {
+                without_bounds += 1;
+                continue;
+            };
+            let bounds = [bounds.0, bounds.1];
+            for which in [0, 1] {
+                for bet in [&mut self.bets[region][which], &mut self.overall[which]] {
+                    bet.rows += 1;
+                    bet.held += u64::from(found[which] <= bounds[which]);
+                }
+            }
+            errors.push((index as u64 + 1, region, row.at, found, bounds));
         }
-        let which = usize::from(bets[1].most > bets[0].most);
-        let since = bets[which].stated.since().unwrap_or(1);
-        let rows = errors
-            .iter()
-            .filter(|(row, of, ..)| *row >= since && region.is_none_or(|region| region == *of));
-        let rows = rows.map(|(_, _, at, errors, bounds)| (at[0], errors[which], bounds[which]));
-        change(&rows.collect::<Vec<_>>(), which)
-    };
-    let region_reports = regions.iter().zip(&bets).enumerate();
-    let region_reports = region_reports.map(|(number, (region, bets))| {
-        let contradicted = bets.iter().any(|bet| bet.after_rows.is_some());
-        RegionCheck {
-            ends: region.ends,
-            rows: bets[0].rows,
-            translation: bets[0].report(),
-            yaw: bets[1].report(),
-            looks_like: looks_like(bets, Some(number), contradicted),
-        }
-    });
-    Ok(CheckReport {
-        after_rows: report_after,
-        rows: new.rows.len() as u64,
-        bets: batches.len() as u64,
-        without_bounds,
-        overall: RegionCheck {
-            ends: model.reach(),
-            rows: all,
-            translation: overall[0].report(),
-            yaw: overall[1].report(),
-            looks_like: looks_like(&overall, None, report_after.is_some()),
-        },
-        regions: region_reports.collect(),
-        detection: detection.report,
-    })
+        (errors, without_bounds)
+    }
+
+    /// Returns the result for each region.
+    fn region_checks(&self, errors: &[RowErrors]) -> Vec<RegionCheck> {
+        let regions = self.regions.iter().zip(&self.bets).enumerate();
+        let regions = regions.map(|(number, (region, bets))| {
+            let is_contradicted = bets.iter().any(|bet| bet.after_rows.is_some());
+            RegionCheck {
+                ends: region.ends,
+                rows: bets[0].rows,
+                translation: bets[0].report(),
+                yaw: bets[1].report(),
+                looks_like: is_contradicted
+                    .then(|| likely_change(errors, bets, Some(number)))
+                    .flatten(),
+            }
+        });
+        regions.collect()
+    }
+}
+
+/// Returns the likely kind of change in a region, or in all, from the rows since the change.
+fn likely_change(
+    errors: &[RowErrors],
+    bets: &[BoundBet; 2],
+    region: Option<usize>,
+) -> Option<Change> {
+    let which = usize::from(bets[1].most > bets[0].most);
+    let since = bets[which].stated.since().unwrap_or(1);
+    let rows = errors
+        .iter()
+        .filter(|(row, of, ..)| *row >= since && region.is_none_or(|region| region == *of));
+    let rows = rows.map(|(_, _, at, errors, bounds)| (at[0], errors[which], bounds[which]));
+    change(&rows.collect::<Vec<_>>(), which)
 }
 
 /// A bet against the shares of detected views: each row against the lower limit of its cell's share.
@@ -550,7 +618,7 @@ fn change(rows: &[(f64, f64, f64)], which: usize) -> Option<Change> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::split::mixed;
+    use crate::learn::random::mixed;
 
     /// Returns the largest value of a bet over 10,000 looks at misses of a given probability.
     fn most(seed: u64, probability: f64, allowed: f64) -> f64 {

@@ -1,7 +1,6 @@
 //! Reads a long file once: computes its digest and draws a random choice of its rows in bounded memory.
 
-use super::Detection;
-use super::split::mixed;
+use super::random::mixed;
 use sha2::{Digest, Sha256};
 use std::io::{self, Read};
 
@@ -54,19 +53,19 @@ impl<R: Read> Read for Digesting<R> {
 
 /// The rows of a file, or a random choice of the allowed number of them by their positions: each choice is equally
 /// likely.
-pub(super) struct Kept {
+pub(super) struct Kept<R> {
     most: usize,
     seed: u64,
     count: u64,
     /// Rows with a larger draw are not kept.
     limit: u64,
     /// Each with its draw and its position.
-    rows: Vec<(u64, u64, Detection)>,
+    rows: Vec<(u64, u64, R)>,
     /// The rows while there are few.
-    all: Vec<Detection>,
+    all: Vec<R>,
 }
 
-impl Kept {
+impl<R> Kept<R> {
     pub(super) fn new(most: usize, seed: u64) -> Self {
         Self {
             most,
@@ -78,7 +77,7 @@ impl Kept {
         }
     }
 
-    pub(super) fn push(&mut self, row: Detection) {
+    pub(super) fn push(&mut self, row: R) {
         let position = self.count;
         self.count += 1;
         if self.rows.is_empty() && self.all.len() < self.most {
@@ -103,7 +102,7 @@ impl Kept {
     /// Keeps the rows with the smallest draws.
     fn cut(&mut self) {
         if self.rows.len() > self.most {
-            let key = |row: &(u64, u64, Detection)| (row.0, row.1);
+            let key = |row: &(u64, u64, R)| (row.0, row.1);
             self.rows.select_nth_unstable_by_key(self.most - 1, key);
             self.rows.truncate(self.most);
             self.limit = self.rows[self.most - 1].0;
@@ -111,7 +110,7 @@ impl Kept {
     }
 
     /// Returns the rows in the file's order, and the number of rows in the file if it has more.
-    pub(super) fn rows(mut self) -> (Vec<Detection>, Option<u64>) {
+    pub(super) fn rows(mut self) -> (Vec<R>, Option<u64>) {
         if self.rows.is_empty() {
             return (self.all, None);
         }
@@ -129,6 +128,7 @@ fn drawn(seed: u64, position: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learn::Detection;
 
     fn row(number: u32) -> Detection {
         Detection {

@@ -62,7 +62,7 @@ impl ErrorModel {
     /// The text is not a model of this kind: another version, an unknown or a missing key, or parts that do not
     /// match.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
-        let document = super::kind::of::<Document>(text, file)?;
+        let document = super::model_file::parse::<Document>(text, file)?;
         Self::new(document, file)
     }
 
@@ -83,7 +83,7 @@ impl ErrorModel {
                 "it is scaled to other tags than those of its data".to_owned(),
             ));
         }
-        super::kind::write(&self.document)
+        super::model_file::write(&self.document)
     }
 
     pub(super) fn new(document: Document, file: &str) -> Result<Self, LearnError> {

@@ -119,20 +119,8 @@ pub fn learn_inflation(
         confidence,
         new_group,
     } = *settings;
-    if !(confidence > 0.0 && confidence < 1.0) {
-        return Err(LearnError::Share {
-            name: "confidence",
-            value: confidence,
-        });
-    }
-    let r2 = radius_squared(epsilon).ok_or(LearnError::Share {
-        name: "epsilon",
-        value: epsilon,
-    })?;
+    let r2 = settings.radius_squared()?;
     let rows = &estimates.rows;
-    let z = normal_quantile(confidence);
-    let all_hold = libm::log(1.0 - confidence) / libm::log(epsilon);
-    let fewest = libm::ceil((z * z * epsilon / (1.0 - epsilon)).max(all_hold)).max(FEWEST);
     let several = estimates.groups.len() >= 2;
     let grouped = new_group && several;
     let scored = Scores {
@@ -142,65 +130,19 @@ pub fn learn_inflation(
         confidence,
         groups: if grouped { estimates.groups.len() } else { 0 },
     };
-    let of = |from: f64, to: f64| scored.report([from, to]);
     let mut sorted: Vec<f64> = rows.iter().map(|row| row.condition).collect();
     sorted.sort_by(f64::total_cmp);
     let (Some(first), Some(last)) = (sorted.first().copied(), sorted.last().copied()) else {
-        return Err(LearnError::TooFew {
-            found: 0,
-            of: "rows whose covariance is possible",
-            needed: fewest as u64,
-        });
+        return Err(scored.too_few(0, "rows whose covariance is possible"));
     };
-    let overall = of(first, last);
-    if grouped {
-        let factors = scored.own_factors([first, last]);
-        if for_a_new_group(&factors, confidence).is_none() {
-            return Err(LearnError::TooFewGroups {
-                found: factors.iter().filter(|factor| factor.is_finite()).count() as u64,
-                of: estimates.grouped_by,
-                confidence,
-                needed: groups::needed(confidence),
-                rows: libm::ceil(epsilon / (1.0 - epsilon) - 1e-9) as u64,
-            });
-        }
-    } else if (overall.independent_rows as f64) < fewest {
-        return Err(LearnError::TooFew {
-            found: overall.independent_rows,
-            of: "rows that are independent of each other",
-            needed: fewest as u64,
-        });
-    }
-    // Use as many conditions as have enough rows. A column with few distinct values keeps one condition per value.
-    let mut part = Vec::new();
-    let distinct = distinct(&sorted);
-    let size = if estimates.condition == LOG_DET {
-        1.0
+    let overall = scored.report([first, last]);
+    scored.check_counts(&overall, estimates.grouped_by)?;
+    // The tolerance for equal conditions.
+    let tolerance = if estimates.condition == LOG_DET {
+        EQUAL_WITHIN
     } else {
-        libm::fabs(first)
+        EQUAL_WITHIN * libm::fabs(first)
     };
-    for count in (1..=MOST).rev() {
-        let mut ends = if distinct.len() > MOST {
-            cuts(&sorted, &distinct, count)
-        } else {
-            let mut ends = std::vec![first];
-            ends.extend(distinct.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
-            ends.push(last);
-            ends
-        };
-        if last - first <= EQUAL_WITHIN * size {
-            ends = std::vec![first - EQUAL_WITHIN * size, last + EQUAL_WITHIN * size];
-        }
-        part = ends.windows(2).map(|pair| of(pair[0], pair[1])).collect();
-        let enough = |part: &InflationReport| {
-            let rows = part.independent_rows as f64 >= ROOMY * fewest;
-            rows && (!grouped || part.inflation > 0.0)
-        };
-        let are_distinct = distinct.len() <= MOST || last - first <= EQUAL_WITHIN * size;
-        if are_distinct || part.iter().all(enough) {
-            break;
-        }
-    }
     let document = Document {
         posegate_model: VERSION,
         kind: "inflation".into(),
@@ -214,7 +156,7 @@ pub fn learn_inflation(
         },
         new: grouped.then(|| estimates.grouped_by.to_owned()),
         overall,
-        part,
+        part: scored.parts(&sorted, [first, last], tolerance),
         group: Vec::new(),
     };
     let mut model = InflationModel::new(document, "the learnt model")?;
@@ -226,6 +168,22 @@ pub fn learn_inflation(
         model.document.group = factors.reports(&model, &estimates.groups);
     }
     Ok(model)
+}
+
+impl InflationSettings {
+    /// Checks the settings, and returns the square of the radius of a pose-set.
+    fn radius_squared(&self) -> Result<f64, LearnError> {
+        if !(self.confidence > 0.0 && self.confidence < 1.0) {
+            return Err(LearnError::Share {
+                name: "confidence",
+                value: self.confidence,
+            });
+        }
+        radius_squared(self.epsilon).ok_or(LearnError::Share {
+            name: "epsilon",
+            value: self.epsilon,
+        })
+    }
 }
 
 /// Returns sorted numbers without repetitions.
@@ -262,6 +220,90 @@ struct Scores<'a> {
 }
 
 impl Scores<'_> {
+    /// Returns the fewest independent rows for a result.
+    fn fewest(&self) -> f64 {
+        let Self {
+            epsilon,
+            confidence,
+            ..
+        } = *self;
+        let z = normal_quantile(confidence);
+        let all_hold = libm::log(1.0 - confidence) / libm::log(epsilon);
+        libm::ceil((z * z * epsilon / (1.0 - epsilon)).max(all_hold)).max(FEWEST)
+    }
+
+    /// Returns the error for too few rows of a kind.
+    fn too_few(&self, found: u64, of: &'static str) -> LearnError {
+        LearnError::TooFew {
+            found,
+            of,
+            needed: self.fewest() as u64,
+        }
+    }
+
+    /// Refuses too few groups for a new one, or too few independent rows. `overall` is the result for all rows.
+    fn check_counts(
+        &self,
+        overall: &InflationReport,
+        grouped_by: &'static str,
+    ) -> Result<(), LearnError> {
+        if self.groups > 0 {
+            let factors = self.own_factors([overall.from, overall.to]);
+            if for_a_new_group(&factors, self.confidence).is_none() {
+                return Err(LearnError::TooFewGroups {
+                    found: factors.iter().filter(|factor| factor.is_finite()).count() as u64,
+                    of: grouped_by,
+                    confidence: self.confidence,
+                    needed: groups::needed(self.confidence),
+                    rows: libm::ceil(self.epsilon / (1.0 - self.epsilon) - 1e-9) as u64,
+                });
+            }
+        } else if (overall.independent_rows as f64) < self.fewest() {
+            let of = "rows that are independent of each other";
+            return Err(self.too_few(overall.independent_rows, of));
+        }
+        Ok(())
+    }
+
+    /// Returns the results for as many conditions as have enough rows. A column with few distinct values keeps one
+    /// condition per value. Conditions within the tolerance are equal.
+    fn parts(
+        &self,
+        sorted: &[f64],
+        [first, last]: [f64; 2],
+        tolerance: f64,
+    ) -> Vec<InflationReport> {
+        let distinct = distinct(sorted);
+        let fewest = self.fewest();
+        let are_equal = last - first <= tolerance;
+        let enough = |part: &InflationReport| {
+            let rows = part.independent_rows as f64 >= ROOMY * fewest;
+            rows && (self.groups == 0 || part.inflation > 0.0)
+        };
+        let mut parts = Vec::new();
+        for count in (1..=MOST).rev() {
+            let ends = if are_equal {
+                std::vec![first - tolerance, last + tolerance]
+            } else if distinct.len() > MOST {
+                cuts(sorted, &distinct, count)
+            } else {
+                let between = distinct.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+                core::iter::once(first)
+                    .chain(between)
+                    .chain([last])
+                    .collect()
+            };
+            parts = ends
+                .windows(2)
+                .map(|pair| self.report([pair[0], pair[1]]))
+                .collect();
+            if distinct.len() <= MOST || are_equal || parts.iter().all(enough) {
+                break;
+            }
+        }
+        parts
+    }
+
     /// Returns the result for the rows of a condition.
     fn report(&self, [from, to]: [f64; 2]) -> InflationReport {
         let Self {
@@ -451,7 +493,7 @@ impl InflationModel {
     /// # Errors
     /// The text is not a model of this kind: another version, an unknown or a missing key, or parts that do not match.
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnError> {
-        Self::new(super::kind::of(text, file)?, file)
+        Self::new(super::model_file::parse(text, file)?, file)
     }
 
     /// Returns the text of the model's file.
@@ -459,7 +501,7 @@ impl InflationModel {
     /// # Errors
     /// [`LearnError::Unwritten`], which does not happen for a model that was learnt or read.
     pub fn write(&self) -> Result<String, LearnError> {
-        super::kind::write(&self.document)
+        super::model_file::write(&self.document)
     }
 
     fn new(document: Document, file: &str) -> Result<Self, LearnError> {

@@ -115,7 +115,7 @@ fn mean_of_logarithms(logs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learn::split::mixed;
+    use crate::learn::random::mixed;
 
     fn fleet(seed: u64, count: u64, failures: f64) -> Vec<bool> {
         let limit = (failures * (1u64 << 53) as f64) as u64;

@@ -212,7 +212,7 @@ mod tests {
     /// Rows that repeat 20 times count once.
     #[test]
     fn effect_of_constant_runs_is_their_length() {
-        let hit = |run: u32| crate::learn::split::mixed(u64::from(run)).is_multiple_of(4);
+        let hit = |run: u32| crate::learn::random::mixed(u64::from(run)).is_multiple_of(4);
         let repeated = Tally::of((0..20_000).map(|row| (row / 20, hit(row / 20))));
         let effect = repeated.effect().unwrap();
         assert!((18.0..22.0).contains(&effect), "{effect}");

@@ -61,7 +61,7 @@ fn log_beta(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::learn::clopper_pearson;
-    use crate::learn::split::mixed;
+    use crate::learn::random::mixed;
 
     const ALPHA: f64 = 0.05;
 

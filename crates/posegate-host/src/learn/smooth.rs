@@ -453,7 +453,7 @@ mod tests {
     /// Rows all over the lattice, each with a number uniform between 0 and 1.
     fn rows(n: u64) -> Vec<([f64; 3], f64)> {
         let even = |k: u64| {
-            let bits = crate::learn::split::mixed(k) >> 11;
+            let bits = crate::learn::random::mixed(k) >> 11;
             bits as f64 / (1u64 << 53) as f64
         };
         (0..n)

@@ -2,6 +2,7 @@
 
 use super::Detection;
 use super::detections::Detections;
+use super::random::mixed;
 use std::collections::BTreeMap;
 
 /// The share of the detections, or of the runs, to which the shape is fitted.
@@ -92,14 +93,6 @@ fn drawn(row: &Detection, seed: u64) -> u64 {
     [a, b, c, e, f]
         .iter()
         .fold(mixed(seed), |draw, number| mixed(draw ^ number.to_bits()))
-}
-
-/// One step of Splitmix64.
-pub(super) fn mixed(number: u64) -> u64 {
-    let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 fn compare(a: &Detection, b: &Detection) -> core::cmp::Ordering {

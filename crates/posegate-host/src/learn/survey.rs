@@ -399,7 +399,7 @@ mod tests {
     ) -> Vec<Look> {
         let mut random = 7u64;
         let mut number = || {
-            random = crate::learn::split::mixed(random);
+            random = crate::learn::random::mixed(random);
             (random >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
         let look = |docking: u64| Look {

@@ -1,7 +1,8 @@
 //! Expected cost of seeing a tag over a pose-set: E\[c\] of Eqs. 10 to 12.
 
+use super::accuracy::MissCost;
 use super::gaussian::Gaussian;
-use super::headings::{self, MissCost};
+use super::headings;
 use super::quadrature::{Approximate, Quadrature};
 use super::rays::Bodies;
 use super::rough;

@@ -1,7 +1,7 @@
 //! The integral over the disc of one heading, by rays from its centre.
 
+use super::accuracy::AccuracyTarget;
 use super::gaussian::WhitenedPoseSet;
-use super::headings::AccuracyTarget;
 use super::quadrature::{Approximate, Panel, Smooth, Sum, panel, refine};
 use super::rays::{Ray, Rule};
 use core::cell::Cell;
@@ -57,7 +57,7 @@ impl<'a> Disc<'a> {
     fn ray(&self, angle: f64) -> Ray {
         let walk = LineSegment {
             from: self.middle,
-            way: self.white.in_metres([libm::cos(angle), libm::sin(angle)]),
+            way: self.white.to_metres([libm::cos(angle), libm::sin(angle)]),
             length: BEYOND * self.radius,
         };
         Ray::cast(self.headed, self.views, walk, self.radius)

@@ -227,7 +227,7 @@ impl WhitenedPoseSet {
     }
 
     /// Maps a direction in the disc to metres.
-    pub(super) fn in_metres(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(super) fn to_metres(self, [u, v]: [f64; 2]) -> [f64; 2] {
         self.spread.map(|[a, b]| a * u + b * v)
     }
 

@@ -28,6 +28,7 @@ pub use self::search::{
 };
 pub use self::space::{Faces, Space, SpaceError};
 
+mod accuracy;
 mod cost;
 mod disc;
 mod gaussian;

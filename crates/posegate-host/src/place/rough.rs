@@ -32,7 +32,7 @@ pub(super) fn sums(
             let angle = (f64::from(k) + turned) * TAU / f64::from(DIRECTIONS);
             let walk = LineSegment {
                 from: white.middle(u1),
-                way: white.in_metres([libm::cos(angle), libm::sin(angle)]),
+                way: white.to_metres([libm::cos(angle), libm::sin(angle)]),
                 length: radius,
             };
             let ray = Ray::cast(&headed, views, walk, radius);

@@ -104,7 +104,7 @@ fn border_distance(
     // No useful pose-set is larger than this.
     let length = 1e4
         / white
-            .in_metres([1.0, 1.0])
+            .to_metres([1.0, 1.0])
             .map(f64::abs)
             .iter()
             .fold(1e-12, |a, b| f64::max(a, *b));
@@ -112,7 +112,7 @@ fn border_distance(
     let mut leaves = |angle: f64| {
         let walk = LineSegment {
             from: white.middle(u1),
-            way: white.in_metres([libm::cos(angle), libm::sin(angle)]),
+            way: white.to_metres([libm::cos(angle), libm::sin(angle)]),
             length,
         };
         headed.stretches_into(&walk, &mut stretches);

@@ -1,36 +1,17 @@
 //! Backward pass from the work task: the places from which it is reachable, and a lower bound of the cost from each.
 
-use std::collections::{BTreeMap, BinaryHeap};
-use std::sync::{Arc, Mutex};
+use std::collections::BinaryHeap;
 
 use super::BeliefStateF64;
 use super::costs::distance;
 use super::library::needed;
-use super::search::{Queued, SearchProblem};
+use super::problem::SearchProblem;
+use super::queue::Queued;
 use posegate::contain::{Decision, decide};
 use posegate::table::Table;
 
 /// Scale factors for a belief's set. A larger set is tried if the set itself does not fit.
 const LARGER: [f64; 7] = [1.0, 1.15, 1.3, 1.6, 2.0, 2.6, 3.5];
-
-/// The costs to go of one problem, by the look that is not allowed: many searches need the same ones.
-#[derive(Debug, Default)]
-pub(super) struct Horizons {
-    known: Mutex<BTreeMap<Option<usize>, Arc<Vec<f64>>>>,
-}
-
-impl Horizons {
-    /// Returns the costs to go without a look; computes them at most once.
-    pub fn of(&self, banned: Option<usize>, make: impl FnOnce() -> Vec<f64>) -> Arc<Vec<f64>> {
-        let Ok(mut known) = self.known.lock() else {
-            return Arc::new(make());
-        };
-        known
-            .entry(banned)
-            .or_insert_with(|| Arc::new(make()))
-            .clone()
-    }
-}
 
 impl SearchProblem<'_> {
     /// Returns the belief after a look, exact at a place: no belief at that place is better.

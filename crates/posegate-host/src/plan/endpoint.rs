@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::map;
-use super::planner::{Prepared, RouteGraph, WIDER};
+use super::planner::{Prepared, WIDER};
 use super::proofs::Proofs;
+use super::route_graph::RouteGraph;
 use super::walk::world;
 use super::{Library, Options, PlanError, PlanResult, TaskTable};
 use crate::site::{ChainStart, Site, TaskKind};
@@ -126,7 +127,7 @@ fn in_reach(
     [start, goal]: [[f64; 3]; 2],
     beside: f64,
 ) -> Result<BTreeSet<String>, PlanError> {
-    let tables = super::planner::parsed(library)?;
+    let tables = library.tables()?;
     let name = |look: usize| library.looks[look].table.name.clone();
     let ends = [start, goal].into_iter();
     let mut names: BTreeSet<String> = ends

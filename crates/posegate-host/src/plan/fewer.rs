@@ -7,7 +7,7 @@
 
 use super::costs::distance;
 use super::library::{facing, needed};
-use super::search::drive_to;
+use super::problem::drive_to;
 use super::{BeliefStateF64, Library, Options, Plan, StepKind};
 use crate::site::{ChainStart, DriveModel, Site};
 use posegate::contain::{Decision, decide, examine};

@@ -82,6 +82,12 @@ impl Library {
         Self::with(site, true, &|_| true)
     }
 
+    /// Parses the table of every look.
+    pub(super) fn tables(&self) -> Result<Vec<Table<'_>>, PlanError> {
+        let tables = self.looks.iter();
+        tables.map(|look| look.table.table()).collect()
+    }
+
     fn with(
         site: &Site,
         candidates: bool,

@@ -2,7 +2,7 @@
 
 use super::Library;
 use super::library::{bounded, towards};
-use super::search::SearchProblem;
+use super::problem::SearchProblem;
 use posegate::contain::{Decision, decide};
 use posegate::table::Table;
 

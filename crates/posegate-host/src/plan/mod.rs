@@ -23,7 +23,7 @@
 //! ```
 
 pub use self::belief::BeliefStateF64;
-pub use self::chain::{ChainReport, StepKind, StepReport, evaluate};
+pub use self::chain::evaluate;
 pub use self::costs::costs;
 pub use self::crossings::crossing_notes;
 pub(crate) use self::endpoint::TaskPlanner;
@@ -34,12 +34,14 @@ pub use self::planned::{Contingency, Nearest, Options, Plan, PlanResult, PlanSte
 pub use self::planner::Prepared;
 pub use self::plans::Plans;
 pub use self::rule_bytes::{RuleOrder, write_rules};
+pub use self::step_report::{ChainReport, StepKind, StepReport};
 pub use self::stop::StopSignal;
 pub use self::task_table::TaskTable;
 
 #[doc = include_str!("language.md")]
 pub mod language {}
 
+mod attempt;
 mod backward;
 mod belief;
 mod bound;
@@ -50,6 +52,7 @@ mod crossings;
 mod endpoint;
 mod error;
 mod fewer;
+mod horizons;
 mod json;
 mod library;
 mod map;
@@ -57,11 +60,15 @@ mod nearby;
 mod planned;
 mod planner;
 mod plans;
+mod problem;
 mod proofs;
+mod queue;
 mod rescue;
+mod route_graph;
 mod rule_bytes;
 mod rules;
 mod search;
+mod step_report;
 mod stop;
 mod task_table;
 mod walk;

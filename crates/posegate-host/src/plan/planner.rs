@@ -1,29 +1,24 @@
 //! Planning: the cheapest chain of looks and drives after which a work task is certain to succeed.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::backward::Horizons;
+use super::attempt::Attempt;
 use super::bound::EveryChain;
 use super::costs::Costs;
 use super::fewer::FewerLooks;
+use super::horizons::Horizons;
 use super::library::Library;
 use super::map::{self, Roadmap};
+use super::problem::SearchProblem;
 use super::proofs::{Proofs, Sharpness};
-use super::rescue::Rescues;
-use super::search::{Action, Answer, SearchGoal, SearchOutcome, SearchProblem};
-use super::walk::{Walk, world};
+use super::route_graph::RouteGraph;
+use super::walk::world;
 use super::{
-    BeliefStateF64, Contingency, Nearest, Options, Plan, PlanError, PlanResult, PlanStep, Status,
-    StepKind, StepReport, StopSignal, TaskTable, Viewpoint,
+    Options, Plan, PlanError, PlanResult, Status, StepKind, StopSignal, TaskTable, Viewpoint,
 };
 use crate::site::{ChainStart, ChainStep, DriveModel, Site, TaskKind};
-use posegate::chain::StartAssumption;
-use posegate::set::Estimate;
-use posegate::table::Table;
-use posegate::task::Leg;
 
 /// A site's library, prepared for any number of plans.
 #[derive(Clone, Debug)]
@@ -44,35 +39,6 @@ pub struct Prepared<'a> {
     proofs: Arc<Proofs>,
 }
 
-/// The places of a planning problem, with the successors and the predecessors of each.
-#[derive(Clone, Debug)]
-pub(super) struct RouteGraph {
-    pub map: Roadmap,
-    pub successors: Vec<Vec<usize>>,
-    pub predecessors: Vec<Vec<usize>>,
-}
-
-impl RouteGraph {
-    /// Keeps the looks that have a new number in `number`, and their places.
-    pub fn only(&self, library: &Library, number: &[Option<usize>]) -> Self {
-        let (map, renumbered) = self.map.only(library, number);
-        let part = |ways: &[Vec<usize>]| -> Vec<Vec<usize>> {
-            let kept = ways
-                .iter()
-                .zip(&renumbered)
-                .filter(|(_, new)| new.is_some());
-            let to = |to: &usize| renumbered[*to];
-            kept.map(|(list, _)| list.iter().filter_map(to).collect())
-                .collect()
-        };
-        Self {
-            successors: part(&self.successors),
-            predecessors: part(&self.predecessors),
-            map,
-        }
-    }
-}
-
 /// The fallback if a single set cannot be proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProofFallback {
@@ -84,16 +50,6 @@ enum ProofFallback {
 
 /// Factors by which the search widens the sets, tried in this order until the core accepts the plan.
 pub(super) const WIDER: [f64; 5] = [1.003, 1.02, 1.06, 1.15, 1.4];
-
-/// If the search finds no plan, it runs again without dominance pruning, limited to `min(limit / FALLBACK_DIVISOR,
-/// FALLBACK_LIMIT)` labels.
-const FALLBACK_DIVISOR: usize = 10;
-const FALLBACK_LIMIT: usize = 4_000;
-
-pub(super) fn parsed(library: &Library) -> Result<Vec<Table<'_>>, PlanError> {
-    let tables = library.looks.iter();
-    tables.map(|look| look.table.table()).collect()
-}
 
 /// Returns the drive model and its source: the site's own model, or that of the first drive of a chain.
 fn model_of(site: &Site, prefer: Option<&str>) -> Option<(DriveModel, String)> {
@@ -165,7 +121,7 @@ impl<'a> Prepared<'a> {
     /// Computes the looks and the successors of the places from a number on, and adds them to the successors of the
     /// other places.
     fn link(&mut self, first: usize) -> Result<(), PlanError> {
-        let tables = parsed(&self.library)?;
+        let tables = self.library.tables()?;
         let places: Vec<[f64; 3]> = self.library.views.iter().map(|view| view.pose).collect();
         let mut seen = self.seen.clone();
         seen.par_extend(
@@ -224,7 +180,7 @@ impl<'a> Prepared<'a> {
 
     /// Plans from a start to a work task.
     ///
-    /// The final decision is that of [`posegate::chain`], for every possible estimate ([`StartAssumption::General`]).
+    /// The final decision is that of [`posegate::chain`], for every possible estimate ([`posegate::chain::StartAssumption::General`]).
     /// Each set that the plan relies on is proven to lie in its success set. If the proof of a single set fails, its
     /// whole table is proven. If that proof makes the table stricter, the search runs again with the proven table. (A
     /// controller's own tables are proven when they are built.)
@@ -274,7 +230,7 @@ impl<'a> Prepared<'a> {
         let places = FewerLooks {
             site: self.site,
             library: &self.library,
-            tables: &parsed(&self.library)?,
+            tables: &self.library.tables()?,
             work: &work.table()?,
             model: self.model,
             start,
@@ -398,10 +354,10 @@ impl<'a> Prepared<'a> {
     ) -> Result<(PlanResult, bool), PlanError> {
         loop {
             let mut planned = match graph {
-                Some(graph) => self.plan_once(start, work, options, wider, graph)?,
+                Some(graph) => self.attempt(start, work, options, wider, graph).run()?,
                 None => {
-                    let graph = self.route_graph(start, work, wider)?;
-                    self.plan_once(start, work, options, wider, &graph)?
+                    let graph = &self.route_graph(start, work, wider)?;
+                    self.attempt(start, work, options, wider, graph).run()?
                 }
             };
             let (mut changed, mut lacks) = (false, false);
@@ -465,7 +421,7 @@ impl<'a> Prepared<'a> {
         work: &TaskTable,
         wider: f64,
     ) -> Result<RouteGraph, PlanError> {
-        let tables = parsed(&self.library)?;
+        let tables = self.library.tables()?;
         let work_table = work.table()?;
         let map = Roadmap::of(
             &self.library,
@@ -504,269 +460,31 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    fn plan_once(
-        &self,
-        start: &ChainStart,
-        work: &TaskTable,
-        options: &Options,
+    /// Returns the input of a single search, with sets widened by a factor.
+    fn attempt<'s>(
+        &'s self,
+        start: &'s ChainStart,
+        work: &'s TaskTable,
+        options: &'s Options,
         wider: f64,
-        RouteGraph {
-            map,
-            successors,
-            predecessors,
-        }: &RouteGraph,
-    ) -> Result<PlanResult, PlanError> {
-        let tables = parsed(&self.library)?;
-        let work_table = work.table()?;
-        let begin = world(start.pose);
-        let costs = self.costs(map, &work.name, options)?;
-        let question = SearchProblem {
+        graph: &'s RouteGraph,
+    ) -> Attempt<'s> {
+        Attempt {
+            site: self.site,
             library: &self.library,
-            tables: &tables,
-            places: &map.places,
-            work: &work_table,
-            navigation: &self.site.navigation,
             model: self.model,
-            epsilon: start.epsilon(self.site),
-            costs: &costs,
-            range: self.site.planner.range,
-            most_risk: options.most_risk,
-            wider,
-            ends: &map.ends,
-            seen: &map.seen,
-            successors,
-            predecessors,
-            limit: options.limit,
-            stop: &options.stop,
-            prunes_dominated: true,
-            horizons: &Horizons::default(),
-        };
-        let belief = BeliefStateF64::at_start(begin, start.spread, &start.known);
-        let rescues = Rescues::default();
-        let mut rescue = |belief: &BeliefStateF64, place: usize, risk: f64, look: usize| {
-            // A look that needs no tag cannot lose one.
-            !options.survive_a_lost_tag
-                || self.library.looks[look].tags.is_empty()
-                || rescues.exists(&question, (belief, place, risk), look)
-        };
-        let end = question.search(
-            (&belief, map.start, 0.0),
-            None,
-            SearchGoal::Cheapest,
-            &mut rescue,
-        );
-        // A smaller set may fail a facet's lever although a larger set passes, so dominance pruning may lose a plan.
-        let end = match end {
-            SearchOutcome::Infeasible(miss) if self.finds_contingencies => {
-                let thorough = SearchProblem {
-                    prunes_dominated: false,
-                    limit: (options.limit / FALLBACK_DIVISOR).min(FALLBACK_LIMIT),
-                    ..question
-                };
-                let begin = (&belief, map.start, 0.0);
-                match thorough.search(begin, None, SearchGoal::Cheapest, &mut rescue) {
-                    SearchOutcome::Optimal(answer) | SearchOutcome::Feasible(answer, _) => {
-                        SearchOutcome::Feasible(answer, 0.0)
-                    }
-                    SearchOutcome::Infeasible(_) | SearchOutcome::Open(_) => {
-                        SearchOutcome::Infeasible(miss)
-                    }
-                }
-            }
-            end => end,
-        };
-        let (status, answer, bound, miss) = match end {
-            SearchOutcome::Optimal(answer) => {
-                let cost = answer.cost;
-                (Status::Optimal, Some(answer), Some(cost), None)
-            }
-            SearchOutcome::Feasible(answer, bound) => {
-                (Status::Feasible, Some(answer), Some(bound), None)
-            }
-            SearchOutcome::Infeasible(miss) => (Status::Infeasible, None, None, miss),
-            SearchOutcome::Open(miss) => (Status::Limit, None, None, miss),
-        };
-        // A plan that was excluded because a contingency is missing may have one.
-        let (status, bound) = match (status, rescues.is_unsure()) {
-            (Status::Optimal, true) => (Status::Feasible, Some(0.0)),
-            (Status::Infeasible, true) => (Status::Limit, None),
-            (status, _) => (status, bound),
-        };
-        let mut contingencies = vec![];
-        let plan = match &answer {
-            None => None,
-            Some(answer) => {
-                let walk = Walk::start(self.site, start, StartAssumption::General)?;
-                let plan = self.evaluated(walk, answer, map, work)?;
-                let others = options.survive_a_lost_tag || self.finds_contingencies;
-                let actions = answer.actions.iter().enumerate();
-                for (step, action) in actions.filter(|_| others) {
-                    let Action::Look(look) = action else {
-                        continue;
-                    };
-                    let tags = self.library.looks[*look].tags.clone();
-                    if tags.is_empty() {
-                        continue;
-                    }
-                    let place = answer.actions[..step]
-                        .iter()
-                        .rev()
-                        .find_map(|action| match action {
-                            Action::Drive(to) => Some(*to),
-                            Action::Look(_) => None,
-                        })
-                        .unwrap_or(map.start);
-                    let before = &plan.steps[step].report.before;
-                    let spent = plan.steps[..step].iter();
-                    let risk_before = spent.map(|step| step.report.risk).sum();
-                    let begin = (before, place, risk_before);
-                    if let Some(other) = rescues.cheapest(&question, begin, *look) {
-                        let mut walk = Walk::start(self.site, start, StartAssumption::General)?;
-                        self.replay(&mut walk, &answer.actions[..step], map)?;
-                        let plan = self.evaluated(walk, &other, map, work)?;
-                        if options.survive_a_lost_tag || plan.report().succeeds() {
-                            contingencies.push(Contingency {
-                                step,
-                                tags,
-                                risk_before,
-                                plan,
-                            });
-                        }
-                    }
-                }
-                Some(plan)
-            }
-        };
-        let nearest = miss.map(|miss| {
-            let [rho, alpha] = miss.belief.enclosing();
-            Nearest {
-                scale: miss.scale,
-                set: [rho + miss.belief.spread[0], alpha + miss.belief.spread[1]],
-                after: miss
-                    .after
-                    .map(|look| self.library.looks[look].table.name.clone()),
-            }
-        });
-        let planned = PlanResult {
-            status,
-            plan,
-            bound,
-            contingencies,
-            nearest,
-            bound_of_all: 0.0,
             model_from: self.model_from(),
-        };
-        Ok(planned)
+            prices: self.prices,
+            finds_contingencies: self.finds_contingencies,
+            start,
+            work,
+            options,
+            wider,
+            graph,
+        }
     }
 
     fn model_from(&self) -> Option<String> {
         self.model.as_ref().map(|_| self.model_from.clone())
-    }
-
-    fn take(
-        &self,
-        walk: &mut Walk,
-        action: Action,
-        map: &Roadmap,
-    ) -> Result<StepReport, PlanError> {
-        match action {
-            Action::Look(look) => {
-                let look = &self.library.looks[look];
-                walk.task(&look.table.table()?, Some(look.bound))
-            }
-            Action::Drive(to) => {
-                let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
-                let from = pose(walk.belief.pose);
-                let model = self.model.ok_or(PlanError::NoModel)?;
-                walk.drive(&from, &[Leg::Straight(pose(map.places[to]))], &model)
-                    .map_err(|cause| PlanError::Drive { step: 0, cause })
-            }
-        }
-    }
-
-    fn replay(&self, walk: &mut Walk, actions: &[Action], map: &Roadmap) -> Result<(), PlanError> {
-        for action in actions {
-            self.take(walk, *action, map)?;
-        }
-        Ok(())
-    }
-
-    /// Evaluates an answer of the search as a plan with the core, on the tables in use.
-    fn evaluated(
-        &self,
-        mut walk: Walk,
-        answer: &Answer,
-        map: &Roadmap,
-        work: &TaskTable,
-    ) -> Result<Plan, PlanError> {
-        let mut steps = vec![];
-        let mut place = map.name_of(answer.beliefs[0].0, &self.library, &work.name);
-        for action in &answer.actions {
-            let report = self.take(&mut walk, *action, map)?;
-            let tags = match action {
-                Action::Look(look) => self.library.looks[*look].tags.clone(),
-                Action::Drive(to) => {
-                    place = map.name_of(*to, &self.library, &work.name);
-                    vec![]
-                }
-            };
-            steps.push(PlanStep {
-                place: place.clone(),
-                tags,
-                report,
-            });
-        }
-        let report = walk.task(&work.table()?, None)?;
-        steps.push(PlanStep {
-            place,
-            tags: vec![],
-            report,
-        });
-        let risk = steps.iter().map(|step| step.report.risk).sum();
-        Ok(Plan {
-            steps,
-            cost: answer.cost,
-            risk,
-        })
-    }
-
-    fn costs(&self, map: &Roadmap, work: &str, options: &Options) -> Result<Costs, PlanError> {
-        let mut costs = Costs {
-            metre: self.prices[0],
-            look: self.prices[1],
-            drives: BTreeMap::new(),
-        };
-        if options.costs.is_empty() {
-            return Ok(costs);
-        }
-        let named = |name: &str| -> Vec<usize> {
-            (0..map.places.len())
-                .filter(|place| {
-                    let known = map.name_of(*place, &self.library, work);
-                    known == name || known.split('#').next() == Some(name)
-                })
-                .collect()
-        };
-        for ((from, to), cost) in &options.costs {
-            if !(*cost >= 0.0 && cost.is_finite()) {
-                return Err(PlanError::Costs(std::format!(
-                    "from {from} to {to}: {cost} is not a cost; write a number, at least 0"
-                )));
-            }
-            let (starts, ends) = (named(from), named(to));
-            for (name, places) in [(from, &starts), (to, &ends)] {
-                if places.is_empty() {
-                    return Err(PlanError::Costs(std::format!(
-                        "there is no place `{name}`; places are `start`, `{work}` and the names of the looks"
-                    )));
-                }
-            }
-            for start in &starts {
-                for end in &ends {
-                    costs.drives.insert((*start, *end), *cost);
-                }
-            }
-        }
-        Ok(costs)
     }
 }

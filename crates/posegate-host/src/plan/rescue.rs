@@ -9,9 +9,8 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use super::BeliefStateF64;
-use super::search::{
-    Action, Answer, DeadEnds, SearchGoal, SearchOutcome, SearchProblem, is_within,
-};
+use super::problem::SearchProblem;
+use super::search::{Action, Answer, DeadEnds, SearchGoal, SearchOutcome, is_within};
 
 /// A belief at a place, and the risk so far.
 type Begin<'b> = (&'b BeliefStateF64, usize, f64);

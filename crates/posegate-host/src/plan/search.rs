@@ -14,53 +14,16 @@
 //! is no plan.
 
 use core::cell::RefCell;
-use std::cmp;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::Arc;
 
 use super::BeliefStateF64;
-use super::StopSignal;
-use super::backward::Horizons;
-use super::costs::{Costs, distance};
-use super::library::{Library, needed};
-use crate::site::{DriveModel, ErrorBound, Navigation};
-use posegate::contain::{Decision, Examination, decide, examine};
-use posegate::set::Estimate;
+use super::library::needed;
+use super::problem::SearchProblem;
+use super::queue::Queued;
+use crate::site::ErrorBound;
+use posegate::contain::{Examination, examine};
 use posegate::table::Table;
-use posegate::task::Leg;
-
-/// The input of a search.
-pub(super) struct SearchProblem<'a> {
-    pub library: &'a Library,
-    pub tables: &'a [Table<'a>],
-    /// Places: the library's, and those of this problem. The goal is the last one.
-    pub places: &'a [[f64; 3]],
-    pub work: &'a Table<'a>,
-    pub navigation: &'a Navigation,
-    pub model: Option<DriveModel>,
-    pub epsilon: f64,
-    pub costs: &'a Costs,
-    pub range: f64,
-    pub most_risk: f64,
-    /// The factor by which the sets of beliefs are widened.
-    pub wider: f64,
-    /// The places at which a robot with a known pose may begin the work. The goal is one of them.
-    pub ends: &'a [usize],
-    /// The looks whose success set contains each place's pose.
-    pub seen: &'a [Vec<usize>],
-    /// The successors of each place: those at which, at best, a robot arrives well enough to look.
-    pub successors: &'a [Vec<usize>],
-    /// The predecessors of each place.
-    pub predecessors: &'a [Vec<usize>],
-    /// The number of labels that may be taken from the queue.
-    pub limit: usize,
-    /// Ends the search as the limit does.
-    pub stop: &'a StopSignal,
-    /// `true` if dominated labels are dropped; else only equal labels are dropped.
-    pub prunes_dominated: bool,
-    /// The costs to go that were already computed.
-    pub horizons: &'a Horizons,
-}
 
 /// The goal of a search.
 #[derive(Clone, Copy, Debug)]
@@ -151,57 +114,7 @@ struct Label {
     is_dominated: bool,
 }
 
-/// A queue entry, ordered by the smallest bound first.
-#[derive(PartialEq)]
-pub(super) struct Queued {
-    pub bound: f64,
-    pub label: usize,
-    pub done: bool,
-}
-
-impl Eq for Queued {}
-
-impl Ord for Queued {
-    fn cmp(&self, other: &Self) -> cmp::Ordering {
-        // The heap pops the greatest entry: the smallest bound, then a finished plan, then the oldest label.
-        other
-            .bound
-            .total_cmp(&self.bound)
-            .then(self.done.cmp(&other.done))
-            .then(other.label.cmp(&self.label))
-    }
-}
-
-impl PartialOrd for Queued {
-    fn partial_cmp(&self, other: &Self) -> Option<cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 impl SearchProblem<'_> {
-    /// Returns `true` if a task may begin with a belief.
-    pub(super) fn fits(&self, table: &Table<'_>, belief: &BeliefStateF64) -> bool {
-        needed(belief, self.wider).is_some_and(|set| decide(table, &set) == Decision::Inside)
-    }
-
-    pub(super) fn drive(&self, belief: &BeliefStateF64, to: usize) -> Option<BeliefStateF64> {
-        drive_to(
-            belief,
-            self.places[to],
-            self.model.as_ref(),
-            self.navigation,
-            self.epsilon,
-        )
-    }
-
-    /// Returns `true` if a look needs none of the tags of the banned look.
-    pub(super) fn allowed(&self, look: usize, banned: Option<usize>) -> bool {
-        let tags = |look: usize| &self.library.looks[look].tags;
-        banned.is_none_or(|lost| {
-            look != lost && !tags(look).iter().any(|tag| tags(lost).contains(tag))
-        })
-    }
-
     /// Searches from a belief at a place. A look counts only if `rescue` returns `true`, that is, if a plan without
     /// its tags exists from there.
     pub fn search(
@@ -225,11 +138,6 @@ impl SearchProblem<'_> {
             false,
         );
         search.run(rescue)
-    }
-
-    /// Returns `true` if a place is within the range of a drive.
-    fn is_near(&self, place: usize, to: usize) -> bool {
-        distance(self.places[place], self.places[to]) <= self.range
     }
 }
 
@@ -500,25 +408,6 @@ impl<'s, 'p, 'd> Search<'s, 'p, 'd> {
                 a.belief == b.belief
             }
     }
-}
-
-/// Returns the belief after a straight drive to a place; `None` without a drive model.
-pub(super) fn drive_to(
-    belief: &BeliefStateF64,
-    to: [f64; 3],
-    model: Option<&DriveModel>,
-    navigation: &Navigation,
-    epsilon: f64,
-) -> Option<BeliefStateF64> {
-    let pose = |[x_m, y_m, yaw_rad]: [f64; 3]| Estimate { x_m, y_m, yaw_rad };
-    Some(belief.driven(
-        &pose(belief.pose),
-        &[Leg::Straight(pose(to))],
-        model?,
-        epsilon,
-        belief.spread,
-        navigation.controller,
-    ))
 }
 
 /// Returns `true` if a belief is at least as good as another belief at the same place in every respect.

@@ -4,7 +4,7 @@ use super::calibration::{self, Numbers};
 use super::error::SiteError;
 use super::named::NamedFile;
 use super::reader::{Key, Node, Table};
-use super::{SiteCamera, keys, parse, places};
+use super::{SiteCamera, keys, places, poses};
 use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
 use posegate::shape::{Intrinsics, Lens, Tolerance};
 
@@ -68,7 +68,7 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
     let view = seen(&calibration, tolerance).map_err(|fault| unseen(&table, fault))?;
     let camera = SiteCamera {
         camera: view.camera,
-        mount: parse::pose3(&table.required(&keys::MOUNT)?)?,
+        mount: poses::pose3(&table.required(&keys::MOUNT)?)?,
         mount_tolerance: match table.optional(&keys::MOUNT_TOLERANCE) {
             Some(node) => places::mount_tolerance(&node)?,
             None => Tolerance::NONE,

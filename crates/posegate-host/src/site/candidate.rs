@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::error::SiteError;
 use super::reader::{Node, Table, name_fault};
-use super::{Candidate, SiteTag, keys, parse, places, row};
+use super::{Candidate, SiteTag, keys, places, poses, row};
 use posegate::shape::{Tag, Tolerance, Wall};
 
 /// Returns the candidates of `[candidate.NAME]` and `[candidates.NAME]` tables, by name. Rows are on the sides of the
@@ -111,7 +111,7 @@ fn candidate(node: &Node<'_>) -> Result<Candidate, SiteError> {
             tag: Tag {
                 id: id.unwrap_or_default(),
                 size: table.number(&keys::SIZE)?,
-                pose: parse::pose3(&table.required(&keys::POSE)?)?,
+                pose: poses::pose3(&table.required(&keys::POSE)?)?,
             },
             tolerance: match table.optional(&keys::TOLERANCE) {
                 Some(node) => places::tolerance(&node)?,

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::error::SiteError;
+use super::names::named;
 use super::reader::{Node, Table};
-use super::{Site, Task, keys, places, success};
+use super::{Site, Task, keys, places};
 use posegate::set::Estimate;
 use posegate::shape::{PoseDeg, Tolerance};
 use posegate::task::{BoundedDriveModel, Leg, Odometry};
@@ -306,7 +307,7 @@ fn step(
     if table.has(keys::STEP_TASK.name) {
         let table = node.table(&[&keys::STEP_TASK])?;
         let name = table.required(&keys::STEP_TASK)?;
-        success::named(&name, "task", tasks)?;
+        named(&name, "task", tasks)?;
         return Ok(ChainStep::Task(name.text()?.to_owned()));
     }
     let table = node.table(&[&keys::NAVIGATE, &keys::DRIVE_MODEL])?;

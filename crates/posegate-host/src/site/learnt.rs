@@ -1,9 +1,9 @@
 //! Success sets from learnt error models: S_l(r) as a union of views in which both bounds are within r.
 
 use super::error::SiteError;
+use super::names::{Names, named};
 use super::places::SiteModel;
 use super::reader::{Node, Table};
-use super::success::{self, Names};
 use super::{ErrorBound, SiteCamera, SiteTag, keys};
 use crate::learn::{ErrorModel, TakenWith};
 use posegate::shape::{Exclusion, Shape, Visibility};
@@ -167,12 +167,12 @@ pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>,
     ) else {
         return Ok(None);
     };
-    let model = success::named(&model, "error_model", names.error_models)?;
+    let model = named(&model, "error_model", names.error_models)?;
     let coverage = match model {
         SiteModel::Learnt(model) => model.coverage(),
         SiteModel::Formula(_) => 1.0,
     };
-    let [translation, yaw_deg] = success::largest(&r)?;
+    let [translation, yaw_deg] = largest(&r)?;
     Ok(Some(Limit {
         bound: ErrorBound {
             translation,
@@ -181,6 +181,15 @@ pub(super) fn limit(node: &Node<'_>, names: &Names<'_>) -> Result<Option<Limit>,
         },
         everywhere: true,
     }))
+}
+
+/// Returns the largest error `r` of a success set, `[metres, degrees]`.
+pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
+    let table = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
+    Ok([
+        table.number(&keys::BOUND_TRANSLATION)?,
+        table.number(&keys::BOUND_YAW)?,
+    ])
 }
 
 fn worse(a: Limit, b: Limit) -> Limit {

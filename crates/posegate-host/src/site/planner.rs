@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use toml::de::DeTable;
 
 use super::error::{SiteError, Source};
+use super::names::Names;
 use super::reader::{Node, Table};
-use super::success::{self, Names};
-use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt};
+use super::syntax::syntax;
+use super::{Candidate, ErrorBound, SiteCamera, SiteTag, keys, learnt, success};
 use posegate::shape::{PoseDeg, Shape, SuccessSet, Tolerance, Wall};
 
 /// The planner's settings. All costs have one unit of any kind, such as seconds.
@@ -103,47 +104,10 @@ fn looks(
     names: &Names<'_>,
     are_there: bool,
 ) -> Result<BTreeMap<String, GeneratedLook>, SiteError> {
-    let table = look.any_table()?;
-    for name in ["tag", "shape", "r"] {
-        if table.has(name) {
-            return Err(table
-                .error_at_key(name, format!("`{name}` in {}", table.title()))
-                .help(
-                    "remove it: the planner looks at every tag, with the errors of its own `r`",
-                ));
-        }
-    }
-    let errors: Vec<[f64; 2]> = errors
-        .array()?
-        .iter()
-        .map(Node::pair)
-        .collect::<Result<_, _>>()?;
-    if errors.iter().any(|[m, deg]| !(*m > 0.0 && *deg > 0.0)) || errors.is_empty() {
-        return Err(look.error("`planner.r` has errors that are not above 0"));
-    }
-    let modelled = table.has(keys::ERROR_MODEL.name);
-    if !modelled && errors.len() > 1 {
-        return Err(look
-            .error("without an `error_model` a look has one largest error")
-            .help("give `r` one entry, or `look` an `error_model`"));
-    }
-    let body = look.written();
-    let body = body
-        .trim()
-        .trim_start_matches('{')
-        .trim_end_matches('}')
-        .trim()
-        .trim_end_matches(',')
-        .to_owned();
-    // Each look gets only the walls near its tag, unless the file names the walls.
-    let far = if table.has(keys::WALLS_SEEN.name) {
-        f64::INFINITY
-    } else {
-        table.number(&keys::D_MAX)?
-    };
+    let template = LookTemplate::read(look, errors)?;
     let mut looks = BTreeMap::new();
     for (tag, of) in names.tags {
-        let reach = far + of.tag.size + of.tolerance.translation;
+        let reach = template.far + of.tag.size + of.tolerance.translation;
         let near =
             |(_, wall): &(&String, &Wall)| wall.distance([of.tag.pose.x, of.tag.pose.y]) <= reach;
         let walls: BTreeMap<String, Wall> = names
@@ -157,60 +121,148 @@ fn looks(
             ..*names
         };
         let (mut has_look, mut too_poor) = (false, None);
-        for [translation, yaw_deg] in &errors {
-            let limit = if modelled {
-                format!(", r = {{ translation = {translation:?}, yaw_deg = {yaw_deg:?} }}")
-            } else {
-                String::new()
-            };
-            let text =
-                format!("success = {{ shape = \"visibility\", tag = {tag:?}, {body}{limit} }}\n");
-            let wrong =
-                |fault: SiteError| look.error(format!("a look at `{tag}`: {}", fault.message));
-            let source = Source {
-                file: look.file(),
-                text: &text,
-            };
-            let document = DeTable::parse(&text)
-                .map_err(|fault| wrong(super::parse::syntax(source, &fault)))?;
-            let root = Table::root(source, &document);
-            let set = root.required(&keys::SUCCESS).map_err(wrong)?;
-            let shape = match made(&set, names, of).map_err(wrong)? {
-                SetResult::Set(shape) => *shape,
-                // With the tag's tolerance another error may be possible.
-                SetResult::NotWithTolerance(fault) => {
-                    too_poor.get_or_insert(wrong(fault));
-                    continue;
+        for error in &template.errors {
+            match template.look((tag, of), *error, names)? {
+                LookResult::Look(made) => {
+                    has_look = true;
+                    looks.insert(template.name(tag, *error), *made);
                 }
-            };
-            has_look = true;
-            let learnt = learnt::limit(&set, names).map_err(wrong)?;
-            let name = if errors.len() == 1 {
-                tag.clone()
-            } else {
-                format!("{tag}@{translation}")
-            };
-            let goal = PoseDeg {
-                x: of.tag.pose.x,
-                y: of.tag.pose.y,
-                yaw_deg: 0.0,
-            };
-            let made = GeneratedLook {
-                tag: tag.clone(),
-                success: SuccessSet { goal, shape },
-                bound: ErrorBound {
-                    coverage: learnt.map_or(1.0, |learnt| learnt.bound.coverage),
-                    translation: *translation,
-                    yaw_deg: *yaw_deg,
-                },
-            };
-            looks.insert(name, made);
+                LookResult::NotWithTolerance(fault) => {
+                    too_poor.get_or_insert(fault);
+                }
+            }
         }
         if let Some(fault) = too_poor.filter(|_| are_there && !has_look) {
             return Err(fault.help("give `planner.r` an error that is large enough for this tag too, or survey it better"));
         }
     }
     Ok(looks)
+}
+
+/// The part of a look that is the same for all tags, and the errors.
+struct LookTemplate<'n, 'a> {
+    look: &'n Node<'a>,
+    /// The largest errors, each `[metres, degrees]`.
+    errors: Vec<[f64; 2]>,
+    /// `true` if the look names an error model.
+    modelled: bool,
+    /// The keys of the look as written in the file.
+    body: String,
+    /// The largest distance of a tag from walls that may hide it, metres. Each look gets only the walls near its tag,
+    /// unless the file names the walls.
+    far: f64,
+}
+
+/// A look, or the reason why there is none.
+enum LookResult {
+    Look(Box<GeneratedLook>),
+    /// With the tag's tolerance no pose is good enough; another error may be possible.
+    NotWithTolerance(SiteError),
+}
+
+impl<'n, 'a> LookTemplate<'n, 'a> {
+    /// Reads `look` and `r` of `[planner]`.
+    fn read(look: &'n Node<'a>, errors: &Node<'_>) -> Result<Self, SiteError> {
+        let table = look.any_table()?;
+        for name in ["tag", "shape", "r"] {
+            if table.has(name) {
+                return Err(table
+                    .error_at_key(name, format!("`{name}` in {}", table.title()))
+                    .help(
+                        "remove it: the planner looks at every tag, with the errors of its own `r`",
+                    ));
+            }
+        }
+        let errors: Vec<[f64; 2]> = errors
+            .array()?
+            .iter()
+            .map(Node::pair)
+            .collect::<Result<_, _>>()?;
+        if errors.iter().any(|[m, deg]| !(*m > 0.0 && *deg > 0.0)) || errors.is_empty() {
+            return Err(look.error("`planner.r` has errors that are not above 0"));
+        }
+        let modelled = table.has(keys::ERROR_MODEL.name);
+        if !modelled && errors.len() > 1 {
+            return Err(look
+                .error("without an `error_model` a look has one largest error")
+                .help("give `r` one entry, or `look` an `error_model`"));
+        }
+        let body = look.written();
+        let body = body
+            .trim()
+            .trim_start_matches('{')
+            .trim_end_matches('}')
+            .trim()
+            .trim_end_matches(',')
+            .to_owned();
+        let far = if table.has(keys::WALLS_SEEN.name) {
+            f64::INFINITY
+        } else {
+            table.number(&keys::D_MAX)?
+        };
+        Ok(Self {
+            look,
+            errors,
+            modelled,
+            body,
+            far,
+        })
+    }
+
+    /// Returns the name of a look at a tag: the tag's, and the error if there are several.
+    fn name(&self, tag: &str, [translation, _]: [f64; 2]) -> String {
+        if self.errors.len() == 1 {
+            tag.to_owned()
+        } else {
+            format!("{tag}@{translation}")
+        }
+    }
+
+    /// Makes the look at a tag with an error.
+    fn look(
+        &self,
+        (tag, of): (&str, &SiteTag),
+        [translation, yaw_deg]: [f64; 2],
+        names: &Names<'_>,
+    ) -> Result<LookResult, SiteError> {
+        let Self { look, body, .. } = self;
+        let limit = if self.modelled {
+            format!(", r = {{ translation = {translation:?}, yaw_deg = {yaw_deg:?} }}")
+        } else {
+            String::new()
+        };
+        let text =
+            format!("success = {{ shape = \"visibility\", tag = {tag:?}, {body}{limit} }}\n");
+        let wrong = |fault: SiteError| look.error(format!("a look at `{tag}`: {}", fault.message));
+        let source = Source {
+            file: look.file(),
+            text: &text,
+        };
+        let document = DeTable::parse(&text).map_err(|fault| wrong(syntax(source, &fault)))?;
+        let root = Table::root(source, &document);
+        let set = root.required(&keys::SUCCESS).map_err(wrong)?;
+        let shape = match made(&set, names, of).map_err(wrong)? {
+            SetResult::Set(shape) => *shape,
+            SetResult::NotWithTolerance(fault) => {
+                return Ok(LookResult::NotWithTolerance(wrong(fault)));
+            }
+        };
+        let learnt = learnt::limit(&set, names).map_err(wrong)?;
+        let goal = PoseDeg {
+            x: of.tag.pose.x,
+            y: of.tag.pose.y,
+            yaw_deg: 0.0,
+        };
+        Ok(LookResult::Look(Box::new(GeneratedLook {
+            tag: tag.to_owned(),
+            success: SuccessSet { goal, shape },
+            bound: ErrorBound {
+                coverage: learnt.map_or(1.0, |learnt| learnt.bound.coverage),
+                translation,
+                yaw_deg,
+            },
+        })))
+    }
 }
 
 /// The success set of a look.

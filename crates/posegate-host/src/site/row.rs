@@ -1,8 +1,9 @@
 //! Rows of candidates along walls, from TOML.
 
 use super::error::SiteError;
+use super::names::named;
 use super::reader::{Node, Table};
-use super::{Candidate, SiteTag, keys, success};
+use super::{Candidate, SiteTag, keys};
 use posegate::shape::{Family, Pose3Deg, Tag, Tolerance, Wall};
 use std::collections::BTreeMap;
 
@@ -30,7 +31,7 @@ pub(super) fn row(
         &keys::CANDIDATE_COST,
         &keys::TOLERANCE,
     ])?;
-    let wall = success::named(&table.required(&keys::ROW_WALL)?, "wall", walls)?;
+    let wall = named(&table.required(&keys::ROW_WALL)?, "wall", walls)?;
     let every = table.required(&keys::ROW_EVERY)?;
     let family = table.required(&keys::FAMILY)?;
     if family.text()?.is_empty() {

@@ -1,26 +1,16 @@
 //! Success sets from TOML.
 
-use std::collections::BTreeMap;
-
 use super::error::SiteError;
 use super::families::{FAMILIES, family_bits};
 use super::learnt;
+use super::names::{Names, named};
 use super::places::SiteModel;
 use super::reader::{Node, Table};
 use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use posegate::shape::{
-    BoxSet, Clear, ErrorLimit, Exclusion, Footprint, Intrinsics, Lens, PolygonError, PoseDeg,
+    BoxSet, Clear, ErrorLimit, ErrorModel, Exclusion, Footprint, Intrinsics, Lens, PolygonError,
     Shape, Sharpness, Visibility, Wall, is_arc,
 };
-
-/// The entries that a success set can refer to by name.
-pub(super) struct Names<'a> {
-    pub cameras: &'a BTreeMap<String, SiteCamera>,
-    pub tags: &'a BTreeMap<String, SiteTag>,
-    pub walls: &'a BTreeMap<String, Wall>,
-    pub error_models: &'a BTreeMap<String, SiteModel>,
-    pub goals: &'a BTreeMap<String, PoseDeg>,
-}
 
 /// Deepest nesting of `any` and `all`.
 const DEEPEST: u32 = 16;
@@ -204,6 +194,54 @@ fn view(
     tag: &SiteTag,
     names: &Names<'_>,
 ) -> Result<Shape, SiteError> {
+    let view = limits(table, camera, tag)?;
+    let mut sets = std::vec![match table.optional(&keys::ERROR_MODEL) {
+        None if table.has(keys::ERROR_LIMIT.name) => {
+            return Err(table
+                .error_at_key(
+                    keys::ERROR_LIMIT.name,
+                    format!("{} has an `r` and no `error_model`", table.title()),
+                )
+                .expected("both or neither")
+                .help("add `error_model = NAME`, or remove `r`"));
+        }
+        None => Shape::Visibility(view),
+        Some(node) => {
+            let model = named(&node, "error_model", names.error_models)?;
+            let limit = table.required(&keys::ERROR_LIMIT)?;
+            let largest = learnt::largest(&limit)?;
+            match model {
+                SiteModel::Formula(model) => bounded(&node, view, *model, largest)?,
+                SiteModel::Learnt(model) => {
+                    learnt::same(&node, model, camera, tag)?;
+                    learnt::set(&limit, &view, model, largest)?
+                }
+            }
+        }
+    }];
+    sets.extend(exclusions(table, view, tag)?.map(Shape::Apart));
+    let walls: Vec<&Wall> = match table.optional(&keys::WALLS_SEEN) {
+        Some(node) => {
+            let walls = node.array()?;
+            let walls = walls.iter().map(|name| named(name, "wall", names.walls));
+            walls.collect::<Result<_, _>>()?
+        }
+        None => names.walls.values().collect(),
+    };
+    sets.extend(walls.into_iter().map(|wall| {
+        Shape::Apart(Exclusion::Hidden {
+            view,
+            wall: wall.clone(),
+        })
+    }));
+    Ok(match <[Shape; 1]>::try_from(sets) {
+        Ok([only]) => only,
+        Err(sets) => Shape::All(sets),
+    })
+}
+
+/// Returns a view of a tag with the limits of a success set.
+fn limits(table: &Table<'_>, camera: &SiteCamera, tag: &SiteTag) -> Result<Visibility, SiteError> {
     let z_near = match table.optional(&keys::Z_NEAR) {
         Some(node) => node.number()?,
         None => Site::DEFAULT_Z_NEAR,
@@ -242,56 +280,51 @@ fn view(
             .expected("tolerances smaller than `phi_max_deg` and `psi_max_deg`")
             .help("survey the tag or the camera better, or allow wider angles"));
     }
-    let mut sets = std::vec![match table.optional(&keys::ERROR_MODEL) {
-        None if table.has(keys::ERROR_LIMIT.name) => {
-            return Err(table
-                .error_at_key(
-                    keys::ERROR_LIMIT.name,
-                    format!("{} has an `r` and no `error_model`", table.title()),
-                )
-                .expected("both or neither")
-                .help("add `error_model = NAME`, or remove `r`"));
-        }
-        None => Shape::Visibility(view),
-        Some(node) => {
-            let model = named(&node, "error_model", names.error_models)?;
-            let limit = table.required(&keys::ERROR_LIMIT)?;
-            let [translation, yaw_deg] = largest(&limit)?;
-            match model {
-                SiteModel::Formula(model) => {
-                    let psi_max_deg = view.psi_max_deg;
-                    if !model.is_bound_up_to(psi_max_deg) {
-                        return Err(node
-                            .error(format!(
-                                "the error model of `{}` has a bound below 0 at a psi of {psi_max_deg} deg",
-                                node.path()
-                            ))
-                            .expected("a bound that is at least 0 at every angle of the set: c0 + c3 psi^2 >= 0 up to `psi_max_deg`")
-                            .help("choose a smaller negative c3, or a smaller `psi_max_deg`"));
-                    }
-                    Shape::Bounded {
-                        view,
-                        limit: ErrorLimit {
-                            model: *model,
-                            translation,
-                            yaw_deg,
-                        },
-                    }
-                }
-                SiteModel::Learnt(model) => {
-                    learnt::same(&node, model, camera, tag)?;
-                    learnt::set(&limit, &view, model, [translation, yaw_deg])?
-                }
-            }
-        }
-    }];
+    Ok(view)
+}
+
+/// Returns the part of a view in which the error of a formula is within `[m, deg]`.
+fn bounded(
+    node: &Node<'_>,
+    view: Visibility,
+    model: ErrorModel,
+    [translation, yaw_deg]: [f64; 2],
+) -> Result<Shape, SiteError> {
+    let psi_max_deg = view.psi_max_deg;
+    if !model.is_bound_up_to(psi_max_deg) {
+        return Err(node
+            .error(format!(
+                "the error model of `{}` has a bound below 0 at a psi of {psi_max_deg} deg",
+                node.path()
+            ))
+            .expected("a bound that is at least 0 at every angle of the set: c0 + c3 psi^2 >= 0 up to `psi_max_deg`")
+            .help("choose a smaller negative c3, or a smaller `psi_max_deg`"));
+    }
+    Ok(Shape::Bounded {
+        view,
+        limit: ErrorLimit {
+            model,
+            translation,
+            yaw_deg,
+        },
+    })
+}
+
+/// Returns the exclusions of near and of head-on views.
+fn exclusions(
+    table: &Table<'_>,
+    view: Visibility,
+    tag: &SiteTag,
+) -> Result<impl Iterator<Item = Exclusion>, SiteError> {
+    let mut near = None;
     if let Some(node) = table.optional(&keys::D_MIN) {
         let d_min = node.number()?;
         if d_min >= view.d_max {
             return Err(node.error(format!("`{}` is not below `d_max`", node.path())));
         }
-        sets.push(Shape::Apart(Exclusion::Near { view, d_min }));
+        near = Some(Exclusion::Near { view, d_min });
     }
+    let mut head_on = None;
     if let Some(node) = table.optional(&keys::PSI_MIN) {
         let psi_min_deg = node.number()?;
         if psi_min_deg + 2.0 * tag.tolerance.turn_deg >= view.psi_max_deg {
@@ -300,35 +333,9 @@ fn view(
                 node.path()
             )));
         }
-        sets.push(Shape::Apart(Exclusion::Square { view, psi_min_deg }));
+        head_on = Some(Exclusion::Square { view, psi_min_deg });
     }
-    let walls: Vec<&Wall> = match table.optional(&keys::WALLS_SEEN) {
-        Some(node) => {
-            let walls = node.array()?;
-            let walls = walls.iter().map(|name| named(name, "wall", names.walls));
-            walls.collect::<Result<_, _>>()?
-        }
-        None => names.walls.values().collect(),
-    };
-    sets.extend(walls.into_iter().map(|wall| {
-        Shape::Apart(Exclusion::Hidden {
-            view,
-            wall: wall.clone(),
-        })
-    }));
-    Ok(match <[Shape; 1]>::try_from(sets) {
-        Ok([only]) => only,
-        Err(sets) => Shape::All(sets),
-    })
-}
-
-/// Returns the largest error `r` of a success set, `[metres, degrees]`.
-pub(super) fn largest(limit: &Node<'_>) -> Result<[f64; 2], SiteError> {
-    let table = limit.table(&[&keys::BOUND_TRANSLATION, &keys::BOUND_YAW])?;
-    Ok([
-        table.number(&keys::BOUND_TRANSLATION)?,
-        table.number(&keys::BOUND_YAW)?,
-    ])
+    Ok(near.into_iter().chain(head_on))
 }
 
 /// Returns the smallest number of pixels per bit at which the tag must be seen.
@@ -412,20 +419,4 @@ fn blur(node: &Node<'_>, off: Intrinsics, view: &mut Visibility) -> Result<(), S
     let near = pixels * arm / (cosine * (most - pixels / (cosine * cosine)));
     view.z_near = view.z_near.max(near * (1.0 + 1e-9));
     Ok(())
-}
-
-/// Returns the entry that a name refers to.
-pub(super) fn named<'m, T>(
-    node: &Node<'_>,
-    what: &str,
-    known: &'m BTreeMap<String, T>,
-) -> Result<&'m T, SiteError> {
-    let name = node.text()?;
-    known.get(name).ok_or_else(|| {
-        let error = node.error(format!("there is no {what} `{name}`"));
-        match suggest::similar(name, known.keys().map(String::as_str)) {
-            Some(similar) => error.help(format!("did you mean `{similar}`?")),
-            None => error.help(format!("add a table [{what}.{name}]")),
-        }
-    })
 }

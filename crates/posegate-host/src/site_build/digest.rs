@@ -5,11 +5,7 @@ use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use serde::Serialize;
 use sha2::{Digest, Sha256};
-
-use super::error::SiteBuildError;
-use super::store::{fault, json};
 
 /// Returns a digest as hexadecimal digits.
 pub(super) fn hex(bytes: &[u8]) -> String {
@@ -37,13 +33,6 @@ pub(super) fn sha256_of_file(path: &Path) -> io::Result<String> {
     Ok(hex(&digest.finalize()))
 }
 
-/// Returns the SHA-256 of a value as [`json`] writes it.
-pub(super) fn sha256_of_json(value: &impl Serialize) -> io::Result<String> {
-    let mut digest = Sha256::new();
-    json(&mut digest, value)?;
-    Ok(hex(&digest.finalize()))
-}
-
 /// Returns the SHA-256 of several texts. The length of each text precedes it, so different lists of texts have
 /// different inputs.
 pub(super) fn sha256_of_texts(texts: &[&str]) -> [u8; 32] {
@@ -53,13 +42,4 @@ pub(super) fn sha256_of_texts(texts: &[&str]) -> [u8; 32] {
         all.update(text.as_bytes());
     }
     all.finalize().into()
-}
-
-/// Returns the SHA-256 of a program's file as hexadecimal digits. It is part of every key, because another build of
-/// the program may make other results.
-///
-/// # Errors
-/// [`SiteBuildError::File`] if the file cannot be read.
-pub fn program(path: &Path) -> Result<String, SiteBuildError> {
-    sha256_of_file(path).map_err(fault(path))
 }

@@ -29,12 +29,12 @@
 //! ```
 
 pub use self::build::{BuildOptions, BuildSummary, build};
-pub use self::digest::program;
 pub use self::error::{PieceError, SiteBuildError};
 pub use self::inventory::Inventory;
 pub use self::merge::{MergeChecks, MergeSummary, merge, pieces};
 pub use self::part::part;
 pub use self::piece::{Piece, PlanOptions, Recipe};
+pub use self::program::program;
 pub use self::results::{BUILD_WRITES, MERGE_WRITES};
 pub use self::shard::{ParseShardError, Shard, number};
 
@@ -50,6 +50,7 @@ mod merge;
 mod part;
 mod piece;
 mod piece_file;
+mod program;
 mod proof;
 mod records;
 mod results;

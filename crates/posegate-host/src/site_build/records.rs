@@ -1,13 +1,16 @@
 //! Records of the shards in a folder: each shard records the inventory whose part it makes.
 
-use serde::{Deserialize, Serialize};
+use std::io;
 
-use super::digest::{hex, sha256, sha256_of_file, sha256_of_json};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::digest::{hex, sha256, sha256_of_file};
 use super::error::{MAX_NAMED, SiteBuildError};
 use super::inventory::Inventory;
 use super::piece::{FORMAT, Recipe};
 use super::shard::Shard;
-use super::store::{Store, fault, parsed};
+use super::store::{Store, fault, json, parsed};
 use crate::site::Site;
 
 /// The record of a shard.
@@ -166,4 +169,11 @@ fn read_inventory(
         ));
     }
     Ok(inventory)
+}
+
+/// Returns the SHA-256 of a value as [`json`] writes it.
+fn sha256_of_json(value: &impl Serialize) -> io::Result<String> {
+    let mut digest = Sha256::new();
+    json(&mut digest, value)?;
+    Ok(hex(&digest.finalize()))
 }

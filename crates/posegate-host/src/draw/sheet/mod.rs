@@ -6,10 +6,10 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-use super::letters::{escaped, literal};
+use super::letters::{escaped, literal, number};
 use super::measure::fitted;
 use super::palette;
-use super::svg::{Anchor, Font, Picture, Style, number};
+use super::svg::{Anchor, Font, Picture, Style};
 use posegate::shape::{Tag, Tolerance, Wall};
 
 /// A tag that is to be mounted.

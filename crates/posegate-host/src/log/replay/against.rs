@@ -1,27 +1,9 @@
 //! Compares an estimate with the truth.
 
-use super::Row;
+use super::{Row, TruthComparison};
 use nalgebra::{Matrix3, Vector3};
 use posegate::set::{CrossTerms, RadiusSquared, Trust, Uncertainty};
 use posegate::shape::SuccessSet;
-
-/// The comparison of an estimate with the truth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TruthComparison {
-    /// `true` if the true pose is in the success set, by the set's own definition.
-    pub inside: bool,
-    /// The scale at which the border of the pose-set passes through the true pose; `None` if there is no pose-set.
-    pub scale: Option<f64>,
-    /// `true` if the true pose is in the pose-set: the scale is at most 1.
-    pub held: Option<bool>,
-    /// `e' P^-1 e` with the error e (x, y, yaw) and the covariance P that the gate was given, before inflation. `None`
-    /// without a covariance, if P is not positive definite, or if the source is not declared.
-    pub nees: Option<f64>,
-    /// Distance of the positions, metres.
-    pub error_m: f64,
-    /// Difference of the headings, radians, 0 to pi.
-    pub error_yaw_rad: f64,
-}
 
 impl TruthComparison {
     /// Compares an estimate with the truth, in plain floats: a true pose on the border may count as inside or

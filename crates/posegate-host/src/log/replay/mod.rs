@@ -57,7 +57,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use self::against::TruthComparison;
 pub use self::channels::Channels;
 pub use self::clock::{Clock, NOT_FRESH};
 pub use self::interlock::{InterlockTimes, WhyShut};
@@ -66,8 +65,8 @@ pub use self::odometry::{Odometry, OdometryError, OdometryExtremes, OdometryPose
 pub use self::open::OpenMoments;
 pub use self::play::{Part, PlayError, play};
 pub use self::refused::RejectedTruth;
-pub use self::row::Row;
-pub use self::rules::{RULES, Rules, Thresholds};
+pub use self::row::{RULES, Row, TruthComparison};
+pub use self::rules::{Rules, Thresholds};
 pub use self::stanford::{END as STANFORD_END, Region, STEPS as STANFORD_STEPS, Stanford};
 pub use self::tally::Tally;
 pub use self::timeline::{Bucket, RuleCounts, Timeline};

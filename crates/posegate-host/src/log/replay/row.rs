@@ -1,12 +1,15 @@
 //! One estimate of a replay.
 
-use super::{TruthComparison, margin_of};
+use super::margin_of;
 use crate::log::recording::Sample;
 use crate::log::{coordinates, recording::yaw_of};
 use posegate::gate::{Reason, State, Verdict};
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
 use serde_json::{Value, json};
+
+/// The names of the rules that judge single estimates; `ate` judges a whole recording.
+pub const RULES: [&str; 3] = ["distance", "sigma", "ellipse"];
 
 /// One estimate of a replay, with all results.
 #[derive(Clone, Debug)]
@@ -47,8 +50,26 @@ pub struct Row {
     pub since_fix_ms: Option<u32>,
     /// The comparison with the truth; `None` if the truth is not known.
     pub against: Option<TruthComparison>,
-    /// The results of the rules in [`super::RULES`]. `None` if a rule lacks its input.
+    /// The results of the rules in [`RULES`]. `None` if a rule lacks its input.
     pub rules: [Option<bool>; 3],
+}
+
+/// The comparison of an estimate with the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TruthComparison {
+    /// `true` if the true pose is in the success set, by the set's own definition.
+    pub inside: bool,
+    /// The scale at which the border of the pose-set passes through the true pose; `None` if there is no pose-set.
+    pub scale: Option<f64>,
+    /// `true` if the true pose is in the pose-set: the scale is at most 1.
+    pub held: Option<bool>,
+    /// `e' P^-1 e` with the error e (x, y, yaw) and the covariance P that the gate was given, before inflation. `None`
+    /// without a covariance, if P is not positive definite, or if the source is not declared.
+    pub nees: Option<f64>,
+    /// Distance of the positions, metres.
+    pub error_m: f64,
+    /// Difference of the headings, radians, 0 to pi.
+    pub error_yaw_rad: f64,
 }
 
 impl Row {
@@ -133,7 +154,7 @@ impl Row {
             "age_s": self.age_s(),
             "pose": self.pose,
         });
-        for (name, permits) in super::RULES.iter().zip(self.rules) {
+        for (name, permits) in RULES.iter().zip(self.rules) {
             line[*name] = json!(permits);
         }
         if let (Some(against), Some(truth)) = (&self.against, self.truth) {

@@ -14,9 +14,6 @@ use super::Row;
 use posegate::set::Uncertainty;
 use posegate::shape::PoseDeg;
 
-/// The names of the rules that judge single estimates; `ate` judges a whole recording.
-pub const RULES: [&str; 3] = ["distance", "sigma", "ellipse"];
-
 /// The limits of the rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
@@ -64,7 +61,7 @@ impl Rules {
         Self { thresholds, goal }
     }
 
-    /// Returns the results of the rules in [`RULES`] for an estimate with its recorded covariance. `None` if a rule
+    /// Returns the results of the rules in [`RULES`](super::RULES) for an estimate with its recorded covariance. `None` if a rule
     /// needs a covariance and there is none. NaN permits nothing.
     #[must_use]
     pub fn of(&self, row: &Row) -> [Option<bool>; 3] {

@@ -170,7 +170,7 @@ impl Body {
         let middle = white.middle(u1);
         let step = white.radius;
         let poses = [[0.0, 0.0], [step, 0.0], [0.0, step]].map(|offset| {
-            let [x, y] = white.in_metres(offset);
+            let [x, y] = white.to_metres(offset);
             let [x, y] = [middle[0] + x, middle[1] + y];
             Planar { x, y, cos, sin }
         });

@@ -174,150 +174,318 @@ impl Optimizer for Descent {
 }
 
 impl Cmaes {
+    /// Runs the strategy once from a point. `larger` multiplies the population.
     fn run(
         &self,
         problem: &dyn Problem,
         budget: &Budget<'_>,
         begin: &[f64],
         larger: usize,
-        mut look: Fidelity,
+        look: Fidelity,
         random: &mut ChaCha8Rng,
     ) -> Solution {
-        let n = problem.dimensions();
+        let mut evolution = Evolution::new(self, problem, begin, larger, look);
+        for number in 1..=600_i32 {
+            let generation = evolution.draw(budget, random);
+            evolution.keep_best(&generation);
+            if budget.left() == 0 {
+                break;
+            }
+            evolution.adapt(&generation, number);
+            if evolution.has_ended(&generation) {
+                break;
+            }
+        }
+        evolution.finish(budget)
+    }
+}
+
+/// The constants of a run.
+struct Rates {
+    of_n: f64,
+    population: usize,
+    /// The weights of the better half.
+    weights: Vec<f64>,
+    /// The weights of the worse half, none above 0; empty unless the strategy is active.
+    worse: Vec<f64>,
+    effective: f64,
+    c_sigma: f64,
+    damping: f64,
+    c_c: f64,
+    c_1: f64,
+    c_mu: f64,
+    /// The usual length of a step of normally distributed numbers.
+    usual: f64,
+}
+
+impl Rates {
+    /// Returns the constants for a number of dimensions, by the tutorial's Table 1.
+    fn new(strategy: &Cmaes, n: usize, larger: usize) -> Self {
         let of_n = n as f64;
         let usual_population = (4 + libm::floor(3.0 * libm::log(of_n)) as usize).max(6);
-        let population = self.population.unwrap_or(usual_population) * larger;
+        let population = strategy.population.unwrap_or(usual_population) * larger;
         let parents = population / 2;
-        let raw = |i: usize| libm::log(0.5 * (population as f64 + 1.0)) - libm::log(i as f64 + 1.0);
+        let raw = |i: usize| raw_weight(population, i);
         let sum: f64 = (0..parents).map(raw).sum();
         let weights: Vec<f64> = (0..parents).map(|i| raw(i) / sum).collect();
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
         // With few evaluations the step adapts faster than by the table; `./ci.sh placement` measures this choice.
-        let slower = if self.active { 3.0 } else { 5.0 };
+        let slower = if strategy.active { 3.0 } else { 5.0 };
         let c_sigma = (effective + 2.0) / (of_n + effective + slower);
-        let damping =
-            1.0 + 2.0 * (libm::sqrt((effective - 1.0) / (of_n + 1.0)) - 1.0).max(0.0) + c_sigma;
-        let c_c = (4.0 + effective / of_n) / (of_n + 4.0 + 2.0 * effective / of_n);
         let c_1 = 2.0 / ((of_n + 1.3) * (of_n + 1.3) + effective);
         // For the same reason the covariance adapts faster.
-        let quarter = if self.active { 0.25 } else { 0.0 };
-        let c_mu = (1.0 - c_1).min(
-            2.0 * (quarter + effective - 2.0 + 1.0 / effective)
-                / ((of_n + 2.0) * (of_n + 2.0) + effective),
-        );
-        // The weights of the worse half, none above 0, with the tutorial's bounds.
-        let worse: Vec<f64> = if self.active {
-            let below = |power: i32| -> f64 {
-                (parents..population)
-                    .map(|i| libm::pow(raw(i).abs(), f64::from(power)))
-                    .sum()
-            };
-            let effective_below = below(1) * below(1) / below(2);
-            let most = (1.0 + c_1 / c_mu)
-                .min(1.0 + 2.0 * effective_below / (effective + 2.0))
-                .min((1.0 - c_1 - c_mu) / (of_n * c_mu));
-            (parents..population)
-                .map(|i| most * raw(i).min(0.0) / below(1))
-                .collect()
+        let quarter = if strategy.active { 0.25 } else { 0.0 };
+        let rates = Self {
+            of_n,
+            population,
+            weights,
+            worse: Vec::new(),
+            effective,
+            c_sigma,
+            damping: 1.0
+                + 2.0 * (libm::sqrt((effective - 1.0) / (of_n + 1.0)) - 1.0).max(0.0)
+                + c_sigma,
+            c_c: (4.0 + effective / of_n) / (of_n + 4.0 + 2.0 * effective / of_n),
+            c_1,
+            c_mu: (1.0 - c_1).min(
+                2.0 * (quarter + effective - 2.0 + 1.0 / effective)
+                    / ((of_n + 2.0) * (of_n + 2.0) + effective),
+            ),
+            usual: libm::sqrt(of_n) * (1.0 - 1.0 / (4.0 * of_n) + 1.0 / (21.0 * of_n * of_n)),
+        };
+        let worse = if strategy.active {
+            rates.worse_weights()
         } else {
             Vec::new()
         };
-        let of_all: f64 = 1.0 + worse.iter().sum::<f64>();
-        let usual = libm::sqrt(of_n) * (1.0 - 1.0 / (4.0 * of_n) + 1.0 / (21.0 * of_n * of_n));
+        Self { worse, ..rates }
+    }
 
-        let mut mean = DVector::from_column_slice(begin);
-        let mut sigma = self.sigma;
-        let mut covariance = DMatrix::<f64>::identity(n, n);
-        let (mut path_sigma, mut path_c) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
-        let mut best = Solution {
-            point: begin.to_vec(),
-            value: f64::INFINITY,
+    /// Returns the weights of the worse half, with the tutorial's bounds.
+    fn worse_weights(&self) -> Vec<f64> {
+        let (population, effective) = (self.population, self.effective);
+        let (of_n, c_1, c_mu) = (self.of_n, self.c_1, self.c_mu);
+        let worse = population / 2..population;
+        let raw = |i: usize| raw_weight(population, i);
+        let below = |power: i32| -> f64 {
+            let powers = worse.clone();
+            powers
+                .map(|i| libm::pow(raw(i).abs(), f64::from(power)))
+                .sum()
         };
-        let mut settled = 0;
-        for generation in 1..=600_i32 {
-            let eigen = SymmetricEigen::new(covariance.clone());
-            let lengths = eigen.eigenvalues.map(|value| libm::sqrt(value.max(1e-24)));
-            let stretched = &eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
-            let steps: Vec<DVector<f64>> = (0..population)
-                .map(|_| {
-                    let drawn = DVector::from_fn(n, |_, _| random.sample::<f64, _>(StandardNormal));
-                    &stretched * drawn
-                })
-                .collect();
-            let points: Vec<Vec<f64>> = steps
-                .iter()
-                .map(|step| folded(problem, (&mean + step * sigma).as_slice()))
-                .collect();
-            let values = budget.values(problem, &points, look);
-            let mut order: Vec<usize> = (0..population).collect();
-            order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
-            let (first, last) = (order[0], order[parents.max(1) - 1]);
-            if values[first] < best.value {
-                best = Solution {
-                    point: points[first].clone(),
-                    value: values[first],
-                };
-            }
-            if budget.left() == 0 {
-                break;
-            }
-            let mut step = DVector::<f64>::zeros(n);
-            for (weight, index) in weights.iter().zip(&order) {
-                step += &steps[*index] * *weight;
-            }
-            mean += &step * sigma;
-            let shrunk = lengths.map(|length| 1.0 / length);
-            let whitened = &eigen.eigenvectors
-                * DMatrix::from_diagonal(&shrunk)
-                * eigen.eigenvectors.transpose()
-                * &step;
-            path_sigma = path_sigma * (1.0 - c_sigma)
-                + whitened * libm::sqrt(c_sigma * (2.0 - c_sigma) * effective);
-            let length = path_sigma.norm();
-            let fresh = libm::sqrt(1.0 - libm::pow(1.0 - c_sigma, 2.0 * f64::from(generation)));
-            let stalls = length / fresh < (1.4 + 2.0 / (of_n + 1.0)) * usual;
-            let h = if stalls { 1.0 } else { 0.0 };
-            path_c = path_c * (1.0 - c_c) + &step * (h * libm::sqrt(c_c * (2.0 - c_c) * effective));
-            let mut spread = DMatrix::<f64>::zeros(n, n);
-            for (weight, index) in weights.iter().zip(&order) {
-                spread += &steps[*index] * steps[*index].transpose() * *weight;
-            }
-            for (weight, index) in worse.iter().zip(&order[parents..]) {
-                // No longer than a usual step, so that the covariance remains positive definite.
-                let whitened = DMatrix::from_diagonal(&shrunk)
-                    * eigen.eigenvectors.transpose()
-                    * &steps[*index];
-                let scale = of_n / whitened.norm_squared().max(f64::MIN_POSITIVE);
-                spread += &steps[*index] * steps[*index].transpose() * (*weight * scale);
-            }
-            covariance = covariance
-                * (1.0 - c_1 - c_mu * of_all + (1.0 - h) * c_1 * c_c * (2.0 - c_c))
-                + &path_c * path_c.transpose() * c_1
-                + spread * c_mu;
-            covariance = (&covariance + covariance.transpose()) * 0.5;
-            sigma *= libm::exp((c_sigma / damping) * (length / usual - 1.0));
-            sigma = sigma.min(1.0);
-            let flat = values[last] - values[first] <= self.settled * values[first].abs();
-            settled = if flat { settled + 1 } else { 0 };
-            let widest = sigma * lengths.max();
-            match look {
-                // Quick values no longer resolve the differences: continue with fine ones, from a slightly larger
-                // spread.
-                Fidelity::Quick if settled >= 2 || widest < QUICK => {
-                    look = Fidelity::Fine;
-                    settled = 0;
-                    sigma *= 2.0;
-                    best.value = f64::INFINITY;
-                }
-                Fidelity::Fine if settled >= 3 || !(widest >= 1e-9) => break,
-                _ => {}
-            }
+        let effective_below = below(1) * below(1) / below(2);
+        let most = (1.0 + c_1 / c_mu)
+            .min(1.0 + 2.0 * effective_below / (effective + 2.0))
+            .min((1.0 - c_1 - c_mu) / (of_n * c_mu));
+        worse
+            .clone()
+            .map(|i| most * raw(i).min(0.0) / below(1))
+            .collect()
+    }
+}
+
+/// Returns the weight of the point with a rank from 0, before the weights are scaled.
+fn raw_weight(population: usize, rank: usize) -> f64 {
+    libm::log(0.5 * (population as f64 + 1.0)) - libm::log(rank as f64 + 1.0)
+}
+
+/// The points of a generation.
+struct Generation {
+    /// The principal axes of the covariance, and the standard deviations along them.
+    axes: DMatrix<f64>,
+    lengths: DVector<f64>,
+    /// The points as multiples of the step size from the mean.
+    steps: Vec<DVector<f64>>,
+    points: Vec<Vec<f64>>,
+    values: Vec<f64>,
+    /// The numbers of the points, the best first.
+    order: Vec<usize>,
+}
+
+impl Generation {
+    /// Returns the reciprocals of the standard deviations as a diagonal matrix.
+    fn shrinking(&self) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.lengths.map(|length| 1.0 / length))
+    }
+
+    /// Yields weights with the steps of the points from a rank on.
+    fn weighted<'g>(
+        &'g self,
+        weights: &'g [f64],
+        first: usize,
+    ) -> impl Iterator<Item = (f64, &'g DVector<f64>)> {
+        let steps = self.order[first..].iter().map(|index| &self.steps[*index]);
+        weights.iter().copied().zip(steps)
+    }
+}
+
+/// The state of a run.
+struct Evolution<'a> {
+    problem: &'a dyn Problem,
+    rates: Rates,
+    look: Fidelity,
+    /// See [`Cmaes::settled`].
+    flat: f64,
+    mean: DVector<f64>,
+    sigma: f64,
+    covariance: DMatrix<f64>,
+    path_sigma: DVector<f64>,
+    path_c: DVector<f64>,
+    best: Solution,
+    /// The number of generations with nearly equal values, without a break.
+    settled: u32,
+}
+
+impl<'a> Evolution<'a> {
+    /// Creates the state before the first generation.
+    fn new(
+        strategy: &Cmaes,
+        problem: &'a dyn Problem,
+        begin: &[f64],
+        larger: usize,
+        look: Fidelity,
+    ) -> Self {
+        let n = problem.dimensions();
+        Self {
+            problem,
+            rates: Rates::new(strategy, n, larger),
+            look,
+            flat: strategy.settled,
+            mean: DVector::from_column_slice(begin),
+            sigma: strategy.sigma,
+            covariance: DMatrix::identity(n, n),
+            path_sigma: DVector::zeros(n),
+            path_c: DVector::zeros(n),
+            best: Solution {
+                point: begin.to_vec(),
+                value: f64::INFINITY,
+            },
+            settled: 0,
         }
-        if look == Fidelity::Quick {
-            best.value =
-                budget.values(problem, core::slice::from_ref(&best.point), Fidelity::Fine)[0];
+    }
+
+    /// Draws and evaluates the points of a generation.
+    fn draw(&self, budget: &Budget<'_>, random: &mut ChaCha8Rng) -> Generation {
+        let eigen = SymmetricEigen::new(self.covariance.clone());
+        let lengths = eigen.eigenvalues.map(|value| libm::sqrt(value.max(1e-24)));
+        let stretched = &eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
+        let (n, population) = (self.mean.len(), self.rates.population);
+        let steps: Vec<DVector<f64>> = (0..population)
+            .map(|_| {
+                let drawn = DVector::from_fn(n, |_, _| random.sample::<f64, _>(StandardNormal));
+                &stretched * drawn
+            })
+            .collect();
+        let points: Vec<Vec<f64>> = steps
+            .iter()
+            .map(|step| folded(self.problem, (&self.mean + step * self.sigma).as_slice()))
+            .collect();
+        let values = budget.values(self.problem, &points, self.look);
+        let mut order: Vec<usize> = (0..population).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
+        Generation {
+            axes: eigen.eigenvectors,
+            lengths,
+            steps,
+            points,
+            values,
+            order,
         }
-        best
+    }
+
+    /// Keeps the best point of a generation if it is better than all before.
+    fn keep_best(&mut self, generation: &Generation) {
+        let first = generation.order[0];
+        if generation.values[first] < self.best.value {
+            self.best = Solution {
+                point: generation.points[first].clone(),
+                value: generation.values[first],
+            };
+        }
+    }
+
+    /// Moves the mean, and adapts the paths, the covariance and the step size.
+    fn adapt(&mut self, generation: &Generation, number: i32) {
+        let mut step = DVector::<f64>::zeros(self.mean.len());
+        for (weight, other) in generation.weighted(&self.rates.weights, 0) {
+            step += other * weight;
+        }
+        self.mean += &step * self.sigma;
+        let h = self.adapt_paths(generation, &step, number);
+        self.adapt_covariance(generation, h);
+        let longer = self.path_sigma.norm() / self.rates.usual - 1.0;
+        self.sigma *= libm::exp((self.rates.c_sigma / self.rates.damping) * longer);
+        self.sigma = self.sigma.min(1.0);
+    }
+
+    /// Adapts the paths to the mean's step. Returns 1, or 0 if the path of the step size is too long.
+    fn adapt_paths(&mut self, generation: &Generation, step: &DVector<f64>, number: i32) -> f64 {
+        let (of_n, effective, usual) = (self.rates.of_n, self.rates.effective, self.rates.usual);
+        let (c_sigma, c_c) = (self.rates.c_sigma, self.rates.c_c);
+        let axes = &generation.axes;
+        let whitened = axes * generation.shrinking() * axes.transpose() * step;
+        self.path_sigma = &self.path_sigma * (1.0 - c_sigma)
+            + whitened * libm::sqrt(c_sigma * (2.0 - c_sigma) * effective);
+        let length = self.path_sigma.norm();
+        let fresh = libm::sqrt(1.0 - libm::pow(1.0 - c_sigma, 2.0 * f64::from(number)));
+        let stalls = length / fresh < (1.4 + 2.0 / (of_n + 1.0)) * usual;
+        let h = if stalls { 1.0 } else { 0.0 };
+        self.path_c =
+            &self.path_c * (1.0 - c_c) + step * (h * libm::sqrt(c_c * (2.0 - c_c) * effective));
+        h
+    }
+
+    /// Adapts the covariance to its path and to the steps of a generation.
+    fn adapt_covariance(&mut self, generation: &Generation, h: f64) {
+        let (weights, worse) = (&self.rates.weights, &self.rates.worse);
+        let (c_c, c_1, c_mu) = (self.rates.c_c, self.rates.c_1, self.rates.c_mu);
+        let n = self.mean.len();
+        let mut spread = DMatrix::<f64>::zeros(n, n);
+        for (weight, step) in generation.weighted(weights, 0) {
+            spread += step * step.transpose() * weight;
+        }
+        let whitening = generation.shrinking() * generation.axes.transpose();
+        for (weight, step) in generation.weighted(worse, weights.len()) {
+            // No longer than a usual step, so that the covariance remains positive definite.
+            let whitened = &whitening * step;
+            let scale = self.rates.of_n / whitened.norm_squared().max(f64::MIN_POSITIVE);
+            spread += step * step.transpose() * (weight * scale);
+        }
+        let of_all: f64 = 1.0 + worse.iter().sum::<f64>();
+        let kept = 1.0 - c_1 - c_mu * of_all + (1.0 - h) * c_1 * c_c * (2.0 - c_c);
+        let covariance =
+            &self.covariance * kept + &self.path_c * self.path_c.transpose() * c_1 + spread * c_mu;
+        self.covariance = (&covariance + covariance.transpose()) * 0.5;
+    }
+
+    /// Returns `true` if the values of a generation are too similar to continue. Continues with fine values if quick
+    /// ones no longer resolve the differences, from a slightly larger spread.
+    fn has_ended(&mut self, generation: &Generation) -> bool {
+        let Generation { order, values, .. } = generation;
+        let (first, last) = (order[0], order[self.rates.weights.len().max(1) - 1]);
+        let flat = values[last] - values[first] <= self.flat * values[first].abs();
+        self.settled = if flat { self.settled + 1 } else { 0 };
+        let widest = self.sigma * generation.lengths.max();
+        match self.look {
+            Fidelity::Quick if self.settled >= 2 || widest < QUICK => {
+                self.look = Fidelity::Fine;
+                self.settled = 0;
+                self.sigma *= 2.0;
+                self.best.value = f64::INFINITY;
+                false
+            }
+            Fidelity::Fine => self.settled >= 3 || !(widest >= 1e-9),
+            Fidelity::Quick => false,
+        }
+    }
+
+    /// Returns the best point with its fine value.
+    fn finish(mut self, budget: &Budget<'_>) -> Solution {
+        if self.look == Fidelity::Quick {
+            let point = core::slice::from_ref(&self.best.point);
+            self.best.value = budget.values(self.problem, point, Fidelity::Fine)[0];
+        }
+        self.best
     }
 }
 

@@ -5,25 +5,25 @@ use toml::de::DeTable;
 use super::Placed;
 use crate::site::error::{SiteError, Source};
 use crate::site::reader::{Node, Table};
-use crate::site::{SiteTag, keys, parse};
+use crate::site::{SiteTag, keys, poses, syntax, tags};
 use posegate::shape::PoseDeg;
 
 type Named<T> = Vec<(String, Placed<T>)>;
 
 pub(super) fn read(source: Source<'_>) -> Result<(Named<SiteTag>, Named<PoseDeg>), SiteError> {
-    let document = DeTable::parse(source.text).map_err(|fault| parse::syntax(source, &fault))?;
+    let document = DeTable::parse(source.text).map_err(|fault| syntax::syntax(source, &fault))?;
     let root = Table::root(source, &document);
     root.refuse_unknown(&[&keys::TAGS, &keys::GOALS])?;
     let mut tags = Vec::new();
     if let Some(node) = root.optional(&keys::TAGS) {
         for (name, node) in node.any_table()?.named(&keys::TAG)? {
-            tags.push((name.to_owned(), placed(&node, parse::tag(&node)?)));
+            tags.push((name.to_owned(), placed(&node, tags::tag(&node)?)));
         }
     }
     let mut goals = Vec::new();
     if let Some(node) = root.optional(&keys::GOALS) {
         for (name, node) in node.any_table()?.named(&keys::ONE_GOAL)? {
-            goals.push((name.to_owned(), placed(&node, parse::pose2(&node)?)));
+            goals.push((name.to_owned(), placed(&node, poses::pose2(&node)?)));
         }
     }
     Ok((tags, goals))

@@ -8,7 +8,7 @@ use crate::input::{self, Limit};
 use crate::site::error::SiteError;
 use crate::site::named::NamedFile;
 use crate::site::reader::{Node, Table};
-use crate::site::{SiteTag, keys, parse, places};
+use crate::site::{SiteTag, keys, places, poses};
 use posegate::shape::PoseDeg;
 
 /// Adds the tags and goals of a site's imports. Returns the files by the imports' names.
@@ -86,7 +86,7 @@ fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, NamedFile), SiteE
         },
         family: text(&keys::FAMILY)?,
         pose: match table.optional(&keys::IMPORT_POSE) {
-            Some(node) => Some(parse::pose3(&node)?),
+            Some(node) => Some(poses::pose3(&node)?),
             None => None,
         },
         prefix: text(&keys::PREFIX)?,

@@ -1,0 +1,27 @@
+//! The study's answers as text in its pictures.
+
+use super::palette;
+use super::study::Answer;
+use super::svg::{Font, Picture};
+
+/// Returns the text of an answer in a picture: `1 m / 2° inside S_l, margin 1.366`.
+#[must_use]
+pub fn words(answer: &Answer, set_name: &str) -> String {
+    format!(
+        "{} {} {set_name}, margin {}",
+        answer.known,
+        answer.holds_text(),
+        answer.margin_text()
+    )
+}
+
+/// Draws the heading of a row of panels, its baseline at `top`, followed by the row's answers.
+pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, answers: &[(&Answer, &str)]) {
+    let font = Font::new(15.0, palette::INK).bold();
+    picture.text([24.0, top], heading, &font);
+    for (index, (answer, set_name)) in answers.iter().enumerate() {
+        let font = Font::new(13.0, palette::of_words(answer.holds())).bold();
+        let at = [560.0 + 310.0 * index as f64, top];
+        picture.text(at, &words(answer, set_name), &font);
+    }
+}
