@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     );
     bar.finish_and_clear();
     played.map_err(play_failure)?;
-    let diagnostics = input.recording.told();
+    let diagnostics = input.recording.diagnostics();
     let [permits, estimates] = replay.permits();
     if estimates == 0 {
         return Err(no_estimates(arguments, diagnostics, input.part.outside));

@@ -399,7 +399,7 @@ fn page_begins_with_a_summary() {
     assert!(fewer.contains("<p id=\"summary\" class=\"bad\">"));
     assert!(fewer.contains("<li>NOT served: dock-1: "));
     // Equal docks are described once.
-    assert!(all.contains("<p>3 tasks are alike in the frames of their goals."));
+    assert!(all.contains("<p>3 tasks are equal in the frames of their goals."));
     assert_eq!(
         all.matches("<details><summary>the pictures of dock-")
             .count(),
@@ -418,7 +418,7 @@ fn equal_tasks_are_described_once() {
     let (before, last) = site.split_once("[task.dock-3]").expect("a task");
     let narrow = last.replacen("x = [-0.1, 0.1]", "x = [-0.1, 0.09]", 1);
     let page = made(&format!("{before}[task.dock-3]{narrow}"), |_| ()).expect("a page");
-    assert!(page.contains("<p>2 tasks are alike in the frames of their goals."));
+    assert!(page.contains("<p>2 tasks are equal in the frames of their goals."));
     assert_eq!(
         page.matches("<details><summary>the pictures of dock-")
             .count(),

@@ -197,9 +197,9 @@ fn read(path: &Path) -> Done<ExitCode> {
     while bag.next()?.is_some() {
         count += 1;
     }
-    assert!(count > 0 && bag.told().damage.is_none());
+    assert!(count > 0 && bag.diagnostics().damage.is_none());
     let seconds = processor_s()? - started;
-    println!("{}", bag.told().message_bytes as f64 * 1e-6 / seconds);
+    println!("{}", bag.diagnostics().message_bytes as f64 * 1e-6 / seconds);
     Ok(ExitCode::SUCCESS)
 }
 

@@ -87,7 +87,7 @@ fn of_topic(
             poses.push((pose.t_s, pose.level()));
         }
     }
-    let diagnostics = bag.told();
+    let diagnostics = bag.diagnostics();
     if !diagnostics.read.contains_key(topic) {
         let refused = diagnostics.skipped.get(topic);
         let transforms = diagnostics

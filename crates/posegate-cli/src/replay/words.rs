@@ -119,7 +119,7 @@ pub fn check_requested(
 
 /// Returns the reader's counts and faults as JSON.
 pub fn recording(input: &Recorded) -> Value {
-    let diagnostics = input.recording.told();
+    let diagnostics = input.recording.diagnostics();
     let skipped: Map<String, Value> = diagnostics
         .skipped
         .iter()

@@ -277,7 +277,7 @@ pub(super) fn hall_legend(
         (
             site.walls.iter().any(|wall| !wall.keep_outs.is_empty()),
             Sample::Line(palette::KEPT_OUT),
-            "no tag may hang there, at some heights",
+            "no tag may be mounted there, at some heights",
         ),
         (
             has(StepKind::Navigation),

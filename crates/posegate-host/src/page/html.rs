@@ -36,7 +36,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         ("plan", "The site", plan(site, contents)),
         ("chains", "Plans and chains", chains(contents)),
         ("tasks", "Tasks", tasks(site, contents)),
-        ("placements", "Where tags hang best", placements),
+        ("placements", "Best places of tags", placements),
         ("pictures", "Pictures", pictures.join("")),
         ("tags", "Mounting sheet", tags(site, &order.title)),
     ];
@@ -207,7 +207,7 @@ fn one_task(shown: &Shown, others: &[&Shown]) -> String {
     if !others.is_empty() {
         let names: Vec<&str> = others.iter().map(|other| other.name.as_str()).collect();
         text += &format!(
-            "<p>{} tasks are alike in the frames of their goals. The pictures are those of {name}; the same holds for {}.</p>\n",
+            "<p>{} tasks are equal in the frames of their goals. The pictures are those of {name}; the same holds for {}.</p>\n",
             others.len() + 1,
             escaped(&names.join(", "))
         );
@@ -479,7 +479,7 @@ fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
         text += if is_adopted {
             "<p>The site file has the tag at the best place. The numbers are those of the file before the tag was moved.</p>\n"
         } else {
-            "<p>The site file, the plans and the mounting sheet have the tag at the place \u{201c}before\u{201d}. To hang it at the best place, write that pose into the site file.</p>\n"
+            "<p>The site file, the plans and the mounting sheet have the tag at the place \u{201c}before\u{201d}. To mount it at the best place, write that pose into the site file.</p>\n"
         };
         text += "<div class=\"pair\">\n";
         // The present place of the tag in the site file.

@@ -307,7 +307,7 @@ impl<R: Read> Recording for Bag<R> {
         }
     }
 
-    fn told(&self) -> &ReaderDiagnostics {
+    fn diagnostics(&self) -> &ReaderDiagnostics {
         &self.notes.diagnostics
     }
 

@@ -169,7 +169,7 @@ pub trait Recording {
     fn next(&mut self) -> Result<Option<Item>, RecordingError>;
 
     /// Returns the counts of all messages that are not items.
-    fn told(&self) -> &ReaderDiagnostics;
+    fn diagnostics(&self) -> &ReaderDiagnostics;
 
     /// Returns the number of bytes that were read from the file.
     fn bytes(&self) -> u64;

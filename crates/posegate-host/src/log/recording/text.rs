@@ -156,7 +156,7 @@ impl<R: Read> Recording for Text<R> {
         Ok(Some(Item::Estimate(sample)))
     }
 
-    fn told(&self) -> &ReaderDiagnostics {
+    fn diagnostics(&self) -> &ReaderDiagnostics {
         &self.diagnostics
     }
 

@@ -99,7 +99,7 @@ fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
     assert!(bag.body.capacity() <= 2 * bytes.len() + 64);
     assert!(bag.records.capacity() <= LARGEST);
     assert!(bag.notes.kept <= MOST_NAMED);
-    (seconds, bag.told().clone())
+    (seconds, bag.diagnostics().clone())
 }
 
 const COMPRESSIONS: [&str; 3] = ["", "zstd", "lz4"];
