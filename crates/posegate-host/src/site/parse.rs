@@ -71,15 +71,15 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     let root = &Table::root(source, &document);
     root.refuse_unknown(&SECTIONS)?;
 
-    let ground = Ground::read(root)?;
-    let names = ground.names();
+    let parts = NamedParts::read(root)?;
+    let names = parts.names();
     let defaults = section(root, &keys::TABLE, TableKeys::read)?.unwrap_or_default();
     let tasks = entries(root, &keys::TASKS, &keys::TASK, |_, node| {
         task(node, &names, &defaults)
     })?;
     let goals = tasks.values().map(|task| task.success.goal);
     let goals: Vec<[f64; 2]> = goals.map(|goal| [goal.x, goal.y]).collect();
-    let candidates = candidate::candidates(root, &ground.tags, &ground.walls, &goals)?;
+    let candidates = candidate::candidates(root, &parts.tags, &parts.walls, &goals)?;
     let epsilon = section(root, &keys::CONFIDENCE, |node| {
         node.table(&[&keys::EPSILON])?.number(&keys::EPSILON)
     })?;
@@ -99,16 +99,16 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
             None => Ok(()),
         }
     })?;
-    let (error_formulas, error_models) = split_models(ground.error_models);
+    let (error_formulas, error_models) = split_models(parts.error_models);
     Ok(Site {
-        digest: digest(sha256, ground.files.iter().map(|file| &file.digest)),
-        files: ground.files.into_iter().map(|file| file.path).collect(),
-        cameras: ground.cameras,
-        tags: ground.tags,
+        digest: digest(sha256, parts.files.iter().map(|file| &file.digest)),
+        files: parts.files.into_iter().map(|file| file.path).collect(),
+        cameras: parts.cameras,
+        tags: parts.tags,
         candidates,
         tasks,
-        walls: ground.walls.into_values().collect(),
-        goals: ground.goals,
+        walls: parts.walls.into_values().collect(),
+        goals: parts.goals,
         chains,
         navigation,
         planner: planner.unwrap_or_default(),
@@ -146,7 +146,7 @@ fn entries<T>(
 }
 
 /// The parts of a site that tasks refer to by name, and the files that they name.
-struct Ground {
+struct NamedParts {
     cameras: BTreeMap<String, SiteCamera>,
     tags: BTreeMap<String, SiteTag>,
     walls: BTreeMap<String, Wall>,
@@ -156,7 +156,7 @@ struct Ground {
     files: Vec<NamedFile>,
 }
 
-impl Ground {
+impl NamedParts {
     /// Reads the sections without tasks, and the imports.
     fn read(root: &Table<'_>) -> Result<Self, SiteError> {
         let cameras = entries(root, &keys::CAMERAS, &keys::CAMERA, |_, node| {
