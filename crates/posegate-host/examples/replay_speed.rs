@@ -199,7 +199,10 @@ fn read(path: &Path) -> Done<ExitCode> {
     }
     assert!(count > 0 && bag.diagnostics().damage.is_none());
     let seconds = processor_s()? - started;
-    println!("{}", bag.diagnostics().message_bytes as f64 * 1e-6 / seconds);
+    println!(
+        "{}",
+        bag.diagnostics().message_bytes as f64 * 1e-6 / seconds
+    );
     Ok(ExitCode::SUCCESS)
 }
 

@@ -154,7 +154,11 @@ fn which_topic(input: impl Read, name: &str) -> Failure {
     let mut bag = Bag::new(input, name, &[]);
     while let Ok(Some(_)) = bag.next() {}
     Failure::list(
-        &format!("{} has topics:{}", printable(name), topics(bag.diagnostics())),
+        &format!(
+            "{} has topics:{}",
+            printable(name),
+            topics(bag.diagnostics())
+        ),
         "name the topic with the estimates, such as --topic /amcl_pose",
     )
 }

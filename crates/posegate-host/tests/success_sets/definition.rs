@@ -177,7 +177,7 @@ impl Nature {
         // The tag.
         let tag = set.tag.pose;
         let by = set.tag_tolerance;
-        let to_world = |p: Point| {
+        let turned_with_tag = |p: Point| {
             let p = fixed_axes(tag.roll_deg, tag.pitch_deg, tag.yaw_deg, p);
             turn_about(UP, self.tag.turn * by.turn_deg.to_radians(), p)
         };
@@ -185,9 +185,9 @@ impl Nature {
             [tag.x, tag.y, tag.z],
             scaled(self.tag.translation, by.translation),
         );
-        let normal = to_world([1.0, 0.0, 0.0]);
+        let normal = turned_with_tag([1.0, 0.0, 0.0]);
         let half = 0.5 * set.tag.size;
-        let on_face = |[y, z]: [f64; 2]| add(centre, to_world([0.0, y * half, z * half]));
+        let on_face = |[y, z]: [f64; 2]| add(centre, turned_with_tag([0.0, y * half, z * half]));
         for corner in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
             let ray = minus(on_face(corner), camera);
             let [depth, left, up] = axes.map(|axis| dot(axis, ray));
@@ -237,7 +237,7 @@ impl Nature {
             let step = 1e-4 * bit;
             for way in [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
                 let [a, b] =
-                    [0.5, -0.5].map(|s| image(add(centre, to_world(scaled(way, s * step)))));
+                    [0.5, -0.5].map(|s| image(add(centre, turned_with_tag(scaled(way, s * step)))));
                 let width = (a[0] - b[0]).hypot(a[1] - b[1]) / step * bit;
                 most("px_per_bit", sharp.px_per_bit, width * (1.0 + 1e-6))?;
             }
