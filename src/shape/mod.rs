@@ -143,7 +143,9 @@ impl Shape {
     pub fn visibility(&self) -> Option<&Visibility> {
         only(self.simple().into_iter().filter_map(|set| match set {
             Self::Visibility(view) | Self::Bounded { view, .. } => Some(view),
-            _ => None,
+            Self::Box(_) | Self::Footprint(_) | Self::Apart(_) | Self::Any(_) | Self::All(_) => {
+                None
+            }
         }))
     }
 
@@ -151,7 +153,11 @@ impl Shape {
     fn simple(&self) -> Vec<&Self> {
         match self {
             Self::Any(sets) | Self::All(sets) => sets.iter().flat_map(Self::simple).collect(),
-            _ => vec![self],
+            Self::Box(_)
+            | Self::Footprint(_)
+            | Self::Visibility(_)
+            | Self::Bounded { .. }
+            | Self::Apart(_) => vec![self],
         }
     }
 

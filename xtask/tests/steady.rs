@@ -133,6 +133,26 @@ fn every_waiting_test_is_in_the_list() {
     );
 }
 
+/// A part of a name that no test has would repeat nothing.
+#[test]
+fn every_part_of_a_name_is_that_of_a_test() {
+    let lines = include_str!("../steady.txt").lines();
+    let mut count = 0;
+    for line in lines.filter(|line| !line.starts_with('#')) {
+        let Some((target, part)) = line.split_once(' ') else {
+            continue;
+        };
+        let (package, name) = target.split_once(':').expect("PACKAGE:TARGET");
+        let path = root().join(format!("crates/{package}/tests/{name}.rs"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        let tests = text.split("#[test]").skip(1);
+        let mut names = tests.filter_map(|test| test.split_once("fn ")?.1.split('(').next());
+        assert!(names.any(|name| name.contains(part)), "{line}");
+        count += 1;
+    }
+    assert!(count > 1);
+}
+
 #[test]
 fn waiting_in_comments_is_ignored() {
     assert!(waits("    std::thread::sleep(time);"));

@@ -11,6 +11,7 @@ use posegate_host::place::{
     Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
     PlacementProblem, PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
 };
+use posegate_host::printable::fixed;
 use posegate_host::site::{Site, pose_line};
 use serde_json::{Value, json};
 
@@ -144,13 +145,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         tag,
         wall: arguments.wall.clone(),
     };
-    let exact = arguments.exact || arguments.belief.is_exact();
-    if exact && arguments.reserve.is_some() {
-        warn(
-            &"--reserve has no effect if the pose is known exactly: the cost is that of the planned place",
-        );
-    }
-    let known = if exact {
+    let known = if arguments.exact || arguments.belief.is_exact() {
         PosePrior::Exactly
     } else {
         let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
@@ -245,11 +240,11 @@ fn print_places(before: Option<&Placed>, found: &Placement) -> Result<(), Failur
         let pose = other.pose;
         let mean = |value| format!(", mean cost {value:.6}");
         print(&format_args!(
-            "another: x {:.4}, y {:.4}, z {:.4}, yaw {:.3} deg{}",
-            printed(pose.x),
-            printed(pose.y),
-            printed(pose.z),
-            printed(pose.yaw_deg),
+            "another: x {}, y {}, z {}, yaw {} deg{}",
+            fixed(pose.x, 4),
+            fixed(pose.y, 4),
+            fixed(pose.z, 4),
+            fixed(pose.yaw_deg, 3),
             other
                 .mean
                 .map_or_else(String::new, |found| mean(found.value)),
@@ -384,8 +379,11 @@ fn serves(objective: Objective, placed: &Placed) -> bool {
 fn unmet_objective(arguments: &Arguments, placed: &Placed) -> String {
     let pose = placed.pose;
     let at = format!(
-        "the nearest is x {:.3}, y {:.3}, z {:.3}, yaw {:.1} deg",
-        pose.x, pose.y, pose.z, pose.yaw_deg
+        "the nearest is x {}, y {}, z {}, yaw {} deg",
+        fixed(pose.x, 3),
+        fixed(pose.y, 3),
+        fixed(pose.z, 3),
+        fixed(pose.yaw_deg, 1)
     );
     if placed.p_miss >= 1.0 {
         format!(
@@ -403,11 +401,11 @@ fn unmet_objective(arguments: &Arguments, placed: &Placed) -> String {
 fn print_placed(placed: &Placed) -> Result<(), Failure> {
     let pose = placed.pose;
     print(&format_args!(
-        "tag at x {:.4} m, y {:.4} m, z {:.4} m, yaw {:.3} deg, size {:.3} m",
-        printed(pose.x),
-        printed(pose.y),
-        printed(pose.z),
-        printed(pose.yaw_deg),
+        "tag at x {} m, y {} m, z {} m, yaw {} deg, size {:.3} m",
+        fixed(pose.x, 4),
+        fixed(pose.y, 4),
+        fixed(pose.z, 4),
+        fixed(pose.yaw_deg, 3),
         placed.size
     ))?;
     if let Some(mean) = placed.mean {
@@ -441,11 +439,6 @@ fn print_placed(placed: &Placed) -> Result<(), Failure> {
 /// Returns a number without the rounding errors of its last digits.
 fn rounded(number: f64) -> f64 {
     (number * 1e6).round() / 1e6
-}
-
-/// Returns a coordinate to four decimals, without a minus before zero.
-fn printed(coordinate: f64) -> f64 {
-    (coordinate * 1e4).round() / 1e4 + 0.0
 }
 
 /// Returns the tag that moves.

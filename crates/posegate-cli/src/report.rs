@@ -69,6 +69,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     let order = PageInput {
         site: &parsed,
+        file: arguments.site.display().to_string(),
         title: arguments
             .title
             .clone()

@@ -11,6 +11,7 @@ fn made(text: &str, change: impl FnOnce(&mut PageInput<'_>)) -> Result<String, P
     let contents = Contents::of(&site, &|_| ())?;
     let mut order = PageInput {
         site: &site,
+        file: "folder/hall.toml".into(),
         title: "Hall".into(),
         placements: vec![],
         pictures: vec![],
@@ -217,6 +218,9 @@ fn page_has_chains_plans_and_the_sheet() {
     }
     assert_eq!(figures(&shown, "The site from above"), 1);
     assert_eq!(figures(&shown, "The mounting sheet"), 1);
+    let digest = site.digest_text();
+    let origin = format!("site hall.toml, digest {}", &digest[..16]);
+    assert_eq!(site.origin("folder/hall.toml"), origin);
     for (name, tag) in &site.tags {
         assert!(shown.contains(&format!(
             "<td>{name}</td><td>{} {}</td>",
@@ -384,7 +388,7 @@ fn page_begins_with_a_summary() {
         .expect("a margin");
     assert!(shown <= least && least < shown + 0.01, "{shown} {least}");
     // A margin near 1 leaves nothing for errors that are larger than stated.
-    let warned = all.contains("This plan holds for the stated errors and none larger");
+    let warned = all.contains("This plan holds for hardly larger errors than stated");
     assert_eq!(warned, shown < 1.05, "{shown}");
     assert!(warned);
     let (header, _) = all.split_once("<main>").expect("a header");

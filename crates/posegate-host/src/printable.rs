@@ -100,6 +100,16 @@ fn escaped(
     Cow::Owned(out)
 }
 
+/// Returns a number with n decimals, without a minus before zero.
+#[must_use]
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|byte| matches!(byte, b'0' | b'.')) => zero.to_owned(),
+        _ => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,6 +154,18 @@ mod tests {
             );
             let again: serde_json::Value = serde_json::from_str(&shown).unwrap();
             assert_eq!(again, value);
+        }
+    }
+
+    #[test]
+    fn zero_has_no_minus() {
+        for (value, text) in [
+            (-0.0004, "0.000"),
+            (-0.0006, "-0.001"),
+            (0.0, "0.000"),
+            (12.0, "12.000"),
+        ] {
+            assert_eq!(fixed(value, 3), text);
         }
     }
 }

@@ -21,7 +21,9 @@ use posegate::verify::{Proof, build};
 pub struct PageInput<'a> {
     /// The site.
     pub site: &'a Site,
-    /// The site's name: the page's title.
+    /// The name of the site file: the mounting sheet states it.
+    pub file: String,
+    /// The page's title.
     pub title: String,
     /// The output of `posegate place --json`, each with its task's name.
     pub placements: Vec<(String, Value)>,

@@ -70,15 +70,6 @@ pub(super) fn folded(title: &str, inside: &str) -> String {
     )
 }
 
-/// Returns a number with n decimals, without a minus before zero.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(zero) if zero.bytes().all(|byte| matches!(byte, b'0' | b'.')) => zero.to_owned(),
-        _ => text,
-    }
-}
-
 /// Returns the numbers of a figure as a folded table with a title.
 pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     format!(
@@ -117,18 +108,6 @@ mod tests {
             base64(&all),
             "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
         );
-    }
-
-    #[test]
-    fn zero_has_no_minus() {
-        for (value, text) in [
-            (-0.0004, "0.000"),
-            (-0.0006, "-0.001"),
-            (0.0, "0.000"),
-            (12.0, "12.000"),
-        ] {
-            assert_eq!(fixed(value, 3), text);
-        }
     }
 
     #[test]

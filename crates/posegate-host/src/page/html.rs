@@ -4,13 +4,14 @@ use serde_json::{Value, json};
 
 use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 use super::equal_tasks::{area, groups_of_equal};
-use super::figures::{base64, escaped, figure, fixed, folded, numbers, table};
+use super::figures::{base64, escaped, figure, folded, numbers, table};
 use super::summary::{summary, text as margin_text, worst};
 use crate::draw::{
     Mounted, MountingSheet, SeenFrom, Subject, borders_picture, mounting_sheet, task_plan,
 };
 use crate::log::factor_text;
 use crate::plan::{ChainReport, StepKind};
+use crate::printable::fixed;
 use crate::site::{Site, SiteTag, TaskKind};
 use posegate::shape::{Pose3Deg, Tag};
 use posegate::table::Table;
@@ -38,7 +39,7 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         ("tasks", "Tasks", tasks(site, contents)),
         ("placements", "Best places of tags", placements),
         ("pictures", "Pictures", pictures.join("")),
-        ("tags", "Mounting sheet", tags(site, &order.title)),
+        ("tags", "Mounting sheet", tags(site, &order.file)),
     ];
     let shown = || sections.iter().filter(|(_, _, text)| !text.is_empty());
     let nav: Vec<String> = shown()
@@ -580,7 +581,7 @@ fn place_row(name: &str, place: &Value) -> Option<Vec<String>> {
 }
 
 /// Draws the mounting sheet of all tags of a site.
-fn sheet(site: &Site, title: &str) -> String {
+fn sheet(site: &Site, file: &str) -> String {
     let mounted = |(name, tag): (&String, &SiteTag)| Mounted {
         name: name.clone(),
         family: tag.family.clone(),
@@ -590,14 +591,14 @@ fn sheet(site: &Site, title: &str) -> String {
     };
     mounting_sheet(&MountingSheet {
         title: "Mounting sheet",
-        origin: &site.origin(title),
+        origin: &site.origin(file),
         tags: &site.tags.iter().map(mounted).collect::<Vec<_>>(),
         walls: &site.walls,
     })
 }
 
 /// Returns the table of the tags and their mounting sheet.
-fn tags(site: &Site, title: &str) -> String {
+fn tags(site: &Site, file: &str) -> String {
     if site.tags.is_empty() {
         return String::new();
     }
@@ -643,7 +644,7 @@ fn tags(site: &Site, title: &str) -> String {
     text += &folded(
         "the mounting sheet",
         &figure(
-            &sheet(site, title),
+            &sheet(site, file),
             "The mounting sheet: each tag with its place and size",
         ),
     );

@@ -16,6 +16,7 @@
 //! let site = Site::parse(SITE, "paper-chain.toml")?;
 //! let input = PageInput {
 //!     site: &site,
+//!     file: "paper-chain.toml".into(),
 //!     title: "Hall 3".into(),
 //!     placements: Vec::new(),
 //!     pictures: Vec::new(),

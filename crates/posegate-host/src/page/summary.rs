@@ -163,7 +163,7 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
             "the worst margin is that of step {} to {name}: a margin is how many times as large the uncertainty could be before the step is no longer certain{}",
             step + 1,
             if factor(margin) < LITTLE_SLACK {
-                ". This plan holds for the stated errors and none larger: state them with slack, or let the tasks allow more"
+                ". This plan holds for hardly larger errors than stated: state them with slack, or let the tasks allow more"
             } else {
                 ""
             }

@@ -28,7 +28,7 @@ impl Costs {
 /// Reads lines of `from,to,cost` with names of places. A look's name means all of its places.
 ///
 /// # Errors
-/// [`PlanError::Costs`] with file and line if the header or a cost is wrong, or a drive has two costs.
+/// [`PlanError::Costs`] with file and line if the header or a cost is wrong, or a pair of names has two costs.
 pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>, PlanError> {
     let wrong = |line: u64, what: &str| PlanError::Costs(format!("{file}:{line}: {what}"));
     let mut reader = csv::ReaderBuilder::new()
