@@ -3,7 +3,7 @@
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::sheet;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
-use posegate::shape::{Family, Tag, Tolerance};
+use posegate::shape::{Family, Pose3Deg, Tag, Tolerance};
 use posegate_host::doctor::stated_error;
 use posegate_host::draw::{Column, Mounted, MountingSheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
@@ -237,14 +237,10 @@ fn print_places(before: Option<&Placed>, found: &Placement) -> Result<(), Failur
         pose_line(&found.best.pose)
     ))?;
     for other in &found.others {
-        let pose = other.pose;
         let mean = |value| format!(", mean cost {value:.6}");
         print(&format_args!(
-            "another: x {}, y {}, z {}, yaw {} deg{}",
-            fixed(pose.x, 4),
-            fixed(pose.y, 4),
-            fixed(pose.z, 4),
-            fixed(pose.yaw_deg, 3),
+            "another: {}{}",
+            place_text(&other.pose),
             other
                 .mean
                 .map_or_else(String::new, |found| mean(found.value)),
@@ -398,14 +394,19 @@ fn unmet_objective(arguments: &Arguments, placed: &Placed) -> String {
     }
 }
 
+/// Returns a tag's place with its units.
+fn place_text(pose: &Pose3Deg) -> String {
+    let [x, y, z] = [pose.x, pose.y, pose.z].map(|length| fixed(length, 4));
+    format!(
+        "x {x} m, y {y} m, z {z} m, yaw {} deg",
+        fixed(pose.yaw_deg, 3)
+    )
+}
+
 fn print_placed(placed: &Placed) -> Result<(), Failure> {
-    let pose = placed.pose;
     print(&format_args!(
-        "tag at x {} m, y {} m, z {} m, yaw {} deg, size {:.3} m",
-        fixed(pose.x, 4),
-        fixed(pose.y, 4),
-        fixed(pose.z, 4),
-        fixed(pose.yaw_deg, 3),
+        "tag at {}, size {:.3} m",
+        place_text(&placed.pose),
         placed.size
     ))?;
     if let Some(mean) = placed.mean {

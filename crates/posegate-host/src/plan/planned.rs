@@ -88,7 +88,7 @@ pub struct Nearest {
     pub scale: f64,
     /// The set: translation, yaw (m, rad), the estimate's spread included.
     pub set: [f64; 2],
-    /// The name of the look before the arrival; `None` if there is none.
+    /// The name of the look before the arrival; `None` if the robot arrives without a look.
     pub after: Option<String>,
 }
 
@@ -97,7 +97,7 @@ pub struct Nearest {
 pub struct PlanResult {
     /// The end of the search.
     pub status: Status,
-    /// The plan; `None` if there is none.
+    /// The plan; `None` if the search found no plan.
     pub plan: Option<Plan>,
     /// A lower bound of the cost of every chain of the library; `None` if no search found a
     /// plan.

@@ -59,7 +59,7 @@ pub struct ReaderDiagnostics {
     pub transforms: BTreeMap<(String, String), u64>,
     /// Number of messages of requested topics that could not be decoded.
     pub undecodable: u64,
-    /// The first message that could not be decoded: its description. `None` if there is none.
+    /// The first message that could not be decoded: its description. `None` if every message was decoded.
     pub first_undecodable: Option<String>,
     /// Bytes of all messages, uncompressed.
     pub message_bytes: u64,

@@ -26,7 +26,7 @@ pub struct Row {
     pub pose: [f64; 3],
     /// The uncertainty that the gate was given; `None` if the source reports none.
     pub spread: Option<Uncertainty>,
-    /// The recorded uncertainty; `None` if there is none.
+    /// The recorded uncertainty; `None` if the recording states none.
     pub recorded: Option<Uncertainty>,
     /// The estimate's age, seconds, if known.
     pub age: Option<f64>,
