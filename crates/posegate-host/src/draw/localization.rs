@@ -76,7 +76,7 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
             left: LEFT + PITCH * (index % 2) as f64,
             top: SEE_TOP + 58.0 + 226.0 * (index / 2) as f64,
             scale: 39.0,
-            y_title: index % 2 == 0,
+            y_title: index.is_multiple_of(2),
         };
         row.draw(picture, &panel, NAMES[index], yaw_deg, "", |inside| {
             for (inscribed, style) in boxes.iter().zip(BOXES) {
@@ -202,7 +202,7 @@ fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
         left: LEFT + 18.0 + PITCH * (index % 2) as f64,
         top: DOCK_TOP + 58.0 + 272.0 * (index / 2) as f64,
         scale: 105.0 / reach,
-        y_title: index % 2 == 0,
+        y_title: index.is_multiple_of(2),
     };
     for (index, yaw_deg) in DOCK_DEG.into_iter().enumerate() {
         row.draw(picture, &square(index, 0.12), "", yaw_deg, "", |inside| {

@@ -63,7 +63,7 @@ pub fn placement_picture(title: &str, cost: &str, columns: &[Column]) -> String 
         if let Some(view) = views.first() {
             image(&mut picture, [left, down + TOP], column, view);
         }
-        let is_first = number % ABREAST == 0;
+        let is_first = number.is_multiple_of(ABREAST);
         floor(
             &mut picture,
             [left, down + FLOOR],

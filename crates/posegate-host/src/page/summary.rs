@@ -250,7 +250,7 @@ mod tests {
             "<li>NOT served: bay: no chain arrives</li>",
             "<li>unknown whether a robot can reach yard: no start is given, as `from`</li>",
             "<li>unknown how far off 1 of 1 tags may be mounted: the site file states no tolerance</li>",
-            "<li>0 of 5 success sets proven, as tables for a controller</li>",
+            "<li>0 of 4 success sets proven, as tables for a controller</li>",
         ] {
             assert!(text.contains(note), "{note}: {text}");
         }
@@ -264,6 +264,6 @@ mod tests {
         );
         // Without a plan nothing is served, and the line says what is proven.
         let none = text_of(0);
-        assert!(none.contains(">0 of 5 success sets proven</p>"), "{none}");
+        assert!(none.contains(">0 of 4 success sets proven</p>"), "{none}");
     }
 }
