@@ -146,6 +146,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         }
         print_json(&Value::Object(line))?;
     } else {
+        print(&format_args!("cost of a view: {}", cost.definition()))?;
         for (name, Approximate { value, error }) in named {
             print(&format_args!("{name:<12} {value:<24} +- {error:.1e}"))?;
         }

@@ -11,7 +11,7 @@ use posegate_host::cover::{
 };
 use posegate_host::draw::{Mounted, MountingSheet};
 use posegate_host::files::{Files, Input, Output};
-use posegate_host::plan::PlanError;
+use posegate_host::plan::{PlanError, little_slack, margin_text};
 use posegate_host::site::Site;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -317,6 +317,19 @@ fn print_cover(found: &Cover, site: &Site) -> Result<(), Failure> {
             None => print(&format_args!("{}: {}", task.task, task.steps().join(", ")))?,
             Some(reason) => print(&format_args!("{}: NOT SERVED: {reason}", task.task))?,
         }
+    }
+    let reports = found.tasks.iter().filter_map(|task| {
+        let report = task.planned.plan.as_ref()?.report();
+        Some((report.worst_margin()?, &task.task))
+    });
+    if let Some(((margin, step), task)) = reports.min_by_key(|((margin, _), _)| margin.q16())
+        && let Some(advice) = little_slack(margin)
+    {
+        print(&format_args!(
+            "worst margin {} at step {} to {task}: {advice}",
+            margin_text(margin),
+            step + 1
+        ))?;
     }
     let served = found.tasks.iter().filter(|task| task.reason.is_none());
     print(&format_args!(

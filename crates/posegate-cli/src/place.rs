@@ -190,10 +190,12 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     if arguments.json {
         let mut line = found.to_json();
         line["task"] = json!(arguments.task);
+        line["cost_definition"] = json!(order.cost.definition());
         line["site_digest"] = json!(site.digest_text());
         line["before"] = before.map_or(Value::Null, |before| before.to_json());
         print_json(&line)?;
     } else {
+        print(&format_args!("cost of a view: {}", order.cost.definition()))?;
         print_places(before.as_ref().ok(), &found)?;
         print(&format_args!(
             "{} places evaluated ({})",
@@ -257,6 +259,9 @@ fn restarts(found: &Placement) -> Result<(), Failure> {
     };
     let same = means.iter().filter(|mean| **mean <= 1.01 * best).count();
     let worst = means.iter().copied().fold(best, f64::max);
+    if means.len() == 1 {
+        return print(&"all restarts of the search ended at one place");
+    }
     print(&format_args!(
         "{} different results of the restarts: mean costs from {best:.6} to {worst:.6}, {same} of them within 1 % of the best",
         means.len()
@@ -295,7 +300,10 @@ fn pictures(
             })
             .collect();
         let title = format!("Places of the tag of task {}", arguments.task);
-        files.write(path, placement_picture(&title, &columns).as_bytes())?;
+        files.write(
+            path,
+            placement_picture(&title, &order.cost.definition(), &columns).as_bytes(),
+        )?;
     }
     if let Some(path) = &arguments.sheet {
         let tag = order.task.tag;
@@ -584,11 +592,13 @@ fn compared(
     if arguments.json {
         let mut line = named((&list[best], &placed[best]));
         line["evaluations"] = json!(placed.len());
+        line["cost_definition"] = json!(order.cost.definition());
         line["site_digest"] = json!(site.digest_text());
         let all: Vec<Value> = list.iter().zip(&placed).map(named).collect();
         line["candidates"] = json!(all);
         print_json(&line)?;
     } else {
+        print(&format_args!("cost of a view: {}", order.cost.definition()))?;
         print(&format_args!(
             "the best of {} is {}",
             list.len(),

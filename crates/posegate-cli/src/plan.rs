@@ -4,7 +4,9 @@ use crate::chain::{failure, sentences};
 use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on, warn};
 use posegate_host::draw::{chain_picture, success_of};
 use posegate_host::files::{Files, Input, Output};
-use posegate_host::plan::{Options, PlanError, Status, crossing_notes, plan_near};
+use posegate_host::plan::{
+    Options, PlanError, Status, crossing_notes, little_slack, margin_text, plan_near,
+};
 use std::collections::BTreeMap;
 
 /// Finds the cheapest chain of looks and drives after which a work task is certain to succeed
@@ -100,8 +102,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                     print(&line)?;
                 }
                 print(&format_args!(
-                    "cost {:.3}, {}; no chain at all costs less than {:.3} (gap {:.1} %)",
+                    "cost {:.3} ({} a metre, {} a look), {}; no chain at all costs less than {:.3} (gap {:.1} %)",
                     plan.cost,
+                    site.planner.metre,
+                    site.planner.look_cost,
                     match planned.status {
                         Status::Optimal => "optimal among the chains of the library".to_owned(),
                         _ => format!(
@@ -112,6 +116,15 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                     planned.bound_of_all,
                     100.0 * planned.gap().unwrap_or(0.0)
                 ))?;
+                if let Some((margin, step)) = plan.report().worst_margin()
+                    && let Some(advice) = little_slack(margin)
+                {
+                    print(&format_args!(
+                        "worst margin {} at step {}: {advice}",
+                        margin_text(margin),
+                        step + 1
+                    ))?;
+                }
                 for other in &planned.contingencies {
                     print(&format_args!(
                         "if tag {} is lost at step {}: {} more steps, cost {:.3} from there",

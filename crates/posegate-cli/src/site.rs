@@ -3,7 +3,8 @@
 use crate::site_input::{
     Failure, Outcome, answer, print, print_json, progress_with_rate, register, site,
 };
-use posegate_host::files::{Files, Input, OutputFolder};
+use posegate_host::draw::site_routes_picture;
+use posegate_host::files::{Files, Input, Output, OutputFolder};
 use posegate_host::plan::Options;
 use posegate_host::site_build::{
     self, BuildOptions, Inventory, MergeChecks, Recipe, Shard, SiteBuildError,
@@ -23,7 +24,7 @@ pub enum Command {
     Build(Build),
     /// Merges the pieces of all shards, with a manifest, or names what is missing
     #[command(
-        after_help = "Examples:\n  posegate site merge built\n  posegate site merge built --site site.toml --prove\n\nWithout --prove it trusts what shards of the same program wrote in the folder: whoever can write there can forge tables and their proofs. With it every table is proven again; plans are trusted either way.\n\nExit code 1 if a work task has no plan (its file has the reason), or if a table is not proven (then nothing is merged)."
+        after_help = "Examples:\n  posegate site merge built\n  posegate site merge built --site site.toml --prove --picture routes.svg\n\nWithout --prove it trusts what shards of the same program wrote in the folder: whoever can write there can forge tables and their proofs. With it every table is proven again; plans are trusted either way.\n\nExit code 1 if a work task has no plan (its file has the reason), or if a table is not proven (then nothing is merged)."
     )]
     Merge(Merge),
 }
@@ -86,6 +87,9 @@ pub struct Merge {
     /// Prove every table again, against the site file
     #[arg(long, requires = "site")]
     prove: bool,
+    /// Draw the hall with walls, tags and docks, the routes of all plans, and the places of the looks (SVG)
+    #[arg(long, requires = "site", value_name = "FILE")]
+    picture: Option<Output>,
     /// Accept parts of another program, or of another version
     #[arg(long)]
     any_program: bool,
@@ -247,6 +251,10 @@ fn merge(arguments: &Merge, files: &Files) -> Outcome {
         Err(SiteBuildError::Unproven(tables)) => return not_proven(arguments, &tables),
         merged => merged.map_err(failure)?,
     };
+    if let (Some(path), Some(site)) = (&arguments.picture, &site) {
+        let plans = site_build::merged_plans(arguments.folder.as_path(), site).map_err(failure)?;
+        files.write(path, site_routes_picture(site, &plans).as_bytes())?;
+    }
     if arguments.json {
         print_json(&json!({
             "proven_again": arguments.prove,

@@ -51,6 +51,85 @@ fn path_through_a_wall_is_reported() {
     }
 }
 
+const DOCKS: &str = include_str!("../../../examples/sites/docks.toml");
+
+/// A plan whose worst margin is hardly above 1 says so and names the remedy, and the remedy works.
+#[test]
+fn little_slack_is_reported_with_the_key_that_reserves_some() {
+    let folder = tempfile::tempdir().unwrap();
+    let posegate = |line: &str| {
+        let program = Command::new(env!("CARGO_BIN_EXE_posegate"))
+            .args(line.split_whitespace())
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let text = String::from_utf8(program.stdout).unwrap();
+        (program.status.code().unwrap(), text)
+    };
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("docks.toml", DOCKS);
+    let line = "cover docks.toml --survive-lost-tags 1 -o with-tags.toml";
+    let (code, out) = posegate(line);
+    assert_eq!(code, 0, "{out}");
+    let advice = ": this plan holds for hardly larger errors than stated: write `least_margin = 1.1` under [planner]";
+    let said = |out: &str| out.lines().filter(|line| line.contains(advice)).count();
+    let (code, plan) = posegate("plan with-tags.toml --to dock-2");
+    assert_eq!((code, said(&plan)), (0, 1), "{plan}");
+    assert!(plan.contains("worst margin 1.00 at step "), "{plan}");
+    assert!(plan.contains(" (1 a metre, 1 a look), "), "{plan}");
+    let (_, plan) = posegate("plan with-tags.toml --to dock-3");
+    assert_eq!(said(&plan), 0, "{plan}");
+    // A cover names the task with the worst margin of all.
+    let (code, out) = posegate("cover docks.toml");
+    assert_eq!((code, said(&out)), (0, 1), "{out}");
+    let named = out.lines().find(|line| line.contains(advice)).unwrap();
+    assert!(
+        named.starts_with("worst margin 1.0") && named.contains(" to dock-"),
+        "{named}"
+    );
+
+    let with = |text: &str, least: &str| {
+        let head = format!("[planner]\nleast_margin = {least}\n");
+        text.replacen("[planner]\n", &head, 1)
+    };
+    write("reserved.toml", &with(DOCKS, "1.1"));
+    let (code, out) = posegate("cover reserved.toml --survive-lost-tags 1 -o more-tags.toml");
+    assert_eq!((code, said(&out)), (0, 0), "{out}");
+    for task in ["dock-1", "dock-2", "dock-3"] {
+        let (code, out) = posegate(&format!("plan more-tags.toml --to {task} --json"));
+        assert_eq!(code, 0, "{out}");
+        let plan: Value = serde_json::from_str(&out).unwrap();
+        let plans = plan["contingencies"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .chain([&plan]);
+        for plan in plans {
+            let steps = plan["steps"].as_array().unwrap().iter();
+            let margins: Vec<f64> = steps.filter_map(|step| step["margin"].as_f64()).collect();
+            assert!(margins.len() >= 2, "{plan}");
+            assert!(margins.iter().all(|margin| *margin >= 1.1), "{margins:?}");
+        }
+    }
+    // No plan has so much slack: the nearest miss names the key. A margin below 1 is refused.
+    write("too-much.toml", &with(DOCKS, "7.5"));
+    let (code, out) = posegate("cover too-much.toml");
+    assert_eq!(code, 1, "{out}");
+    let paper = format!("{PAPER}\n[planner]\nleast_margin = 4.0\n");
+    let (code, out, _, _) = run(&paper, "plan site.toml --from back-to-dock --to dock");
+    assert_eq!(code, 1, "{out}");
+    assert!(
+        out.contains("times as large would fit, and the site's `least_margin` is 4"),
+        "{out}"
+    );
+    let (code, _, err, _) = run(&with(DOCKS, "0.9"), "check site.toml");
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("least_margin") && err.contains("from 1 to 8"),
+        "{err}"
+    );
+}
+
 #[test]
 fn chain_reports_every_step() {
     let line = "chain site.toml --name back-to-dock --json";

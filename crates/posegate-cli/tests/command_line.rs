@@ -741,7 +741,11 @@ fn invalid_input_of_cost_is_refused() {
     // The site's epsilon is the default.
     assert!((line["mass"].as_f64().unwrap() - 0.99).abs() < 1e-12);
     let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas}"));
-    assert!(out.contains("p_miss") && out.lines().count() == 5, "{out}");
+    assert!(out.contains("p_miss") && out.lines().count() == 6, "{out}");
+    assert!(
+        out.starts_with("cost of a view: 100 d^2 + 50 phi^2 + 50 psi^2 (m, rad), "),
+        "{out}"
+    );
     folder.write("p.csv", "0.09,0,0\n0,0.09,0\n0,0,0.0003\n");
     folder.expect(0, "cost site.toml --task see-t7 --covariance-file p.csv");
     let see = "cost site.toml --task see-t7";

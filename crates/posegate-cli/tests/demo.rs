@@ -180,6 +180,26 @@ fn check_figures(out: &Path, numbers: &Value) {
         placement.matches("m from the goal</tspan></text>").count(),
         4
     );
+    // The same pose-set in the same success set has one margin.
+    let margins: Vec<&str> = chain
+        .split("all of X\u{302} is in S, margin ")
+        .skip(1)
+        .filter_map(|rest| rest.split('<').next())
+        .collect();
+    assert_eq!(margins.len(), 2);
+    for margin in margins {
+        assert!(
+            sections.contains(&format!(", margin {margin}<")),
+            "{margin}"
+        );
+    }
+    assert!(placement.contains(">cost of a view: 100 d^2 + 50 phi^2 + 50 psi^2 (m, rad)"));
+    // On a telephone, the words of wider figures would be too small to be read.
+    for figure in [&sections, &placement, &text("fig3-plan.svg")] {
+        let (_, rest) = figure.split_once(" width=\"").unwrap();
+        let wide: f64 = rest.split_once('"').unwrap().0.parse().unwrap();
+        assert!(wide <= 760.0, "{wide}");
+    }
     // The sets of the paper can be distinguished without colours: S is hatched, pose-sets are dashed.
     for figure in [&chain, &sections, &placement] {
         assert!(figure.contains("stroke=\"#b3001b\" stroke-width=\"0.6\""));

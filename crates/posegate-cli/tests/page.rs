@@ -139,6 +139,17 @@ fn placements_are_checked_and_shown() {
         order.placements.push(("see-t7".into(), placement.clone()))
     });
     let page = page.expect("a page");
+    // A mean cost has no unit, and its definition is shown if it is known.
+    assert!(page.contains("<th>mean cost, no unit</th>") && !page.contains("Cost of a view"));
+    placement["cost_definition"] = json!("100 d^2 & more; no unit");
+    let defined = made(SAMPLE, |order| {
+        order.placements.push(("see-t7".into(), placement.clone()))
+    });
+    assert!(
+        defined
+            .expect("a page")
+            .contains("<p>Cost of a view: 100 d^2 &amp; more; no unit.</p>")
+    );
     let before = format!("<td>before</td><td>{:.4}</td>", mounted.x);
     assert!(page.contains(&before) && page.contains("<td>109.500000</td>"));
     // A probability is rounded up, a margin down.
@@ -388,7 +399,7 @@ fn page_begins_with_a_summary() {
         .expect("a margin");
     assert!(shown <= least && least < shown + 0.01, "{shown} {least}");
     // A margin near 1 leaves nothing for errors that are larger than stated.
-    let warned = all.contains("This plan holds for hardly larger errors than stated");
+    let warned = all.contains("this plan holds for hardly larger errors than stated");
     assert_eq!(warned, shown < 1.05, "{shown}");
     assert!(warned);
     let (header, _) = all.split_once("<main>").expect("a header");
@@ -437,8 +448,18 @@ fn summary_shows_warnings() {
     let page = made(&doubtful, |_| ()).expect("a page");
     assert!(page.contains("<p id=\"summary\" class=\"warned\">2 of 2 docks"));
     assert!(page.contains("<li>WARNING: "), "no warning");
-    let page = made(&hall(2, &TAGS_OF_TWO), |_| ()).expect("a page");
-    assert!(page.contains("<p id=\"summary\" class=\"good\">") && !page.contains("WARNING"));
+    let sound = hall(2, &TAGS_OF_TWO);
+    let page = made(&sound, |_| ()).expect("a page");
+    // A margin hardly above 1 is no warning of the site, but it is not shown in green.
+    assert!(
+        page.contains("<p id=\"summary\" class=\"warned\">2 of 2 docks")
+            && !page.contains("WARNING")
+    );
+    let reserved = sound.replacen("[planner]\n", "[planner]\nleast_margin = 1.06\n", 1);
+    let page = made(&reserved, |_| ()).expect("a page");
+    assert!(
+        page.contains("<p id=\"summary\" class=\"good\">2 of 2 docks") && !page.contains("WARNING")
+    );
 }
 
 /// A missing tolerance is shown as unknown: 0.000 m would claim that the tag is exactly at the pose of the file.

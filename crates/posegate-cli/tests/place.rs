@@ -543,6 +543,11 @@ fn learnt_model_turns_the_tag_away_from_head_on() {
     let tilt = (pose(&best, "yaw_deg") - 180.0).abs();
     assert!((30.0..60.0).contains(&tilt), "{best}");
     assert_eq!(best["contained"], true);
+    let definition = best["cost_definition"].as_str().unwrap();
+    assert!(
+        definition.starts_with("100 times the error model's bound in metres plus"),
+        "{definition}"
+    );
     let other = run_in(
         folder.path(),
         &site,
@@ -619,6 +624,22 @@ fn pictures_are_drawn() {
     assert!(
         places.starts_with("<svg ") && places.contains("before") && places.contains("best by cost")
     );
+    // A cost has no unit: its definition is next to it.
+    let definition = "100 d^2 + 50 phi^2 + 50 psi^2 (m, rad), 1000000 outside of S; no unit";
+    assert!(
+        output
+            .out
+            .starts_with(&format!("cost of a view: {definition}\n")),
+        "{}",
+        output.out
+    );
+    assert!(
+        places.contains(&format!(">cost of a view: {definition}</text>")),
+        "{places}"
+    );
+    let placed = json(SITE, &place("0.1", "--free x=1:4 --budget 200 --c1 7"), 0);
+    let text = placed["cost_definition"].as_str().unwrap();
+    assert!(text.starts_with("7 d^2 + 50 phi^2"), "{text}");
     let sheet = read("sheet.svg");
     assert!(
         sheet.contains("t7: tag36h11 id 7") && sheet.contains("size 300 mm"),

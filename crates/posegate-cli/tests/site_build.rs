@@ -196,6 +196,37 @@ fn bytes_are_equal_for_any_number_of_shards_and_threads() {
     folder.expect(0, "site merge five");
     assert!(folder.results("five") == one, "merged again");
 
+    // The picture of the routes is of the results alone, and changes none of them.
+    for output in ["one", "five"] {
+        folder.expect(
+            0,
+            &format!("site merge {output} --site site.toml --picture {output}.svg"),
+        );
+        assert!(folder.results(output) == one, "{output} with a picture");
+    }
+    let picture = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let routes = picture("one.svg");
+    assert!(routes == picture("five.svg"), "pictures");
+    assert!(
+        routes.contains(">The site, with the routes of its 4 plans</text>")
+            && routes.matches(": worst margin 1.").count() == 4
+            && routes.contains("looks: every place where the robot may be"),
+        "{routes}"
+    );
+    // A disc and a dotted line of sight for each look, and one of each in the legend.
+    let plans = one.iter().filter(|(name, _)| name.starts_with("plans/"));
+    let looks = plans.map(|(_, bytes)| {
+        let plan: serde_json::Value = serde_json::from_slice(bytes).unwrap();
+        let steps = plan["steps"].as_array().unwrap().iter();
+        steps.filter(|step| step["type"] == "localization").count()
+    });
+    let count: usize = looks.sum();
+    assert!(count >= 4);
+    assert_eq!(
+        routes.matches("stroke-dasharray=\"4 2\"").count(),
+        count + 1
+    );
+
     // The manifest is of exactly these files.
     let manifest: serde_json::Value = serde_json::from_slice(&one["manifest.json"]).unwrap();
     let listed = manifest["files"].as_array().unwrap();
@@ -309,7 +340,13 @@ fn work_task_without_a_plan_is_reported() {
         boxes()
     ));
     folder.expect(0, "site build site.toml -o out");
-    let (out, _) = folder.expect(1, "site merge out");
+    let (out, _) = folder.expect(1, "site merge out --site site.toml --picture routes.svg");
+    let routes = std::fs::read_to_string(folder.path().join("routes.svg")).unwrap();
+    assert!(
+        routes.contains(">The site: 0 of 1 plans found</text>")
+            && routes.contains(">dock-4 from gate: NO PLAN: "),
+        "{routes}"
+    );
     assert!(
         out.contains("5 proven tables, 0 plans") && out.contains("no plan: gate: dock-4"),
         "{out}"

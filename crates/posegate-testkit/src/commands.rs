@@ -76,7 +76,10 @@ pub const LINES: [(&str, &str); 35] = [
         "place {site} --task see-near --covariance-file {covariance_file} --candidates {candidates}",
     ),
     ("site build", "site build {site} --tables-only -o {output}"),
-    ("site merge", "site merge {folder} --site {site}"),
+    (
+        "site merge",
+        "site merge {folder} --site {site} --picture {picture}",
+    ),
     (
         "draw",
         "draw {site} --task dock --table {table} --estimates {estimates} -o {output}",

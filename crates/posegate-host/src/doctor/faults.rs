@@ -52,19 +52,34 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     all
 }
 
-/// Returns a warning for each task, and each look of the planner, whose stated error is smaller than the error from
-/// the tolerances of tag and camera in some of its views.
+/// Returns a warning for each task, and for the looks of the planner at tags and candidates, whose stated error is
+/// smaller than the error from the tolerances of tag and camera in some of its views. Looks with the same fault share a
+/// warning.
 #[must_use]
 pub fn stated_errors(site: &Site) -> Vec<Warning> {
     let tasks = site.tasks.iter().filter_map(|(name, task)| {
         bound_without_survey(&task.success.shape, task.error_bound?, ["task", name])
     });
-    let looks = site.planner.looks.iter().filter_map(|(name, look)| {
-        let warning = bound_without_survey(&look.success.shape, look.bound, ["planner", "r"])?;
-        Some(Warning {
-            about: format!("look {name} of the planner"),
-            ..warning
-        })
+    let mut looks: Vec<(Warning, Vec<&str>)> = Vec::new();
+    for (name, look) in site.planner.looks.iter().chain(&site.planner.offers) {
+        let fault = bound_without_survey(&look.success.shape, look.bound, ["planner", "r"]);
+        let Some(warning) = fault else {
+            continue;
+        };
+        let same = |known: &&mut (Warning, Vec<&str>)| {
+            (known.0.code, &known.0.message) == (warning.code, &warning.message)
+        };
+        match looks.iter_mut().find(same) {
+            Some((_, names)) => names.push(name),
+            None => looks.push((warning, vec![name])),
+        }
+    }
+    let looks = looks.into_iter().map(|(warning, names)| Warning {
+        about: match names.as_slice() {
+            [name] => format!("look {name} of the planner"),
+            names => format!("looks {} of the planner", names.join(", ")),
+        },
+        ..warning
     });
     tasks.chain(looks).collect()
 }

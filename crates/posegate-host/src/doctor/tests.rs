@@ -340,3 +340,28 @@ fn rows_of_candidates_are_examined() {
         .unwrap();
     assert_eq!(findings.warnings[0].line(&text), line + 1);
 }
+
+/// All candidates of a row have the same tolerance: one warning names their looks, before any of them is a tag.
+#[test]
+fn looks_with_the_same_fault_share_a_warning() {
+    let row = "[candidates.row]\nwall = \"north\"\nevery = 1.0\nz = [1.0]\nfamily = \"tag36h11\"\nsize = 0.2\ntolerance = { translation = 0.01, yaw_deg = 0.5 }\n";
+    let planner = |r: f64| {
+        format!(
+            "[planner]\nlook = {{ camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0, walls = [\"rack\"] }}\nr = [[{r:?}, 1.0]]\n"
+        )
+    };
+    let warnings = |r: f64| {
+        let text = hall(&format!("{row}{}", planner(r)));
+        let found = examine(&site(&text)).warnings;
+        let about = |w: &super::Warning| (w.code, w.about.clone());
+        found.iter().map(about).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        warnings(0.03),
+        [(
+            "error_bound_below_tolerance",
+            "looks row-1, row-2, row-3, row-4, row-5 of the planner".to_owned()
+        )]
+    );
+    assert_eq!(warnings(0.2), []);
+}

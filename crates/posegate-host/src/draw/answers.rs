@@ -15,13 +15,13 @@ pub fn words(answer: &Answer, set_name: &str) -> String {
     )
 }
 
-/// Draws the heading of a row of panels, its baseline at `top`, followed by the row's answers.
+/// Draws the heading of a row of panels, its baseline at `top`, and the row's answers below it.
 pub fn row_heading(picture: &mut Picture, top: f64, heading: &str, answers: &[(&Answer, &str)]) {
     let font = Font::new(15.0, palette::INK).bold();
     picture.text([24.0, top], heading, &font);
     for (index, (answer, set_name)) in answers.iter().enumerate() {
         let font = Font::new(13.0, palette::of_words(answer.holds())).bold();
-        let at = [560.0 + 310.0 * index as f64, top];
+        let at = [24.0 + 306.0 * index as f64, top + 22.0];
         picture.text(at, &words(answer, set_name), &font);
     }
 }

@@ -9,7 +9,7 @@ use super::panel::{Inside, Panel, Window, tick_at_scale};
 use super::section::border;
 use super::svg::{Font, Picture, Style, literal};
 use crate::log::factor_text;
-use crate::plan::{BeliefStateF64, ChainReport, StepKind, StepReport};
+use crate::plan::{BeliefStateF64, ChainReport, Route, StepKind, StepReport};
 use crate::site::Site;
 use posegate::shape::SuccessSet;
 
@@ -41,18 +41,19 @@ pub fn chain_picture<'s>(
     let width = LEFT + columns as f64 * ACROSS + 10.0;
     let title = format!("Chain {}", literal(name));
     // The height of the hall determines where the steps begin: draw it once for its size.
+    let routes = [Route::from(report)];
     let with_hall = |picture: &mut Picture| {
         let site = site?;
         let panel = hall(
             picture,
             site,
-            &[report],
+            &routes,
             "The hall and the route",
             [LEFT, TOP + 14.0],
             HALL,
         );
         let legend = [24.0, panel.bottom() + 44.0];
-        Some(legend[1] + hall_legend(picture, site, &[report], legend) + 34.0)
+        Some(legend[1] + hall_legend(picture, site, &routes, legend) + 34.0)
     };
     let first = with_hall(&mut Picture::new(760.0, 760.0, &title)).unwrap_or(TOP);
     let bottom = first + rows as f64 * DOWN;

@@ -5,9 +5,9 @@ use super::legend::{Sample, legend};
 use super::palette;
 use super::panel::{Panel, Window, tick_at_scale};
 use super::section::border;
-use super::study::{CHAIN, CaseStudy, StudyError};
+use super::study::{CHAIN, CaseStudy, PoseSetSpec, StudyError};
 use super::svg::{Anchor, Font, Picture, Style, literal};
-use crate::log::factor_text;
+use crate::log::{factor, factor_text};
 use crate::plan::{BeliefStateF64, StepReport, evaluate};
 use posegate::chain::StartAssumption;
 use posegate::shape::SuccessSet;
@@ -45,7 +45,7 @@ pub fn fig2_chain(study: &CaseStudy) -> Result<String, StudyError> {
         let set = site.tasks.get(name).map(|task| &task.success);
         let before = format!("{}. before {}", index + 1, literal(name));
         panel(&mut picture, left, &before, &step.before, set, index == 0);
-        verdict(&mut picture, left, step);
+        verdict(&mut picture, left, step, study);
         let [from, to] = [left + EDGE + 18.0, left + PITCH[0] - 46.0];
         let middle = TOP + 0.5 * EDGE;
         let arrow = Style::outlined(palette::INK, 2.4);
@@ -131,10 +131,27 @@ fn known(picture: &mut Picture, left: f64, belief: &BeliefStateF64) {
     picture.text([left, TOP + EDGE + 54.0], &text, &font);
 }
 
+/// Returns the step's margin. If the controller's table of the task gives a larger one, it is that of Fig. 3: both are
+/// proven.
+fn margin(step: &StepReport, study: &CaseStudy) -> Option<String> {
+    let own = step.margin.map(factor_text);
+    let [translation, yaw] = step.before.enclosing();
+    let known = PoseSetSpec::Bounded {
+        translation,
+        yaw_deg: yaw.to_degrees(),
+    };
+    let of_table = study.ask(step.task.as_deref()?, known).ok();
+    let of_table = of_table.filter(|answer| {
+        answer.holds() == step.failure.is_none()
+            && step.margin.is_some_and(|own| answer.margin() > factor(own))
+    });
+    of_table.map(|answer| answer.margin_text()).or(own)
+}
+
 /// Writes the pose-set and the verdict below a panel.
-fn verdict(picture: &mut Picture, left: f64, step: &StepReport) {
+fn verdict(picture: &mut Picture, left: f64, step: &StepReport, study: &CaseStudy) {
     known(picture, left, &step.before);
-    let margin = step.margin.map_or_else(|| "unknown".into(), factor_text);
+    let margin = margin(step, study).unwrap_or_else(|| "unknown".into());
     let inside = if step.failure.is_none() {
         "all of X\u{302} is in S"
     } else {

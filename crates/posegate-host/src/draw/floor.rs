@@ -23,13 +23,19 @@ impl Inside<'_> {
 
     /// Draws a tag's edge from above, with the direction of its face.
     pub fn tag(&mut self, tag: &Tag) {
+        self.tag_with_arrow(tag, None);
+    }
+
+    /// Draws a tag's edge from above, with the direction of its face as an arrow of at most some pixels.
+    pub fn tag_with_arrow(&mut self, tag: &Tag, longest: Option<f64>) {
         let [normal, across, _] = axes(&tag.pose);
         let (x, y, half) = (tag.pose.x, tag.pose.y, 0.5 * tag.size);
         let end = |way: f64| [x + way * half * across[0], y + way * half * across[1]];
         self.line(&[end(-1.0), end(1.0)], &palette::TAG);
         let mut tip = [x, y];
         self.in_pixels(|_, panel| {
-            let length = (30.0 / panel.scale).max(0.6 * tag.size);
+            let longest = longest.map_or(f64::INFINITY, |pixels| pixels / panel.scale);
+            let length = (30.0 / panel.scale).max(0.6 * tag.size).min(longest);
             tip = [x + length * normal[0], y + length * normal[1]];
         });
         self.arrow([x, y], tip, &Style::outlined(palette::INK, 1.6));
@@ -37,11 +43,16 @@ impl Inside<'_> {
 
     /// Draws a pose as a dot and an arrow forward.
     pub fn pose(&mut self, pose: PoseDeg, style: &Style) {
+        self.pose_with_arrow(pose, 26.0, style);
+    }
+
+    /// Draws a pose as a dot and an arrow forward with a length in pixels.
+    pub fn pose_with_arrow(&mut self, pose: PoseDeg, length: f64, style: &Style) {
         let yaw = pose.yaw_deg.to_radians();
         let from = [pose.x, pose.y];
         let mut tip = from;
         self.in_pixels(|_, panel| {
-            let length = 26.0 / panel.scale;
+            let length = length / panel.scale;
             tip = [
                 pose.x + length * libm::cos(yaw),
                 pose.y + length * libm::sin(yaw),

@@ -8,7 +8,7 @@ use super::palette;
 use super::panel::{Inside, Panel, tick_at_scale};
 use super::svg::{Picture, Style, literal};
 use super::task_plan::about;
-use crate::plan::{ChainReport, StepKind, StepReport};
+use crate::plan::{Route, RouteStep, StepKind};
 use crate::site::{Site, Task};
 use posegate::shape::{PoseDeg, SuccessSet};
 
@@ -28,21 +28,15 @@ pub fn success_of<'s>(site: &'s Site, name: &str) -> Option<&'s SuccessSet> {
     own.or(made)
 }
 
-/// A robot's place before a step: x, y in metres, and the distance of the farthest possible place from it.
-fn place(step: &StepReport) -> ([f64; 2], f64) {
-    let [x, y, _] = step.before.pose;
-    ([x, y], step.before.enclosing()[0] + step.before.spread[0])
-}
-
-fn looks<'r>(routes: &[&'r ChainReport]) -> Vec<&'r StepReport> {
-    let steps = routes.iter().flat_map(|report| &report.steps);
+fn looks(routes: &[Route]) -> Vec<&RouteStep> {
+    let steps = routes.iter().flat_map(|route| &route.steps);
     steps
         .filter(|step| step.kind == StepKind::Localization)
         .collect()
 }
 
 /// Returns the corners of all drawn parts, in the world.
-fn points(site: &Site, routes: &[&ChainReport]) -> Vec<[f64; 2]> {
+fn points(site: &Site, routes: &[Route]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     points.extend(site.tags.values().map(|t| [t.tag.pose.x, t.tag.pose.y]));
     let walls = site.walls.iter();
@@ -55,11 +49,10 @@ fn points(site: &Site, routes: &[&ChainReport]) -> Vec<[f64; 2]> {
             [x, y]
         }));
     }
-    for step in routes.iter().flat_map(|report| &report.steps) {
-        let ([x, y], reach) = place(step);
+    for step in routes.iter().flat_map(|route| &route.steps) {
+        let ([x, y], reach) = (step.from, step.reach);
         points.extend([[x - reach, y - reach], [x + reach, y + reach]]);
-        let [x, y, _] = step.after.pose;
-        points.push([x, y]);
+        points.push(step.to);
     }
     if points.is_empty() {
         points.push([0.0; 2]);
@@ -71,7 +64,7 @@ fn points(site: &Site, routes: &[&ChainReport]) -> Vec<[f64; 2]> {
 pub(super) fn hall(
     picture: &mut Picture,
     site: &Site,
-    routes: &[&ChainReport],
+    routes: &[Route],
     title: &str,
     [left, top]: [f64; 2],
     largest: [f64; 2],
@@ -112,7 +105,7 @@ pub(super) fn hall(
 /// The drawn parts of a hall.
 struct Hall<'a> {
     site: &'a Site,
-    routes: &'a [&'a ChainReport],
+    routes: &'a [Route],
     /// Pixels per metre.
     scale: f64,
 }
@@ -124,8 +117,8 @@ impl Hall<'_> {
     }
 
     /// Yields the steps of all routes.
-    fn steps(&self) -> impl Iterator<Item = &StepReport> {
-        self.routes.iter().flat_map(|report| &report.steps)
+    fn steps(&self) -> impl Iterator<Item = &RouteStep> {
+        self.routes.iter().flat_map(|route| &route.steps)
     }
 
     /// Draws the walls, and the robots at the goals.
@@ -141,8 +134,8 @@ impl Hall<'_> {
     /// Draws the looks with their lines of sight, and the drives.
     fn draw_steps(&self, inside: &mut Inside<'_>) {
         for step in looks(self.routes) {
-            let (at, reach) = place(step);
-            inside.disc(at, reach, &LOOK);
+            let at = step.from;
+            inside.disc(at, step.reach, &LOOK);
             let name = step.task.as_deref();
             let set = name.and_then(|name| success_of(self.site, name));
             for tag in set.map(SuccessSet::tags).unwrap_or_default() {
@@ -151,8 +144,7 @@ impl Hall<'_> {
         }
         for step in self.steps() {
             if step.kind == StepKind::Navigation {
-                let ends = [step.before.pose, step.after.pose].map(|[x, y, _]| [x, y]);
-                inside.arrow(ends[0], ends[1], &ROUTE);
+                inside.arrow(step.from, step.to, &ROUTE);
             }
         }
     }
@@ -177,11 +169,10 @@ impl Hall<'_> {
     /// Reserves the area of looks, drives, goals and tags, so that no label covers them.
     fn avoid_drawn(&self, inside: &mut Inside<'_>, labels: &mut Labels) {
         for step in looks(self.routes) {
-            let (at, reach) = place(step);
-            labels.avoid(inside, at, reach * self.scale);
+            labels.avoid(inside, step.from, step.reach * self.scale);
         }
         for step in self.steps() {
-            let [from, to] = [step.before.pose, step.after.pose];
+            let [from, to] = [step.from, step.to];
             let between = |t: f64| [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]));
             let length = libm::hypot(to[0] - from[0], to[1] - from[1]) * self.scale;
             let count = libm::ceil(length / 14.0).min(100.0) as u32;
@@ -225,17 +216,16 @@ impl Hall<'_> {
 
     /// Draws the starts of the routes. Routes that share a start share a label.
     fn label_starts(&self, inside: &mut Inside<'_>, labels: &mut Labels) {
-        for (number, report) in self.routes.iter().enumerate() {
-            let Some(first) = report.steps.first() else {
+        for (number, route) in self.routes.iter().enumerate() {
+            let Some(first) = route.steps.first() else {
                 continue;
             };
-            let ([x, y], _) = place(first);
-            inside.disc([x, y], 0.0, &Style::filled("#0072b2"));
+            inside.disc(first.from, 0.0, &Style::filled("#0072b2"));
             let begun = self.routes[..number]
                 .iter()
                 .filter_map(|other| other.steps.first());
-            if !begun.map(place).any(|(other, _)| other == [x, y]) {
-                labels.place(inside, [x, y], "start");
+            if !begun.map(|step| step.from).any(|at| at == first.from) {
+                labels.place(inside, first.from, "start");
             }
         }
     }
@@ -246,10 +236,10 @@ impl Hall<'_> {
 pub(super) fn hall_legend(
     picture: &mut Picture,
     site: &Site,
-    routes: &[&ChainReport],
+    routes: &[Route],
     [left, top]: [f64; 2],
 ) -> f64 {
-    let kinds = || routes.iter().flat_map(|report| &report.steps);
+    let kinds = || routes.iter().flat_map(|route| &route.steps);
     let has = |kind| kinds().any(|step| step.kind == kind);
     let of_wall = |is_block: bool| {
         let walls = site.walls.iter();
@@ -312,4 +302,45 @@ pub(super) fn hall_legend(
         legend(picture, [left + 320.0 * column as f64, top], entries);
     }
     LINE * rows as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DOCK: &str = include_str!("../../../../examples/sites/dock.toml");
+
+    /// Returns the box of the text in a picture: left, top, right, bottom.
+    fn box_of(svg: &str, text: &str) -> [f64; 4] {
+        let end = format!(">{text}</text>");
+        let line = svg.lines().find(|line| line.ends_with(&end));
+        let line = line.unwrap_or_else(|| panic!("no text `{text}`: {svg}"));
+        let number = |name: &str| -> f64 {
+            let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
+            rest.split_once('"').unwrap().0.parse().unwrap()
+        };
+        let (x, y, size) = (number("x"), number("y"), number("font-size"));
+        let wide = crate::draw::measure::text_width(text, size, true);
+        [x, y - size, x + wide, y + 0.3 * size]
+    }
+
+    #[test]
+    fn walls_are_labelled_at_their_middles() {
+        let text = format!(
+            "{DOCK}\n[wall.north]\nfrom = [-2.0, 3.0]\nto = [6.0, 3.0]\nz = [0.0, 2.5]\n\
+             [wall.rack_a]\ncorners = [[1.0, -3.0], [3.0, -3.0], [3.0, -2.0], [1.0, -2.0]]\nz = [0.0, 2.5]\n"
+        );
+        let site = Site::parse(&text, "site.toml").unwrap();
+        let mut picture = Picture::new(760.0, 760.0, "walls");
+        let panel = hall(&mut picture, &site, &[], "", [66.0, 50.0], [600.0, 560.0]);
+        let svg = picture.finish();
+        for (name, middle) in [("north", [2.0, 3.0]), ("rack_a", [2.0, -2.5])] {
+            assert_eq!(svg.matches(&format!(">{name}</text>")).count(), 1, "{svg}");
+            let [left, top, right, bottom] = box_of(&svg, name);
+            let [x, y] = panel.at(middle);
+            let near = [x.clamp(left, right), y.clamp(top, bottom)];
+            let off = libm::hypot(near[0] - x, near[1] - y);
+            assert!(off <= 16.0, "{name}: {off} px from its middle: {svg}");
+        }
+    }
 }

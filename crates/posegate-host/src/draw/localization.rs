@@ -11,11 +11,15 @@ use super::svg::{Font, Picture, Style};
 use crate::inscribe::{InscribedBox, inscribed_box};
 use posegate::shape::{Shape, Visibility};
 
-const WIDTH: f64 = 1200.0;
-const HEIGHT: f64 = 926.0;
-/// Left edge of the first column of panels, and the distance between columns.
+const WIDTH: f64 = 660.0;
+const HEIGHT: f64 = 1534.0;
+/// Left edge of the first column of panels, and the distance between columns. There are two: on a telephone, the words of
+/// more would be too small to be read.
 const LEFT: f64 = 66.0;
-const PITCH: f64 = 287.0;
+const PITCH: f64 = 307.0;
+/// Baselines of the headings of S_l and S_w.
+const SEE_TOP: f64 = 202.0;
+const DOCK_TOP: f64 = 952.0;
 
 /// The headings of S_l's sections, degrees; they include the ends of the pose-sets.
 const SEE_DEG: [f64; 5] = [-8.0, -2.0, 0.0, 2.0, 8.0];
@@ -31,15 +35,15 @@ const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
 pub fn fig3_sections(study: &CaseStudy) -> Result<String, StudyError> {
     let title = "Fig. 3: which containments hold: pose-sets in S_l and in S_w";
     let mut picture = Picture::new(WIDTH, HEIGHT, title);
-    let font = Font::new(19.0, palette::INK).bold();
+    let font = Font::new(18.0, palette::INK).bold();
     picture.text([24.0, 32.0], title, &font);
     for (index, step) in chain(study)?.iter().enumerate() {
         let bold = format!("{}. {}", index + 1, words(&step.answer, step.set_name));
-        let at = [24.0 + 392.0 * index as f64, 52.0];
+        let at = [24.0, 50.0 + 42.0 * index as f64];
         verdict(&mut picture, at, step.answer.holds(), &bold, step.meaning);
     }
     see(study, &mut picture)?;
-    explain(study, &mut picture, [LEFT + PITCH * 1.0 + 4.0, 388.0])?;
+    explain(study, &mut picture, [LEFT + PITCH - 24.0, SEE_TOP + 490.0])?;
     dock(study, &mut picture)?;
     Ok(picture.finish())
 }
@@ -55,7 +59,7 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
     ];
     let [one, two] = &answers;
     let heading = "S_l: where the robot sees tag t7, heading by heading";
-    row_heading(picture, 132.0, heading, &[(one, "S_l"), (two, "S_l")]);
+    row_heading(picture, SEE_TOP, heading, &[(one, "S_l"), (two, "S_l")]);
     let row = Row {
         study,
         task: SEE,
@@ -69,10 +73,10 @@ fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
                 x: [-2.1, 4.2],
                 y: [-2.1, 2.1],
             },
-            left: LEFT + PITCH * (index % 4) as f64,
-            top: 166.0 + 226.0 * (index / 4) as f64,
+            left: LEFT + PITCH * (index % 2) as f64,
+            top: SEE_TOP + 58.0 + 226.0 * (index / 2) as f64,
             scale: 39.0,
-            y_title: index % 4 == 0,
+            y_title: index.is_multiple_of(2),
         };
         row.draw(picture, &panel, NAMES[index], yaw_deg, "", |inside| {
             for (inscribed, style) in boxes.iter().zip(BOXES) {
@@ -118,27 +122,32 @@ fn explain(
         (Sample::SuccessSet, "success set S at this heading"),
         (
             Sample::Disc(palette::PAPER_SET),
-            "pose-set X\u{302} about the goal, where its yaw interval has the heading",
+            "pose-set X\u{302} about the goal, where",
         ),
+        (Sample::Words, "its yaw interval has the heading"),
         (Sample::Line(palette::TAG), "tag t7, facing the goal"),
     ];
     legend(picture, [left, top], &entries);
     for (number, (inscribed, style)) in boxes(study)?.into_iter().zip(BOXES).enumerate() {
-        let text = format!("box TSR_l in S_l, proven: {}", in_words(&inscribed));
-        let at = [left, top + 63.0 + 21.0 * number as f64];
-        legend(picture, at, &[(Sample::Line(style), &text)]);
+        let [place, yaw] = in_words(&inscribed);
+        let at = [left, top + 84.0 + 63.0 * number as f64];
+        let entries = [
+            (Sample::Line(style), "box TSR_l in S_l, proven:"),
+            (Sample::Words, &*place),
+            (Sample::Words, &*yaw),
+        ];
+        legend(picture, at, &entries);
     }
     Ok(())
 }
 
-fn in_words(inscribed: &InscribedBox) -> String {
+/// Returns a box in two lines of words.
+fn in_words(inscribed: &InscribedBox) -> [String; 2] {
     let ends = |[lo, hi]: [f64; 2]| format!("{} to {}", signed(lo), signed(hi));
-    format!(
-        "x {} m, y {} m, yaw {}°",
-        ends(inscribed.x),
-        ends(inscribed.y),
-        ends(inscribed.yaw_deg)
-    )
+    [
+        format!("x {} m, y {} m,", ends(inscribed.x), ends(inscribed.y)),
+        format!("yaw {}°", ends(inscribed.yaw_deg)),
+    ]
 }
 
 /// Draws the tag's edge from above.
@@ -170,7 +179,12 @@ fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
     ];
     let [small, large] = &answers;
     let heading = "S_w: where docking succeeds, enlarged";
-    row_heading(picture, 632.0, heading, &[(small, "S_w"), (large, "S_w")]);
+    row_heading(
+        picture,
+        DOCK_TOP,
+        heading,
+        &[(small, "S_w"), (large, "S_w")],
+    );
     let caption = |answer: &Answer| format!("{}: {}", answer.known, answer.holds_text());
     let [fits, sticks_out] = [small, large].map(caption);
     let [fits_colour, out_colour] = [small, large].map(|a| palette::of_words(a.holds()));
@@ -185,10 +199,10 @@ fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
             x: [-reach, reach],
             y: [-reach, reach],
         },
-        left: LEFT + 18.0 + PITCH * index as f64,
-        top: 666.0,
+        left: LEFT + 18.0 + PITCH * (index % 2) as f64,
+        top: DOCK_TOP + 58.0 + 272.0 * (index / 2) as f64,
         scale: 105.0 / reach,
-        y_title: index == 0,
+        y_title: index.is_multiple_of(2),
     };
     for (index, yaw_deg) in DOCK_DEG.into_iter().enumerate() {
         row.draw(picture, &square(index, 0.12), "", yaw_deg, "", |inside| {

@@ -30,6 +30,7 @@ pub use self::replay::replay_picture;
 pub use self::sheet::{Mounted, MountingSheet, mounting_sheet, mounting_sheet_html};
 pub use self::site_pictures::site_pictures;
 pub(crate) use self::site_plan::site_plan;
+pub use self::site_plan::site_routes_picture;
 pub use self::subject::{DrawError, Subject};
 pub(crate) use self::task_image::task_image_with_numbers;
 pub use self::task_image::{SeenFrom, task_image};

@@ -3,7 +3,7 @@
 
 use super::belief::PoseSetF64;
 use super::ingredients::{Ingredients, radians};
-use super::legend::{Sample, legend};
+use super::legend::{LINE, Sample, legend};
 use super::palette;
 use super::panel::{Panel, Window, tick_at_scale};
 use super::section::border;
@@ -27,40 +27,60 @@ pub struct Column {
 }
 
 const LEFT: f64 = 62.0;
-const PITCH: f64 = 318.0;
+const PITCH: f64 = 340.0;
+/// Number of places next to each other: on a telephone, the words of more would be too small to be read.
+const ABREAST: usize = 2;
 const IMAGE: [f64; 2] = [268.0, 201.0];
 const TOP: f64 = 92.0;
 const FLOOR: f64 = TOP + 201.0 + 44.0;
 const FLOOR_HEIGHT: f64 = 230.0;
+/// Distance from a row of places to the next one.
+const DOWN: f64 = FLOOR + FLOOR_HEIGHT + 52.0 + 6.0 * 18.0 + 4.0 - 42.0;
 
 /// The tag's corners seen from the goal, and from the pose-set's border.
 const FROM_GOAL: Style = Style::outlined("#222222", 2.0).with_fill_opacity("#222222", 0.12);
 const FROM_BORDER: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
 
-/// Returns an SVG of places next to each other.
+/// Returns an SVG of places next to each other, two in a row. `cost` is the definition of the cost
+/// ([`ViewCost::definition`](crate::place::ViewCost::definition)).
 #[must_use]
-pub fn placement_picture(title: &str, columns: &[Column]) -> String {
+pub fn placement_picture(title: &str, cost: &str, columns: &[Column]) -> String {
     let reach = columns
         .iter()
         .fold(2.0, |reach: f64, column| reach.max(wide(column)));
-    let bottom = FLOOR + FLOOR_HEIGHT;
-    let width = LEFT + PITCH * columns.len().max(2) as f64;
-    let mut picture = Picture::new(width, bottom + 256.0, title);
-    picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
+    let cost = format!("cost of a view: {cost}");
+    let rows = columns.len().div_ceil(ABREAST).max(1);
+    let below = 42.0 + DOWN * rows as f64;
+    let width = LEFT + PITCH * ABREAST as f64;
+    let mut picture = Picture::new(width, below + 4.0 * LINE + 20.0, title);
+    picture.text([24.0, 32.0], title, &Font::new(17.0, palette::INK).bold());
     for (number, column) in columns.iter().enumerate() {
-        let left = LEFT + PITCH * number as f64;
+        let left = LEFT + PITCH * (number % ABREAST) as f64;
+        let down = DOWN * (number / ABREAST) as f64;
         let heading = Font::new(14.0, palette::INK).bold();
-        picture.text([left, 62.0], &column.heading, &heading);
+        picture.text([left, down + 70.0], &column.heading, &heading);
         let views = Ingredients::of(&column.set.shape).views;
         if let Some(view) = views.first() {
-            image(&mut picture, left, column, view);
+            image(&mut picture, [left, down + TOP], column, view);
         }
-        floor(&mut picture, left, column, &views, reach, number == 0);
-        words(&mut picture, [left, bottom + 52.0], column);
+        let is_first = number.is_multiple_of(ABREAST);
+        floor(
+            &mut picture,
+            [left, down + FLOOR],
+            column,
+            &views,
+            reach,
+            is_first,
+        );
+        words(
+            &mut picture,
+            [left, down + FLOOR + FLOOR_HEIGHT + 52.0],
+            column,
+        );
     }
     legend(
         &mut picture,
-        [LEFT, bottom + 182.0],
+        [24.0, below],
         &[
             (
                 Sample::Patch(FROM_GOAL),
@@ -74,6 +94,7 @@ pub fn placement_picture(title: &str, columns: &[Column]) -> String {
                 Sample::Disc(palette::PAPER_SET),
                 "floor: the pose-set X\u{302} about the goal; the line of the margin says whether all of it is in S_l",
             ),
+            (Sample::Words, &cost),
         ],
     );
     picture.finish()
@@ -94,11 +115,11 @@ fn drawn(column: &Column) -> Option<PoseSetF64> {
     })
 }
 
-fn image(picture: &mut Picture, left: f64, column: &Column, view: &Visibility) {
+fn image(picture: &mut Picture, [left, top]: [f64; 2], column: &Column, view: &Visibility) {
     let camera = &view.camera;
     let scale = (IMAGE[0] / camera.width_px).min(IMAGE[1] / camera.height_px);
-    let at = |[u, v]: [f64; 2]| [left + u * scale, TOP + v * scale];
-    let edges = [left, TOP, camera.width_px * scale, camera.height_px * scale];
+    let at = |[u, v]: [f64; 2]| [left + u * scale, top + v * scale];
+    let edges = [left, top, camera.width_px * scale, camera.height_px * scale];
     let corners = |pose: [f64; 3]| {
         let alone = SuccessSet {
             goal: column.set.goal,
@@ -141,7 +162,7 @@ fn image(picture: &mut Picture, left: f64, column: &Column, view: &Visibility) {
         }
     });
     let caption = Font::new(11.0, palette::FAINT).anchored(Anchor::Middle);
-    let below = [left + 0.5 * edges[2], TOP + edges[3] + 16.0];
+    let below = [left + 0.5 * edges[2], top + edges[3] + 16.0];
     picture.text(
         below,
         &format!("image, {} x {} px", camera.width_px, camera.height_px),
@@ -151,7 +172,7 @@ fn image(picture: &mut Picture, left: f64, column: &Column, view: &Visibility) {
 
 fn floor(
     picture: &mut Picture,
-    left: f64,
+    [left, top]: [f64; 2],
     column: &Column,
     views: &[Visibility],
     reach: f64,
@@ -173,7 +194,7 @@ fn floor(
             y: [middle[1] - half, middle[1] + half],
         },
         left,
-        top: FLOOR,
+        top,
         scale,
         y_title: first,
     };
@@ -185,9 +206,11 @@ fn floor(
         if let Some(section) = drawn(column).and_then(|belief| belief.section(heading)) {
             inside.polygons(&[section], &palette::PAPER_SET);
         }
-        inside.pose(goal, &Style::outlined(palette::INK, 2.0));
+        // The arrows of a tag near the goal and of the goal are shorter, so that they do not meet.
+        let longest = 0.4 * scale * column.placed.distance;
+        inside.pose_with_arrow(goal, longest.min(26.0), &Style::outlined(palette::INK, 2.0));
         for view in views {
-            inside.tag(&view.tag);
+            inside.tag_with_arrow(&view.tag, Some(longest));
         }
     });
 }
@@ -253,7 +276,7 @@ fn words(picture: &mut Picture, [left, top]: [f64; 2], column: &Column) {
             0.0 => "none".into(),
             p_miss => format!("{p_miss:.1e}"),
         };
-        lines.push(format!("mean cost {:.2}, misses {misses}", mean.value));
+        lines.push(format!("mean cost E[c] {:.2}, misses {misses}", mean.value));
     }
     if let Some(margin) = placed.margin {
         lines.push(format!(

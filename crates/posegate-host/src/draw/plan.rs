@@ -26,9 +26,10 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
     };
     let before = study.ask(SEE, PoseSetSpec::ONE_METRE)?;
     let after = study.ask(DOCK, PoseSetSpec::FIVE_CENTIMETRES)?;
-    let title = "Floor plan: the robot at its goal, camera front, tag t7";
-    let mut picture = Picture::new(1160.0, 600.0, title);
-    picture.text([24.0, 32.0], title, &Font::new(19.0, palette::INK).bold());
+    let title = "Fig. 3, floor plan: the robot at its goal, camera front, tag t7";
+    // The words are below the panel: on a telephone they would be too small next to it.
+    let mut picture = Picture::new(680.0, 716.0, title);
+    picture.text([24.0, 32.0], title, &Font::new(17.0, palette::INK).bold());
     let panel = Panel {
         window: Window {
             x: [-2.0, 4.4],
@@ -36,7 +37,7 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
         },
         left: 66.0,
         top: 76.0,
-        scale: 110.0,
+        scale: 92.0,
         y_title: true,
     };
     let border = outline(success, 0.0, &panel.window, 1.0 / panel.scale);
@@ -69,17 +70,17 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
             palette::of_words(after.holds()),
         );
     });
-    let left = 806.0;
+    let (left, below) = (24.0, panel.bottom() + 44.0);
     verdict(
         &mut picture,
-        [left, 76.0],
+        [left, below],
         before.holds(),
         &words(&before, "S_l"),
         "before the localization",
     );
     verdict(
         &mut picture,
-        [left, 120.0],
+        [left, below + 44.0],
         after.holds(),
         &words(&after, "S_w"),
         "after it",
@@ -87,7 +88,7 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
     let psi = format!("{}° off the tag's normal", sight.psi_max_deg);
     legend(
         &mut picture,
-        [left, 176.0],
+        [left, below + 94.0],
         &[
             (Sample::SuccessSet, "S_l at yaw 0°"),
             (Sample::Patch(VIEW), "the camera's view at the goal"),

@@ -1,28 +1,221 @@
-//! Floor plan of a whole site.
+//! Floor plan of a whole site, and of the routes that a build of the site found.
 
 use super::hall::{hall, hall_legend};
+use super::legend::LINE;
+use super::measure::{fitted, text_width};
 use super::palette;
-use super::svg::{Font, Picture};
-use crate::plan::ChainReport;
+use super::svg::{Font, Picture, literal};
+use crate::plan::{Route, little_slack, margin_text};
 use crate::site::Site;
+use crate::site_build::{MergedPlan, MergedRoute};
+use posegate::contain::Margin;
 
 /// The largest panel, pixels: A4 paper shows the plan at its own size.
 const LARGEST: [f64; 2] = [600.0, 560.0];
 const LEFT: f64 = 66.0;
 const WIDTH: f64 = 690.0;
+const MARGIN: f64 = 24.0;
+/// Size of the words about a plan.
+const SIZE: f64 = 12.0;
+/// Largest number of plans with words of their own.
+const PLANS: usize = 60;
 
 /// Returns an SVG of a site's floor plan in the world, with the routes of some plans or chains.
 #[must_use]
-pub fn site_plan(site: &Site, routes: &[&ChainReport]) -> String {
-    let title = "The site, as its file says it";
+pub fn site_plan(site: &Site, routes: &[Route]) -> String {
+    with_notes(site, routes, "The site, as its file says it", &[])
+}
+
+/// Returns an SVG of a site with the routes of its plans, and words about each plan: its cost and smallest margin, or the
+/// reason why there is none.
+#[must_use]
+pub fn site_routes_picture(site: &Site, plans: &[MergedPlan]) -> String {
+    let found = plans.iter().filter_map(|plan| plan.found.as_ref().ok());
+    let routes: Vec<Route> = found.map(|found| found.route.clone()).collect();
+    let title = match (plans.len(), routes.len()) {
+        (0, _) => "The site: it was built without plans".to_owned(),
+        (1, 1) => "The site, with the route of its plan".to_owned(),
+        (all, served) if all == served => format!("The site, with the routes of its {all} plans"),
+        (all, served) => format!("The site: {served} of {all} plans found"),
+    };
+    with_notes(site, &routes, &title, &notes(site, plans))
+}
+
+/// A line of words below the picture; `true` for a good result.
+type Note = (String, bool);
+
+/// Returns the words about each plan: first the tasks without a plan.
+fn notes(site: &Site, plans: &[MergedPlan]) -> Vec<Note> {
+    let (mut notes, mut advice) = (Vec::new(), None);
+    for MergedPlan { from, task, found } in plans {
+        if let Err(why) = found {
+            notes.push((format!("{task} from {from}: NO PLAN: {why}"), false));
+        }
+    }
+    let with_plan = plans.iter().filter_map(|plan| {
+        let found = plan.found.as_ref().ok()?;
+        Some((plan, found))
+    });
+    for (MergedPlan { from, task, .. }, found) in with_plan {
+        let MergedRoute {
+            cost, worst_margin, ..
+        } = found;
+        let margin = Margin::from_q16((worst_margin * 65_536.0) as u32);
+        let mut text = format!(
+            "{task} from {from}: worst margin {}, cost {cost:.3}",
+            margin_text(margin)
+        );
+        if let Some(words) = little_slack(margin) {
+            text += ", little slack";
+            advice = advice.or(Some(words));
+        }
+        notes.push((text, true));
+    }
+    let more = notes.len().saturating_sub(PLANS);
+    if more > 0 {
+        let failed = notes.iter().skip(PLANS).filter(|(_, good)| !good).count();
+        notes.truncate(PLANS);
+        let text = format!("and {more} more plans, of which {failed} are not found");
+        notes.push((text, failed == 0));
+    }
+    if let Some(words) = advice {
+        notes.push((format!("little slack: {words}"), false));
+    }
+    if plans.iter().any(|plan| plan.found.is_ok()) {
+        let planner = &site.planner;
+        notes.push((
+            format!(
+                "costs are in the unit of the site file: {} a metre, {} a look",
+                planner.metre, planner.look_cost
+            ),
+            true,
+        ));
+    }
+    notes
+}
+
+fn with_notes(site: &Site, routes: &[Route], title: &str, notes: &[Note]) -> String {
+    let lines: Vec<Note> = notes
+        .iter()
+        .flat_map(|(text, good)| {
+            let lines = wrapped(&literal(text), WIDTH - 2.0 * MARGIN);
+            lines.into_iter().map(|line| (line, *good))
+        })
+        .collect();
     // The panel determines the height: draw it once for its size.
     let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
     let bottom = hall(&mut trial, site, routes, "", [LEFT, 50.0], LARGEST).bottom();
     let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
-    let legend = hall_legend(&mut trial, site, routes, [24.0, bottom]);
-    let mut picture = Picture::new(WIDTH, bottom + 46.0 + legend + 12.0, title);
-    picture.text([24.0, 30.0], title, &Font::new(19.0, palette::INK).bold());
+    let legend = hall_legend(&mut trial, site, routes, [MARGIN, bottom]);
+    let below = bottom + 46.0 + legend + 12.0;
+    let height = below
+        + match lines.len() {
+            0 => 0.0,
+            count => LINE * count as f64 + 12.0,
+        };
+    let mut picture = Picture::new(WIDTH, height, title);
+    let font = Font::new(19.0, palette::INK).bold();
+    picture.text([MARGIN, 30.0], title, &font);
     hall(&mut picture, site, routes, "", [LEFT, 50.0], LARGEST);
-    hall_legend(&mut picture, site, routes, [24.0, bottom + 46.0]);
+    hall_legend(&mut picture, site, routes, [MARGIN, bottom + 46.0]);
+    for (number, (line, good)) in lines.iter().enumerate() {
+        let at = [MARGIN, below + LINE * (number as f64 + 0.75)];
+        picture.text(at, line, &Font::new(SIZE, palette::of_words(*good)));
+    }
     picture.finish()
+}
+
+/// Breaks a text between words into lines that are at most as wide as `most` pixels.
+fn wrapped(text: &str, most: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        let fits = |line: &String| text_width(&format!("{line} {word}"), SIZE, false) <= most;
+        match lines.last_mut().filter(|line| fits(line)) {
+            Some(line) => *line = format!("{line} {word}"),
+            None => lines.push(fitted(word, SIZE, false, most)),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DOCK: &str = include_str!("../../../../examples/sites/dock.toml");
+
+    fn plan(task: &str, found: Result<MergedRoute, String>) -> MergedPlan {
+        MergedPlan {
+            from: "gate".into(),
+            task: task.into(),
+            found,
+        }
+    }
+
+    fn route(worst_margin: f64) -> MergedRoute {
+        MergedRoute {
+            route: Route { steps: Vec::new() },
+            cost: 4.8867,
+            worst_margin,
+        }
+    }
+
+    #[test]
+    fn picture_states_margin_and_cost_or_the_reason() {
+        let site = Site::parse(DOCK, "dock.toml").unwrap();
+        let plans = [
+            plan("dock-1", Ok(route(1.0899))),
+            plan("dock-3", Ok(route(1.0012))),
+            plan("dock-2", Err("no chain arrives at the work task".into())),
+        ];
+        let svg = site_routes_picture(&site, &plans);
+        // Rounded down, and the failure first.
+        let good = svg.find(">dock-1 from gate: worst margin 1.08, cost 4.887<");
+        let bad = svg.find(">dock-2 from gate: NO PLAN: no chain arrives at the work task<");
+        assert!(bad.unwrap() < good.unwrap(), "{svg}");
+        assert!(svg.contains(">The site: 2 of 3 plans found<"), "{svg}");
+        assert!(
+            svg.contains(">dock-3 from gate: worst margin 1.00, cost 4.887, little slack<")
+                && svg.contains(">little slack: this plan holds for hardly larger errors"),
+            "{svg}"
+        );
+        assert!(
+            svg.contains(">costs are in the unit of the site file: 1 a metre, 1 a look<"),
+            "{svg}"
+        );
+        let none = site_routes_picture(&site, &[]);
+        assert!(
+            none.contains(">The site: it was built without plans<"),
+            "{none}"
+        );
+    }
+
+    #[test]
+    fn long_lists_of_plans_end_with_their_number() {
+        let mut plans: Vec<MergedPlan> = (0..100)
+            .map(|number| plan(&format!("dock-{number}"), Ok(route(1.2))))
+            .collect();
+        plans.extend((0..2).map(|number| plan(&format!("bay-{number}"), Err("why".into()))));
+        let site = Site::parse(DOCK, "dock.toml").unwrap();
+        let notes = notes(&site, &plans);
+        assert_eq!(notes.len(), PLANS + 2);
+        assert!(!notes[0].1 && !notes[1].1 && notes[2].1);
+        assert_eq!(
+            notes[PLANS].0,
+            "and 42 more plans, of which 0 are not found"
+        );
+    }
+
+    #[test]
+    fn lines_are_broken_between_words() {
+        let text = "infeasible: no chain of the library is certain to succeed; ".repeat(4);
+        let lines = wrapped(text.trim_end(), 300.0);
+        assert!(lines.len() > 3);
+        assert_eq!(lines.join(" "), text.trim_end());
+        assert!(
+            lines
+                .iter()
+                .all(|line| text_width(line, SIZE, false) <= 300.0)
+        );
+    }
 }

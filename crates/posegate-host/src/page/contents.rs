@@ -9,7 +9,7 @@ use crate::draw::panel::Window;
 use crate::draw::site_plan;
 use crate::draw::{DrawError, Subject, chain_picture, success_of};
 use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
-use crate::plan::{ChainReport, Options, Plans, evaluate};
+use crate::plan::{ChainReport, Options, Plans, Route, evaluate};
 use crate::site::{Site, Task};
 use posegate::bake;
 use posegate::chain::StartAssumption;
@@ -124,9 +124,9 @@ impl Contents {
             })
             .collect();
         let (chains, plans) = (chains(site), plans(site));
-        let found = |list: &[ShownChain]| -> Vec<ChainReport> {
+        let found = |list: &[ShownChain]| -> Vec<Route> {
             let found = list.iter().filter_map(|shown| shown.found.as_ref().ok());
-            found.map(|(report, _)| report.clone()).collect()
+            found.map(|(report, _)| Route::from(report)).collect()
         };
         // The routes of the plans; without plans those of the chains in the site file.
         let mut routes = found(&plans);
@@ -134,7 +134,7 @@ impl Contents {
             routes = found(&chains);
         }
         let mut contents = Self {
-            plan: site_plan(site, &routes.iter().collect::<Vec<_>>()),
+            plan: site_plan(site, &routes),
             tasks: Vec::new(),
             left_out: Vec::new(),
             chains,

@@ -5,12 +5,12 @@ use serde_json::{Value, json};
 use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 use super::equal_tasks::{area, groups_of_equal};
 use super::figures::{base64, escaped, figure, folded, numbers, table};
-use super::summary::{summary, text as margin_text, worst};
+use super::summary::summary;
 use crate::draw::{
     Mounted, MountingSheet, SeenFrom, Subject, borders_picture, mounting_sheet, task_plan,
 };
 use crate::log::factor_text;
-use crate::plan::{ChainReport, StepKind};
+use crate::plan::{ChainReport, StepKind, margin_text};
 use crate::printable::fixed;
 use crate::site::{Site, SiteTag, TaskKind};
 use posegate::shape::{Pose3Deg, Tag};
@@ -338,7 +338,7 @@ fn chains(contents: &Contents) -> String {
                     };
                     row.extend([
                         end.clone(),
-                        worst(report).map_or_else(
+                        report.worst_margin().map_or_else(
                             || "unknown".into(),
                             |(margin, step)| {
                                 format!("{} at step {}", margin_text(margin), step + 1)
@@ -439,7 +439,7 @@ const PLACE_HEAD: [&str; 8] = [
     "y, m",
     "z, m",
     "yaw, deg",
-    "mean cost",
+    "mean cost, no unit",
     "P(miss)",
     "margin",
 ];
@@ -496,6 +496,10 @@ fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
         }
         text += "</div>\n";
         text += &table(&PLACE_HEAD, &rows);
+        // Older versions of `posegate place` do not state it.
+        if let Some(definition) = placement["cost_definition"].as_str() {
+            text += &format!("<p>Cost of a view: {}.</p>\n", escaped(definition));
+        }
     }
     Ok(text)
 }

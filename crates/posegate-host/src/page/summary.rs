@@ -4,10 +4,8 @@ use super::contents::{Contents, ShownChain};
 use super::figures::escaped;
 use crate::doctor::examine;
 use crate::draw::success_of;
-use crate::log::factor;
-use crate::plan::{ChainReport, StepKind, crossing_notes};
+use crate::plan::{StepKind, crossing_notes, little_slack, margin_text};
 use crate::site::{Site, TaskKind};
-use posegate::contain::Margin;
 use std::collections::BTreeSet;
 
 /// Returns the summary as HTML.
@@ -59,10 +57,12 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
             Ok((report, _)) => match report.first_failure() {
                 None => format!(
                     "chain {name} succeeds{}",
-                    worst(report).map_or_else(String::new, |(margin, _)| format!(
-                        ", worst margin {}",
-                        text(margin)
-                    ))
+                    report
+                        .worst_margin()
+                        .map_or_else(String::new, |(margin, _)| format!(
+                            ", worst margin {}",
+                            margin_text(margin)
+                        ))
                 ),
                 Some((step, _)) => {
                     failing += 1;
@@ -81,7 +81,7 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
     good &= failing == 0;
     // A proof is about the site file, so doubts about the file follow the claim.
     let warnings = examine(site).warnings;
-    let class = match (good, warnings.is_empty()) {
+    let class = match (good, warnings.is_empty() && !line.has_little_slack) {
         (true, true) => "good",
         (true, false) => "warned",
         (false, _) => "bad",
@@ -101,13 +101,13 @@ pub(super) fn summary(site: &Site, contents: &Contents) -> String {
     )
 }
 
-/// Below this margin, errors that are a little larger than stated break a plan.
-const LITTLE_SLACK: f64 = 1.05;
-
-/// The first line; `true` if all tasks are served.
+/// The first line.
 struct Line {
     text: String,
+    /// `true` if all tasks are served.
     good: bool,
+    /// `true` if the worst margin is hardly above 1.
+    has_little_slack: bool,
 }
 
 /// Returns the line about the plans, with notes; an empty line without plans.
@@ -115,7 +115,12 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
     let mut notes = Vec::new();
     if plans.is_empty() {
         let text = String::new();
-        return (Line { text, good: true }, notes);
+        let line = Line {
+            text,
+            good: true,
+            has_little_slack: false,
+        };
+        return (line, notes);
     }
     let reports = || {
         let found = plans
@@ -156,17 +161,15 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
         };
         text += &format!(" by {number}");
     }
-    let all = reports().filter_map(|(name, report)| Some((worst(report)?, name)));
+    let mut has_little_slack = false;
+    let all = reports().filter_map(|(name, report)| Some((report.worst_margin()?, name)));
     if let Some(((margin, step), name)) = all.min_by_key(|((margin, _), _)| margin.q16()) {
-        text += &format!(", worst margin {}, proven", self::text(margin));
+        text += &format!(", worst margin {}, proven", margin_text(margin));
+        has_little_slack = little_slack(margin).is_some();
         notes.push(format!(
             "the worst margin is that of step {} to {name}: a margin is how many times as large the uncertainty could be before the step is no longer certain{}",
             step + 1,
-            if factor(margin) < LITTLE_SLACK {
-                ". This plan holds for hardly larger errors than stated: state them with slack, or let the tasks allow more"
-            } else {
-                ""
-            }
+            little_slack(margin).map_or_else(String::new, |advice| format!("; {advice}"))
         ));
     }
     let unused = site.tags.len() - tags.len();
@@ -187,17 +190,80 @@ fn served(site: &Site, plans: &[ShownChain], works: &[&String]) -> (Line, Vec<St
         }
     }
     let good = count == plans.len();
-    (Line { text, good }, notes)
+    let line = Line {
+        text,
+        good,
+        has_little_slack,
+    };
+    (line, notes)
 }
 
-/// Returns the smallest margin of a chain with the number of its step, from 0.
-pub(super) fn worst(report: &ChainReport) -> Option<(Margin, usize)> {
-    let steps = report.steps.iter().enumerate();
-    let margins = steps.filter_map(|(number, step)| Some((step.margin?, number)));
-    margins.min_by_key(|(margin, _)| margin.q16())
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Options, Plans};
 
-/// Formats a margin with two decimals, rounded down: the printed value is proven.
-pub(super) fn text(margin: Margin) -> String {
-    format!("{:.2}", libm::floor(factor(margin) * 100.0) / 100.0)
+    const PAPER: &str = include_str!("../../../../examples/sites/paper-chain.toml");
+
+    /// Returns the summary of the paper's site with two more work tasks: `dock` with a plan, `bay` with a reason why it has
+    /// none, or as many of them as `count`, and `yard` without a start.
+    fn text_of(count: usize) -> String {
+        let task = |name: &str| {
+            format!(
+                "[task.{name}]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\n\
+                 success = {{ shape = \"box\", x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-4.0, 4.0] }}\n"
+            )
+        };
+        let text = format!("{PAPER}\n{}{}", task("bay"), task("yard"));
+        let site = Site::parse(&text, "site.toml").unwrap();
+        let planned = Plans::of(&site).plan("back-to-dock", "dock", &Options::default());
+        let report = planned.unwrap().unwrap().plan.unwrap().report();
+        let shown = |name: &str, found| ShownChain {
+            name: name.into(),
+            found,
+        };
+        let mut plans = vec![
+            shown("dock", Ok((report, String::new()))),
+            shown("bay", Err("no chain arrives".into())),
+        ];
+        plans.truncate(count);
+        let contents = Contents {
+            plan: String::new(),
+            tasks: Vec::new(),
+            left_out: Vec::new(),
+            chains: Vec::new(),
+            plans,
+        };
+        summary(&site, &contents)
+    }
+
+    #[test]
+    fn summary_states_served_and_not_served_and_unknown() {
+        let text = text_of(2);
+        assert!(
+            text.starts_with(
+                "<p id=\"summary\" class=\"bad\">1 of 2 work tasks served by 1 tag, worst margin 1.12, proven</p>"
+            ),
+            "{text}"
+        );
+        for note in [
+            "<li>NOT served: bay: no chain arrives</li>",
+            "<li>unknown whether a robot can reach yard: no start is given, as `from`</li>",
+            "<li>unknown how far off 1 of 1 tags may be mounted: the site file states no tolerance</li>",
+            "<li>0 of 4 success sets proven, as tables for a controller</li>",
+        ] {
+            assert!(text.contains(note), "{note}: {text}");
+        }
+        assert!(!text.contains("hardly larger errors"), "{text}");
+        let served = text_of(1);
+        assert!(
+            served.contains(">1 of 1 work tasks served by 1 tag, ")
+                && !served.contains("NOT served")
+                && served.contains("<li>unknown whether a robot can reach bay, yard: "),
+            "{served}"
+        );
+        // Without a plan nothing is served, and the line says what is proven.
+        let none = text_of(0);
+        assert!(none.contains(">0 of 4 success sets proven</p>"), "{none}");
+    }
 }

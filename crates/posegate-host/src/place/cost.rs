@@ -53,6 +53,15 @@ impl Cost {
         Ok(())
     }
 
+    /// Returns the definition of the cost in words, with its unit.
+    #[must_use]
+    pub fn definition(&self) -> String {
+        format!(
+            "{} d^2 + {} phi^2 + {} psi^2 (m, rad), {} outside of S; no unit",
+            self.c1, self.c2, self.c3, self.c_high
+        )
+    }
+
     /// Returns the cost of a view `[d, phi, psi]`, m and rad.
     #[must_use]
     pub fn of_view(&self, [d, phi, psi]: [f64; 3]) -> f64 {

@@ -84,6 +84,13 @@ impl ViewCost for LearntCost<'_> {
         self.c_high
     }
 
+    fn definition(&self) -> String {
+        format!(
+            "100 times the error model's bound in metres plus its bound in degrees, {} outside of S; no unit",
+            self.c_high
+        )
+    }
+
     /// A learnt bound has jumps and kinks at the borders of its cells. So the relative error is never below
     /// 1e-4, and the number of views is limited.
     fn quadrature(&self, requested: Quadrature) -> Quadrature {

@@ -66,6 +66,9 @@ pub trait ViewCost: Sync {
     /// Returns the cost of a pose outside S.
     fn of_miss(&self) -> f64;
 
+    /// Returns the definition of the cost in words, with its unit.
+    fn definition(&self) -> String;
+
     /// Returns `true` if the cost of every view is known to be finite.
     fn is_finite(&self) -> bool {
         false
@@ -84,6 +87,10 @@ impl ViewCost for Cost {
 
     fn of_miss(&self) -> f64 {
         self.c_high
+    }
+
+    fn definition(&self) -> String {
+        Self::definition(self)
     }
 
     fn is_finite(&self) -> bool {

@@ -234,7 +234,9 @@ impl Attempt<'_> {
     fn nearest(&self, miss: &NearMiss) -> Nearest {
         let [rho, alpha] = miss.belief.enclosing();
         Nearest {
-            scale: miss.scale,
+            // The search widens its sets by the smallest margin.
+            scale: miss.scale * self.site.planner.least_margin,
+            least: self.site.planner.least_margin,
             set: [rho + miss.belief.spread[0], alpha + miss.belief.spread[1]],
             after: miss
                 .after

@@ -5,6 +5,8 @@
 //! plan's looks without one of them, and single looks near the path. It only proposes: the places are added to the
 //! library, and planning runs again, with its proofs.
 
+use rayon::prelude::*;
+
 use super::costs::distance;
 use super::library::{facing, needed};
 use super::problem::drive_to;
@@ -125,11 +127,15 @@ impl FewerLooks<'_> {
             .collect();
         begun.sort_by(|a, b| a.0.total_cmp(&b.0));
         begun.truncate(BEGINNINGS);
-        let ends = begun.into_iter().map(|(value, mut places)| {
-            let value = self.descend(chain, &mut places, value);
-            (value, places)
-        });
-        let best = ends.min_by(|a, b| a.0.total_cmp(&b.0));
+        // The descents are independent of each other, and take most of the time of a plan.
+        let ends: Vec<(f64, Vec<[f64; 3]>)> = begun
+            .into_par_iter()
+            .map(|(value, mut places)| {
+                let value = self.descend(chain, &mut places, value);
+                (value, places)
+            })
+            .collect();
+        let best = ends.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         best.unwrap_or((f64::INFINITY, vec![]))
     }
 
@@ -233,7 +239,8 @@ impl FewerLooks<'_> {
             }
             metres += length;
             let table = look.map_or(self.work, |look| &self.tables[look]);
-            misfit += missing_scale(table, &belief);
+            let scale = SCALE * self.site.planner.least_margin();
+            misfit += missing_scale(table, &belief, scale);
             risk += belief.risk();
             if let Some(look) = look {
                 let bound = self.library.looks[look].bound;
@@ -253,8 +260,8 @@ impl FewerLooks<'_> {
 }
 
 /// Returns the difference of the required scale and that of a belief's set; 0 if the set fits.
-fn missing_scale(table: &Table<'_>, belief: &BeliefStateF64) -> f64 {
-    let Some(set) = needed(belief, SCALE) else {
+fn missing_scale(table: &Table<'_>, belief: &BeliefStateF64, scale: f64) -> f64 {
+    let Some(set) = needed(belief, scale) else {
         return 2.0;
     };
     if decide(table, &set) == Decision::Inside {

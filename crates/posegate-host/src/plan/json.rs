@@ -156,10 +156,15 @@ impl PlanResult {
                     None => "without a look".into(),
                 };
                 text += &format!(
-                    "; the nearest miss is {after}: the robot arrives within {:.3} m and {:.2} deg, but only a set {:.3} times as large would fit; mount a tag that is seen nearer to the task, allow more at the task, or state drives that err less",
+                    "; the nearest miss is {after}: the robot arrives within {:.3} m and {:.2} deg, but only a set {:.3} times as large would fit{}; mount a tag that is seen nearer to the task, allow more at the task, or state drives that err less",
                     miss.set[0],
                     miss.set[1].to_degrees(),
-                    miss.scale
+                    miss.scale,
+                    if miss.least > 1.0 {
+                        format!(", and the site's `least_margin` is {}", miss.least)
+                    } else {
+                        String::new()
+                    }
                 );
             }
             None => text += "; no chain arrives at the work task",

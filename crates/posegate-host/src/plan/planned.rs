@@ -86,6 +86,8 @@ pub struct Contingency {
 pub struct Nearest {
     /// The scale at which the set would fit.
     pub scale: f64,
+    /// The scale at which it must fit: `least_margin` of `[planner]`.
+    pub least: f64,
     /// The set: translation, yaw (m, rad), the estimate's spread included.
     pub set: [f64; 2],
     /// The name of the look before the arrival; `None` if the robot arrives without a look.
@@ -133,20 +135,28 @@ impl PlanResult {
         Some(gap)
     }
 
-    /// Returns `true` if the core's evaluation satisfies the options.
-    pub(super) fn satisfies(&self, options: &Options) -> bool {
+    /// Returns `true` if the core's evaluation satisfies the options, and every margin is at least `least`.
+    pub(super) fn satisfies(&self, options: &Options, least: f64) -> bool {
         let Some(plan) = &self.plan else {
             return false;
         };
         let within = |risk: f64| risk <= options.most_risk + 1e-12;
+        let least = libm::floor(least * 65_536.0) as u32;
+        let has_slack = |plan: &Plan| {
+            let worst = plan.report().worst_margin();
+            worst.is_none_or(|(margin, _)| margin.q16() >= least)
+        };
         let other = |other: &Contingency| {
-            other.plan.report().succeeds() && within(other.risk_before + other.plan.risk)
+            other.plan.report().succeeds()
+                && has_slack(&other.plan)
+                && within(other.risk_before + other.plan.risk)
         };
         let survives = !options.survive_a_lost_tag
             || plan.steps.iter().enumerate().all(|(number, step)| {
                 step.tags.is_empty() || self.contingencies.iter().any(|c| c.step == number)
             });
         plan.report().succeeds()
+            && has_slack(plan)
             && within(plan.risk)
             && survives
             && (!options.survive_a_lost_tag || self.contingencies.iter().all(other))

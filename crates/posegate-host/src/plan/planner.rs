@@ -313,6 +313,7 @@ impl<'a> Prepared<'a> {
     ) -> Result<PlanResult, PlanError> {
         let mut bound = None;
         for wider in WIDER {
+            let wider = wider * self.site.planner.least_margin();
             let (planned, satisfies) =
                 self.plan_proven(start, work_table, options, wider, &mut graph, fallback)?;
             if planned.plan.is_none() && bound.is_none() || satisfies {
@@ -367,6 +368,7 @@ impl<'a> Prepared<'a> {
             } else {
                 Sharpness::Holds
             };
+            let least = self.site.planner.least_margin();
             for step in planned.steps_mut() {
                 let name = step.report.task.as_deref();
                 let table = match step.report.kind {
@@ -383,7 +385,7 @@ impl<'a> Prepared<'a> {
                 let failed = step.report.failure.is_some();
                 if table.is_proven()
                     || failed
-                    || proofs.certify(&mut step.report, &table.success, sharpness)
+                    || proofs.certify(&mut step.report, &table.success, sharpness, least)
                 {
                     continue;
                 }
@@ -399,7 +401,7 @@ impl<'a> Prepared<'a> {
                 return Ok((planned, false));
             }
             if !changed {
-                let satisfies = planned.satisfies(options);
+                let satisfies = planned.satisfies(options, least);
                 return Ok((planned, satisfies));
             }
             *graph = None;

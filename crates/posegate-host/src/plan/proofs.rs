@@ -24,7 +24,7 @@ const SHARES: [f64; 4] = [0.98, 0.9, 0.75, 0.0];
 /// A task and the numbers of a set, bit by bit.
 type Key = (String, Vec<u64>);
 
-/// The proven margins of sets. The key is a task's name, so all plans that share the proofs must have the same tasks.
+/// The proven margins of sets. The key is a task's name, so all plans that share the proofs must be of one site.
 #[derive(Debug, Default)]
 pub(super) struct Proofs {
     /// The proven margin in units of 2^-16; `None` if the set could not be proven to fit.
@@ -32,19 +32,20 @@ pub(super) struct Proofs {
 }
 
 impl Proofs {
-    /// Proves that the set a step relies on lies inside its success set, scaled by a share of the table's margin. The
-    /// reported margin is then the proven one.
+    /// Proves that the set a step relies on lies inside its success set, scaled by a share of the table's margin, but at
+    /// least by `least`. The reported margin is then the proven one.
     pub fn certify(
         &self,
         report: &mut StepReport,
         success: &SuccessSet,
         sharpness: Sharpness,
+        least: f64,
     ) -> bool {
         let key = key(report, sharpness);
         let known = self.known.lock().ok();
         let known = known.and_then(|known| known.get(&key).copied());
         let proven = known.unwrap_or_else(|| {
-            let proven = proven(report, success, sharpness);
+            let proven = proven(report, success, sharpness, least);
             if let Ok(mut known) = self.known.lock() {
                 known.insert(key, proven);
             }
@@ -57,7 +58,12 @@ impl Proofs {
     }
 }
 
-fn proven(report: &StepReport, success: &SuccessSet, sharpness: Sharpness) -> Option<u32> {
+fn proven(
+    report: &StepReport,
+    success: &SuccessSet,
+    sharpness: Sharpness,
+    least: f64,
+) -> Option<u32> {
     let margin = report.margin.map_or(0.0, crate::log::factor);
     let prover = Prover::new(success);
     let shares = match sharpness {
@@ -66,7 +72,7 @@ fn proven(report: &StepReport, success: &SuccessSet, sharpness: Sharpness) -> Op
     };
     let mut tried = f64::INFINITY;
     for share in shares {
-        let scale = (share * margin).clamp(1.0, 8.0);
+        let scale = (share * margin).clamp(least, 8.0);
         if scale >= tried {
             break;
         }

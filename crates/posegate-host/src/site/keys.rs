@@ -645,7 +645,7 @@ pub(super) const CONTROLLER: Key = Key::new(
 // The planner.
 pub(super) const PLANNER: Key = Key::new(
     "planner",
-    "a table with `look`, `r`, `metre`, `look_cost`, `views` and `range`",
+    "a table with `look`, `r`, `metre`, `look_cost`, `views`, `range` and `least_margin`",
     "{ look = { camera = \"front\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 50.0 }, r = [[0.05, 2.0]] }",
 );
 pub(super) const PLANNER_LOOK: Key = Key::new(
@@ -665,6 +665,15 @@ pub(super) const PLANNER_VIEWS: Key = Key::new(
     "views",
     "the number of places from which a tag is observed: a whole number from 1 to 64",
     "6",
+);
+fn margin(number: f64) -> bool {
+    (1.0..=8.0).contains(&number)
+}
+pub(super) const PLANNER_LEAST_MARGIN: Key = Key::number(
+    "least_margin",
+    "the smallest margin of each step of a plan, from 1 to 8",
+    "1.1",
+    margin,
 );
 pub(super) const PLANNER_RANGE: Key = Key::number(
     "range",

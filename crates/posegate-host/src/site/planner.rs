@@ -22,10 +22,20 @@ pub struct Planner {
     pub views: u32,
     /// The longest drive, metres.
     pub range: f64,
+    /// The smallest margin of each step of a plan, 1 to 8: each pose-set, as many times as large, must be inside.
+    pub least_margin: f64,
     /// The localization tasks generated from the site's tags, by name.
     pub looks: BTreeMap<String, GeneratedLook>,
     /// The localization tasks generated from the candidates, by name. Plans do not use them.
     pub offers: BTreeMap<String, GeneratedLook>,
+}
+
+impl Planner {
+    /// Returns the smallest margin of each step of a plan, rounded up to the unit of proven margins, 2^-16.
+    #[must_use]
+    pub fn least_margin(&self) -> f64 {
+        libm::ceil(self.least_margin * 65_536.0) / 65_536.0
+    }
 }
 
 /// A localization task generated from a tag.
@@ -46,6 +56,7 @@ impl Default for Planner {
             look_cost: 1.0,
             views: 6,
             range: 20.0,
+            least_margin: 1.0,
             looks: BTreeMap::new(),
             offers: BTreeMap::new(),
         }
@@ -64,6 +75,7 @@ pub(super) fn planner(
         &keys::PLANNER_LOOK_COST,
         &keys::PLANNER_VIEWS,
         &keys::PLANNER_RANGE,
+        &keys::PLANNER_LEAST_MARGIN,
     ])?;
     let mut planner = Planner::default();
     let number = |key| match table.optional(key) {
@@ -73,6 +85,7 @@ pub(super) fn planner(
     planner.metre = number(&keys::PLANNER_METRE)?.unwrap_or(planner.metre);
     planner.look_cost = number(&keys::PLANNER_LOOK_COST)?.unwrap_or(planner.look_cost);
     planner.range = number(&keys::PLANNER_RANGE)?.unwrap_or(planner.range);
+    planner.least_margin = number(&keys::PLANNER_LEAST_MARGIN)?.unwrap_or(planner.least_margin);
     if let Some(node) = table.optional(&keys::PLANNER_VIEWS) {
         planner.views = node.whole(1..=64)?;
     }

@@ -38,7 +38,13 @@ pub(super) fn draw(picture: &mut Picture, top: f64, mounted: &Mounted, walls: &[
         picture.text([VALUES, y], &text, &value);
     }
     image(picture, [IMAGE_COLUMN + 10.0, top + 22.0], mounted);
-    measured(picture, top + 232.0, &planned(mounted, on.as_ref()));
+    let has_reserve = mounted.reserve.is_some();
+    measured(
+        picture,
+        top + 232.0,
+        &planned(mounted, on.as_ref()),
+        has_reserve,
+    );
     ticks(picture, [IMAGE_COLUMN, top + 232.0], on.is_some());
     let drawing = top + 350.0;
     match &on {
@@ -208,15 +214,13 @@ fn planned(mounted: &Mounted, on: Option<&OnWall>) -> Vec<Quantity> {
     rows
 }
 
-/// Draws the table for measured values.
-fn measured(picture: &mut Picture, top: f64, rows: &[Quantity]) {
+/// Draws the table for measured values. Without a known reserve there is nothing to tick.
+fn measured(picture: &mut Picture, top: f64, rows: &[Quantity], has_reserve: bool) {
     let columns = [SIDES[0], 170.0, 280.0, 430.0];
     let head = Font::new(11.0, palette::FAINT);
-    for (x, title) in
-        columns
-            .into_iter()
-            .zip(["measure", "planned", "measured", "within the reserve"])
-    {
+    let titles = ["measure", "planned", "measured", "within the reserve"];
+    let count = if has_reserve { 4 } else { 3 };
+    for (x, title) in columns.into_iter().zip(titles).take(count) {
         picture.text([x, top], title, &head);
     }
     let font = Font::new(13.0, palette::INK);
@@ -228,7 +232,9 @@ fn measured(picture: &mut Picture, top: f64, rows: &[Quantity]) {
         picture.rectangle([columns[2], y, 130.0, 20.0], &BOX);
         // In the box, so that nobody writes centimetres.
         picture.text([columns[2] + 124.0, y + 15.0], unit.trim_start(), &faint);
-        picture.rectangle([columns[3], y + 3.0, 14.0, 14.0], &BOX);
+        if has_reserve {
+            picture.rectangle([columns[3], y + 3.0, 14.0, 14.0], &BOX);
+        }
     }
 }
 

@@ -173,6 +173,43 @@ fn block_lists_the_values_to_measure_on_the_wall() {
     assert_ne!(images(&sheet), images(&changed));
 }
 
+/// The fields of a tag on a stand, and those of a tag that must be mounted exactly.
+#[test]
+fn block_states_what_is_unknown_and_what_is_exact() {
+    let mut tag = mounted("pole-1", "tag36h11", 5, [-1.5, 2.0, 0.75, 45.0]);
+    tag.tag.pose.pitch_deg = -10.0;
+    let sheet = mounting_sheet(&of(&[tag.clone()], &[]));
+    for text in [
+        ">pole-1: tag36h11 id 5</text>",
+        ">none: on a stand of its own</text>",
+        ">x \u{2212}1.500 m, y 2.000 m in the site's frame</text>",
+        ">0.750 m above the floor</text>",
+        ">roll 0°, pitch \u{2212}10°; its face looks to yaw 45°</text>",
+        ">size 300 mm over the border that is measured, 375 mm in all</text>",
+        ">unknown: survey it after mounting</text>",
+    ] {
+        assert!(sheet.contains(text), "{text}: {sheet}");
+    }
+    assert!(!sheet.contains("beyond it") && !sheet.contains("corner A"));
+    // Nobody can tick that an unknown reserve is kept.
+    assert!(!sheet.contains("within the reserve"), "{sheet}");
+    tag.reserve = Some(Tolerance::NONE);
+    let sheet = mounting_sheet(&of(&[tag.clone()], &[]));
+    assert!(sheet.contains(">mount it exactly: nothing is allowed for errors</text>"));
+    // Rounded down: the installer may rely on it.
+    tag.reserve = Some(Tolerance {
+        translation: 0.0199,
+        turn_deg: 0.5,
+    });
+    tag.left = Some(1.29);
+    let sheet = mounting_sheet(&of(&[tag], &[]));
+    assert!(
+        sheet.contains(">it may be off by 19 mm and 0.5°</text>")
+            && sheet.contains(">still seen if it is 12 mm and 1.2° more off,</text>"),
+        "{sheet}"
+    );
+}
+
 #[test]
 fn pages_are_a4_and_each_has_two_blocks() {
     let tags: Vec<Mounted> = (0..5)

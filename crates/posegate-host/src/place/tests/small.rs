@@ -138,6 +138,10 @@ impl ViewCost for Within {
         1e6
     }
 
+    fn definition(&self) -> String {
+        Cost::default().definition()
+    }
+
     fn quadrature(&self, requested: Quadrature) -> Quadrature {
         Quadrature {
             accuracy: requested.accuracy.max(1e-4),
