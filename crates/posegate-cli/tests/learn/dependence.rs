@@ -162,7 +162,7 @@ fn regions_hold_if_frames_depend_on_each_other() {
 #[ignore = "takes minutes: ./ci.sh deep"]
 fn regions_hold_if_frames_depend_on_each_other_in_many_data_sets() {
     let cases = QUANTILES.map(|quantile| [(0.0, quantile), (0.3, quantile)]);
-    check(240, cases.as_flattened());
+    check(120, cases.as_flattened());
 }
 
 /// With independent rows each bound holds with the stated confidence, at every share, also where tags flip.
@@ -201,7 +201,7 @@ fn regions_hold_if_rows_are_independent() {
 #[test]
 #[ignore = "takes minutes: ./ci.sh deep"]
 fn regions_hold_if_rows_are_independent_in_many_data_sets() {
-    check_independent(200);
+    check_independent(60);
 }
 
 /// The test above finds rows that are wrongly taken as independent.
