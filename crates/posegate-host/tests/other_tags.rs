@@ -1,4 +1,5 @@
-//! A model that was learnt with tags of one size, scaled to tags of another size that the same camera sees.
+//! A model that was learnt with tags of one size, scaled to tags of another size that the same camera sees. A model of one mount of
+//! the camera is not valid for another mount.
 
 use posegate::shape::{Camera, Pose3Deg, Tag, Tolerance};
 use posegate_host::learn::{
@@ -22,9 +23,14 @@ const MOUNT: Pose3Deg = Pose3Deg {
 
 /// Returns the detections of tags of a size (m): corners with an error of 0.3 px, at distances of 8 to 24 times the size.
 fn detections(size: f64, seed: u64, rows: u64) -> Detections {
+    detections_of(MOUNT, size, seed, rows)
+}
+
+/// The same for a camera at another `x` and `yaw_deg` on the robot.
+fn detections_of(mount: Pose3Deg, size: f64, seed: u64, rows: u64) -> Detections {
     let camera = MountedCamera {
         camera: Camera::pinhole([1280.0, 960.0], [FOCAL; 2], [640.0, 480.0]),
-        mount: MOUNT,
+        mount,
         mount_tolerance: Tolerance::NONE,
     };
     let tag = Tag {
@@ -61,10 +67,12 @@ fn detections(size: f64, seed: u64, rows: u64) -> Detections {
             tolerance: Tolerance::NONE,
             corners_px,
         };
+        let heading = yaw - mount.yaw_deg.to_radians();
+        let (sin, cos) = heading.sin_cos();
         let robot = [
-            camera_at[0] - cos * MOUNT.x,
-            camera_at[1] - sin * MOUNT.x,
-            yaw,
+            camera_at[0] - cos * mount.x,
+            camera_at[1] - sin * mount.x,
+            heading,
         ];
         let errors = locate(&camera, &[seen], 0.3, 11.3449).ok().map(|fix| {
             let [x, y, turned] = [0, 1, 2].map(|i| fix.pose[i] - robot[i]);
@@ -175,5 +183,38 @@ fn bounds_are_scaled_to_tags_of_another_size() {
         (0.2, f64::INFINITY),
     ] {
         assert!(large.for_tags_of(size, lever, 0.0).is_none());
+    }
+}
+
+/// Bounds are valid for the mount of the data, and for one that differs by no more than two files of one mount may. If the camera is
+/// before the reference point instead of behind it, or a metre farther away, they are not.
+#[test]
+fn bounds_are_not_valid_for_another_mount() {
+    let model = learnt(0.1);
+    let of = |x: f64, yaw_deg: f64| {
+        let mount = Pose3Deg {
+            x,
+            yaw_deg,
+            ..MOUNT
+        };
+        let (share, count) = held(&model, &detections_of(mount, 0.1, 4, 6_000));
+        println!("mounted at {x} m, {yaw_deg} deg: {share:?} of {count}");
+        assert!(count > 5_000.0, "{count}");
+        share
+    };
+    for (x, yaw_deg) in [
+        (MOUNT.x, 0.0),
+        (MOUNT.x - 0.001, 0.1),
+        (MOUNT.x + 0.001, -0.1),
+    ] {
+        let share = of(x, yaw_deg);
+        assert!(
+            share[1] >= QUANTILE - 0.01 && share[2] >= QUANTILE - 0.01,
+            "{share:?}"
+        );
+    }
+    for (x, yaw_deg) in [(-MOUNT.x, 0.0), (MOUNT.x - 1.0, 0.0), (MOUNT.x, 90.0)] {
+        let share = of(x, yaw_deg);
+        assert!(share[1] < QUANTILE - 0.05, "{share:?}");
     }
 }

@@ -5,10 +5,10 @@ use posegate_host::files::{Files, Input};
 use posegate_host::learn::TakenWith;
 use posegate_host::site::Site;
 
-/// The camera and the tags of the data. A site whose camera or tag differs refuses the model.
+/// The camera and the tags of the data. A site whose camera, mount or tag differs refuses the model.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The camera of the site (--site) with which the detections were taken
+    /// The camera of the site (--site) with which the detections were taken, at its mount on the robot
     #[arg(long, requires = "site")]
     camera: Option<String>,
     /// The site file that has the camera; the tags are those of the site if all are equal

@@ -146,11 +146,18 @@ impl Distribution {
 
     /// Returns the share of translation errors at a place that are at most `bound`.
     pub fn share_within(&self, at: [f64; 3], bound: f64) -> f64 {
-        let flips = (self.flips)(at);
+        self.shares_within(at, [bound, 0.0])[0]
+    }
+
+    /// Returns the shares of translation and of yaw errors at a place that are at most their bounds.
+    pub fn shares_within(&self, at: [f64; 3], bounds: [f64; 2]) -> [f64; 2] {
+        let (sigma, flips) = ((self.sigma)(at), (self.flips)(at));
         let half_normal = |x: f64| error_function(x / core::f64::consts::SQRT_2);
-        let plain = half_normal(bound / (self.sigma)(at));
-        let flipped = half_normal((bound - 1.0).max(0.0) / (self.sigma)(at));
-        (1.0 - flips) * plain + flips * flipped
+        let share = |bound: f64, sigma: f64| {
+            let flipped = half_normal((bound - 1.0).max(0.0) / sigma);
+            (1.0 - flips) * half_normal(bound / sigma) + flips * flipped
+        };
+        [share(bounds[0], sigma), share(bounds[1], 0.2 * sigma)]
     }
 
     /// Returns the q-quantile of the translation error at a place.

@@ -129,6 +129,8 @@ fn bounds_for_both_poses_ignore_flips() {
     let ratio = of_one.bounds_deg(flipping).unwrap().0 / of_both.bounds_deg(flipping).unwrap().0;
     assert!(ratio > 5.0, "{ratio}");
     let (mut held, mut tried) = (0, 0);
+    // Where tags flip: the views, and those in which the detector's own pose is within both bounds.
+    let (mut own, mut far) = (0, 0);
     for (at, poses) in of_both_poses(33, 20_000) {
         let Some((translation, yaw)) = of_both.bounds_deg(at) else {
             continue;
@@ -138,7 +140,15 @@ fn bounds_for_both_poses_ignore_flips() {
             .iter()
             .any(|pose| pose[0] <= translation && pose[1] <= yaw);
         held += u32::from(within);
+        if at[0] > 5.0 && at[2] < 20.0 {
+            far += 1;
+            own += u32::from(poses[0][0] <= translation && poses[0][1] <= yaw);
+        }
     }
+    assert!(
+        far > 500 && f64::from(own) < 0.95 * f64::from(far),
+        "{own} of {far}"
+    );
     assert!(
         tried > 15_000 && f64::from(held) >= 0.98 * f64::from(tried),
         "{held} of {tried}"

@@ -1,8 +1,9 @@
-//! A learnt model records what its detections were taken with, and a site with another camera or tag refuses it by name.
+//! A learnt model records what its detections were taken with, and a site with another camera, mount or tag refuses it by name.
 
 use crate::command::{lines, run, write};
 use crate::distribution::SQUARES;
 use posegate_host::site::SAMPLE;
+use serde_json::json;
 use std::fmt::Write;
 
 const LOOK: &str = "
@@ -109,6 +110,81 @@ fn site_with_another_camera_or_tag_is_refused() {
     assert_eq!(code, 2, "{err}");
     assert!(
         joined(&err).contains("tags of the family tag36h11, not tag25h9"),
+        "{err}"
+    );
+}
+
+/// The errors are those of the robot's reference point, so a model is for one mount of the camera.
+#[test]
+fn site_with_another_mount_is_refused() {
+    let folder = folder();
+    let learn =
+        "learn bounds d.csv --quantile 0.9 -o m.toml --camera front --site site.toml --json";
+    let (code, out, err) = run(&folder, learn);
+    assert_eq!(code, 0, "{err}");
+    let mount =
+        json!({"x": 0.25, "y": 0.0, "z": 0.5, "roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0});
+    assert_eq!(lines(&out)[0]["taken_with"]["mount"], mount, "{out}");
+    let from =
+        "mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }";
+    let tolerance = "\nmount_tolerance = { translation = 0.01, angle_deg = 1.0 }";
+    // Room for the errors from the tolerance, which the bound of a look includes.
+    let look = LOOK.replace(
+        "translation = 0.04, yaw_deg = 1.0",
+        "translation = 0.2, yaw_deg = 4.0",
+    );
+    assert_ne!(look, LOOK);
+    let at = |x: f64, yaw: f64, tolerance: &str| {
+        let numbers = format!("x = {x:?}, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0");
+        let to = format!("mount = {{ {numbers}, yaw_deg = {yaw:?} }}{tolerance}");
+        assert!(SAMPLE.contains(from));
+        write(
+            &folder,
+            "there.toml",
+            &(SAMPLE.replacen(from, &to, 1) + &look),
+        );
+        let (code, _, err) = run(&folder, "check there.toml");
+        (code, joined(&err))
+    };
+    for (x, yaw, tolerance, accepted) in [
+        (0.25, 0.0, "", true),
+        (0.2509, 0.09, "", true),
+        (0.25, 360.0, "", true),
+        (0.252, 0.0, "", false),
+        (0.25, 0.2, "", false),
+        (-0.25, 180.0, "", false),
+        (0.26, 0.0, tolerance, true),
+        (0.25, 1.0, tolerance, true),
+        (0.262, 0.0, tolerance, false),
+        (0.25, -1.1, tolerance, false),
+    ] {
+        let (code, err) = at(x, yaw, tolerance);
+        assert_eq!(
+            code,
+            if accepted { 0 } else { 2 },
+            "{x} {yaw} {tolerance}: {err}"
+        );
+        let named = "mounted at (0.25, 0, 0.5) m with roll 0, pitch 0, yaw 0 deg, not at";
+        assert_eq!(err.contains(named), !accepted, "{x} {yaw}: {err}");
+    }
+    // Models without a mount are read as before, and their mount is not compared.
+    let text = std::fs::read_to_string(folder.path().join("m.toml")).unwrap();
+    let start = text.find("[taken_with.mount]").unwrap();
+    let end = start + text[start + 1..].find("\n[").unwrap() + 2;
+    write(
+        &folder,
+        "m.toml",
+        &format!("{}{}", &text[..start], &text[end..]),
+    );
+    let (code, err) = at(-0.25, 180.0, "");
+    assert_eq!(code, 0, "{err}");
+    // An impossible mount is refused.
+    let impossible = text.replacen("\nx = 0.25", "\nx = nan", 1);
+    assert_ne!(impossible, text);
+    write(&folder, "m.toml", &impossible);
+    let (code, err) = at(0.25, 0.0, "");
+    assert!(
+        code == 2 && err.contains("mount has finite numbers"),
         "{err}"
     );
 }

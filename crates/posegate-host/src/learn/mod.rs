@@ -17,7 +17,7 @@ pub use self::outcomes::{OutcomesReport, outcomes, test_outcomes};
 pub use self::runs::{RunSource, Runs};
 pub use self::sequence::confidence_sequence;
 pub use self::survey::{Look, OffsetReport, Surveyed, SurveyedSite, looks, survey};
-pub use self::taken_with::TakenWith;
+pub use self::taken_with::{MountRecord, TakenWith};
 pub use self::views::ViewBox;
 
 mod axis;

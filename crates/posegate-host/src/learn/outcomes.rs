@@ -140,6 +140,20 @@ mod tests {
         assert!(contradicted(0.03) >= 390, "{}", contradicted(0.03));
     }
 
+    /// Each docking must succeed with the probability for any earlier results. If failures come in series of 20, the claim is true on
+    /// average, and false after the first failure of a series: such fleets are contradicted.
+    #[test]
+    fn failures_in_series_contradict_a_claim_that_is_true_on_average() {
+        let contradicted = (0..400).filter(|seed| {
+            let series = fleet(*seed, 75, 0.01);
+            let dockings: Vec<bool> = series.iter().flat_map(|ok| [*ok; 20]).collect();
+            let found = test_outcomes(&dockings, 0.99, 0.05).unwrap();
+            found.contradicted_at.is_some()
+        });
+        let count = contradicted.count();
+        assert!(count > 100, "{count}");
+    }
+
     #[test]
     fn e_value_equals_the_hand_computed_one() {
         let found = test_outcomes(&[true; 100], 0.9, 0.05).unwrap();

@@ -8,7 +8,7 @@ use super::{ErrorBound, SiteCamera, SiteTag, keys};
 use crate::learn::{ErrorModel, TakenWith};
 use posegate::shape::{Exclusion, Shape, Visibility};
 
-/// Refuses a model whose detections were taken with another camera or other tags, if both are known.
+/// Refuses a model whose detections were taken with another camera, another mount or other tags, if both are known.
 pub(super) fn same(
     node: &Node<'_>,
     model: &ErrorModel,
@@ -20,7 +20,9 @@ pub(super) fn same(
         family: Some(tag.family.clone()),
         ..camera.taken_with()
     };
-    let Some(difference) = model.taken_with().and_then(|taken| taken.difference(&here)) else {
+    let taken = model.taken_with();
+    let Some(difference) = taken.and_then(|taken| taken.difference(&here, camera.mount_tolerance))
+    else {
         return Ok(());
     };
     Err(node
@@ -28,12 +30,12 @@ pub(super) fn same(
             "the error model of `{}` was learnt with {difference} as here",
             node.path()
         ))
-        .expected("the camera and the tags with which its detections were taken")
-        .help("take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`. If only the size of the tags differs, `tag_size` in the [error_model] table scales the model"))
+        .expected("the camera, its mount and the tags with which its detections were taken")
+        .help("take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`. If only the size of the tags differs, `tag_size` in the [error_model] table scales the model. If the same mount was measured again, compute the errors with its new numbers, or state a `mount_tolerance` that covers the difference"))
 }
 
 impl SiteCamera {
-    /// Returns the description of this camera that a model learnt with it records.
+    /// Returns the description of this camera and its mount that a model learnt with it records.
     #[must_use]
     pub fn taken_with(&self) -> TakenWith {
         let [fx, fy] = self.calibration.focal_px;
@@ -45,6 +47,7 @@ impl SiteCamera {
             lens: Some(self.calibration.lens.name().to_owned()),
             tag_size: None,
             family: None,
+            mount: Some(self.mount.into()),
         }
     }
 }
