@@ -44,12 +44,12 @@ mod firmware {
     use cortex_m_rt::{ExceptionFrame, entry, exception};
     use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprintln;
-    use posegate::contain::{self, Decision, Examination, Margin, second};
+    use posegate::contain::{self, Cause, Decision, Examination, Margin, second};
     use posegate::pose::Pose;
     use posegate::report::PoseEstimate;
     use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
     use posegate::sight::{Scene, Sighting, TagVisibility};
-    use posegate::table::Table;
+    use posegate::table::{Table, WorstCase};
 
     static DOCK: &[u8] = include_bytes!("tables/dock.posegate");
     static SEE_T7: &[u8] = include_bytes!("tables/see-t7.posegate");
@@ -59,6 +59,8 @@ mod firmware {
     static CORNER: &[u8] = include_bytes!("../tests/data/corner.posegate");
     /// Cells of the whole circle, and cells with facets over headings about half a turn.
     static WHOLE_CIRCLE: &[u8] = include_bytes!("../tests/data/whole-circle.posegate");
+    /// A narrow band of cells, in which each row of a set along the band needs both of its tests.
+    static DIAGONAL: &[u8] = include_bytes!("../tests/data/diagonal.posegate");
     static OVER_180: &[u8] = include_bytes!("../tests/data/over-180.posegate");
 
     /// Iterations of a loop that checks the whole measurement, and the allowed cost of its call.
@@ -281,6 +283,102 @@ mod firmware {
         );
         if search.cost() > u64::from(bound) {
             return Err("a decision costs more than the table's worst case");
+        }
+        match search.most_expensive(radius) {
+            Some(set) if !by_facets => runs(counter, name, table, &set),
+            _ => Ok(()),
+        }
+    }
+
+    /// Prints the cost of a decision's most expensive run, with that of the slab it may begin: the difference of two limits of runs.
+    /// Fails if it is above the price that `worst_case` takes.
+    fn runs(
+        counter: &mut Counter,
+        name: &str,
+        table: &Table<'_>,
+        set: &PoseSet,
+    ) -> Result<(), Failure> {
+        let up_to = |limit: u32| decide(&table.clone().within(limit), set);
+        let ends = |limit: u32| up_to(limit) != Decision::Outside(Cause::TooCostly);
+        let (mut few, mut enough) = (0, table.worst_case().runs);
+        while enough - few > 1 {
+            let limit = few + (enough - few) / 2;
+            if ends(limit) {
+                enough = limit;
+            } else {
+                few = limit;
+            }
+        }
+        let mut highest = 0;
+        for run in (1..enough).step_by(enough as usize / 64 + 1) {
+            let mut cost = |limit: u32| -> Result<u64, Failure> {
+                let table = table.clone().within(limit);
+                Ok(counter
+                    .count(|| decide(black_box(&table), black_box(set)))?
+                    .0)
+            };
+            highest = highest.max(cost(run + 1)?.saturating_sub(cost(run)?));
+        }
+        let price = |worst: WorstCase| {
+            u64::from(if M4F {
+                worst.instructions_m4f()
+            } else {
+                worst.instructions_m0_plus()
+            })
+        };
+        let none = WorstCase::default();
+        let one = WorstCase {
+            slabs: 1,
+            runs: 1,
+            ..none
+        };
+        let most = price(one) - price(none);
+        counter.line(
+            "most expensive run,",
+            name,
+            highest,
+            "instructions",
+            Some(most),
+        );
+        if highest > most {
+            return Err("a run costs more than its price in the table's worst case");
+        }
+        Ok(())
+    }
+
+    /// Decides sets along a diagonal band of cells, where every row needs both of its tests.
+    fn along_a_band(counter: &mut Counter, table: &Table<'_>) -> Result<(), Failure> {
+        let goal_pose = table.goal().pose;
+        let estimate = Estimate {
+            x_m: f64::from(goal_pose.x_um) * 1e-6,
+            y_m: f64::from(goal_pose.y_um) * 1e-6,
+            yaw_rad: 0.0,
+        };
+        let yaw: f64 = 2.4 * PI / 180.0;
+        for (name, short) in [
+            ("decide diagonal, thin set", 0.01),
+            ("decide diagonal, thick set", 0.02),
+        ] {
+            let (mean, half) = (0.5 * (0.16 + short * short), 0.5 * (0.16 - short * short));
+            let c = 0.2 * short * yaw;
+            let covariance = [[mean, half, c], [half, mean, -c], [c, -c, yaw * yaw]];
+            let set = PoseSet::gaussian(estimate, covariance, table.radius_squared())
+                .map_err(|_| "a set along the band was refused")?;
+            let cost = counter.count(|| decide(black_box(table), black_box(&set)))?;
+            let worst = table.worst_case();
+            let bound = u64::from(if M4F {
+                worst.instructions_m4f()
+            } else {
+                worst.instructions_m0_plus()
+            });
+            counter.line("", name, cost.0, "instructions", Some(bound));
+            if cost.1 != Decision::Inside {
+                return Err("the band does not hold a set along it");
+            }
+            if cost.0 > bound {
+                return Err("a decision costs more than the table's worst case");
+            }
+            runs(counter, name, table, &set)?;
         }
         Ok(())
     }
@@ -511,6 +609,7 @@ mod firmware {
         let _ = counter.print("decide whole circle, every heading, ellipsoid", || {
             decide(black_box(&circle), black_box(&narrow))
         })?;
+        along_a_band(&mut counter, &parse(DIAGONAL)?)?;
         for (name, bytes, about) in [
             ("decide see-t7 grid", SEE_T7_GRID, (ABOUT, DEAR_SEE_T7_GRID)),
             (

@@ -28,6 +28,7 @@ use std::sync::LazyLock;
 
 const VECTORS: &str = "tests/data/vectors.bin";
 const WHOLE_CIRCLE: &str = "tests/data/whole-circle.posegate";
+const DIAGONAL: &str = "tests/data/diagonal.posegate";
 const TURNING: &str = "tests/data/turning.posegate";
 const OVER_180: &str = "tests/data/over-180.posegate";
 const CORNER: &str = "tests/data/corner.posegate";
@@ -43,11 +44,12 @@ const TABLES: [&str; 7] = [
 ];
 type Maker = fn() -> Vec<u8>;
 /// The tables that are made here.
-const MADE: [(&str, Maker); 4] = [
+const MADE: [(&str, Maker); 5] = [
     (WHOLE_CIRCLE, wrapped::whole_circle),
     (TURNING, wrapped::turning),
     (OVER_180, wrapped::over_180),
     (CORNER, wrapped::corner),
+    (DIAGONAL, wrapped::diagonal),
 ];
 /// Facets, a grid, both.
 const LAYOUTS: [&str; 3] = ["facets", "grid", "both"];

@@ -127,6 +127,12 @@ impl Search {
         is_highest
     }
 
+    /// Returns the most expensive set.
+    pub fn most_expensive(&mut self, radius: RadiusSquared) -> Option<PoseSet> {
+        self.genes = self.best;
+        self.set(radius)
+    }
+
     /// Returns the cost of the most expensive set.
     pub const fn cost(&self) -> u64 {
         self.cost

@@ -61,6 +61,7 @@ pub(super) fn covers<S: Section>(
             return Err(section.yaw_end(true).into());
         }
     }
+    let mut shared = S::Shared::default();
     // On the whole circle the range may begin one turn early or end one turn late.
     let mut turns = if low < 0 { TURN.wrapping_neg() } else { 0 };
     let mut k = cells.slab_of(low.wrapping_sub(turns));
@@ -77,7 +78,15 @@ pub(super) fn covers<S: Section>(
             section.yaw_q24(),
         );
         if let Some(window) = window {
-            covers_slab(&grid.slab(k), cells, [x, y], section, window, &mut left)?;
+            covers_slab(
+                &grid.slab(k),
+                cells,
+                [x, y],
+                section,
+                window,
+                &mut shared,
+                &mut left,
+            )?;
         }
         k = k.saturating_add(1);
         if k >= cells.slabs {
@@ -111,6 +120,7 @@ fn covers_slab<S: Section>(
     [x, y]: [i64; 2],
     section: &S,
     yaw: [i64; 2],
+    shared: &mut S::Shared,
     left: &mut u32,
 ) -> Result<(), Stop> {
     let cut = section.cut(yaw);
@@ -143,7 +153,7 @@ fn covers_slab<S: Section>(
             ],
             yaw,
         };
-        let fits = |run: Run| {
+        let mut fits = |run: Run| {
             let (from, to) = (i64::from(run.first), i64::from(run.last));
             let left = || {
                 x.wrapping_sub(from.wrapping_mul(step))
@@ -155,10 +165,10 @@ fn covers_slab<S: Section>(
                     .wrapping_sub(x)
                     .wrapping_sub(SLACK_UM)
             };
-            if !(from <= first || section.fits_row(Side::Left, &window, left())) {
+            if !(from <= first || section.fits_row(Side::Left, &window, left(), shared)) {
                 return Err(Side::Left);
             }
-            if !(to >= last || section.fits_row(Side::Right, &window, right())) {
+            if !(to >= last || section.fits_row(Side::Right, &window, right(), shared)) {
                 return Err(Side::Right);
             }
             Ok(())

@@ -63,13 +63,15 @@ impl Offset {
 /// A pose-set as the walk needs it. The methods that end in `_end` are for reports and decide
 /// nothing.
 pub trait Section {
+    /// What tests of rows share. It is computed at the first use, so a walk keeps it from row to row; a new one gives the same answers.
+    type Shared: Default;
     /// Returns the largest yaw offset, 2^-24 turn.
     fn yaw_q24(&self) -> i64;
     /// Returns the reach of the set for yaw offsets in a window, rounded up.
     fn cut(&self, yaw: [i64; 2]) -> Cut;
     /// Returns `true` only if no pose of the set within the window is farther than `room` to that
     /// side.
-    fn fits_row(&self, side: Side, window: &Window, room: i64) -> bool;
+    fn fits_row(&self, side: Side, window: &Window, room: i64, shared: &mut Self::Shared) -> bool;
     /// Returns the pose of largest (`high`) or smallest yaw.
     fn yaw_end(&self, high: bool) -> Offset;
     /// Returns the pose of largest (`high`) or smallest y within a yaw window.
@@ -134,6 +136,8 @@ impl Disc {
 }
 
 impl Section for Disc {
+    type Shared = ();
+
     fn yaw_q24(&self) -> i64 {
         self.yaw
     }
@@ -148,7 +152,7 @@ impl Section for Disc {
     }
 
     /// Exact: `room^2 + y^2 >= radius^2` at the window's nearest y.
-    fn fits_row(&self, _side: Side, window: &Window, room: i64) -> bool {
+    fn fits_row(&self, _side: Side, window: &Window, room: i64, (): &mut ()) -> bool {
         let y = self.nearest_y(window.y);
         room >= 0 && wide_square(room).wrapping_add(wide_square(y)) >= wide_square(self.radius)
     }
@@ -259,39 +263,67 @@ impl Ellipsoid {
         ])
     }
 
-    /// Returns approximately the touching point of a row window: the point farthest along `row` on
+    /// Returns approximately the touching point of a row window: the point farthest towards a side on
     /// the edge of the window that is nearer to the slab's own farthest point.
     ///
     /// `None` if the slab's farthest point lies within the row: then the row does not sharpen the
     /// bound.
-    fn touch(&self, row: [i32; 3], window: &Window) -> Option<Touch> {
-        let Offset([_, y, _]) = self.offset(self.farthest(row, window.yaw));
+    fn touch(&self, side: Side, window: &Window, shared: &mut Shared) -> Option<Touch> {
+        let shared = match side {
+            Side::Left => &mut shared.left,
+            Side::Right => &mut shared.right,
+        };
+        let farthest_y = match shared.farthest_y {
+            Some((yaw, y)) if yaw == window.yaw => y,
+            _ => {
+                let Offset([_, y, _]) = self.offset(self.farthest(self.towards(side), window.yaw));
+                shared.farthest_y = Some((window.yaw, y));
+                y
+            }
+        };
         let [low, high] = window.y;
-        let edge = if y < low {
+        let edge = if farthest_y < low {
             low
-        } else if y > high {
+        } else if farthest_y > high {
             high
         } else {
             return None;
         };
-        Some(Touch::at(&self.factor, row, edge, window.yaw))
+        let factor = shared
+            .factor
+            .get_or_insert_with(|| FactorWithYFirst::new(&self.factor, self.towards(side)));
+        Some(Touch::at(*factor, edge, window.yaw))
     }
 }
 
-/// The factor with y first, `y = Y1 v1, yaw = T1 v1 + T2 v2, x = X1 v1 + X2 v2 + X3 v3`, and a point
-/// v of the unit sphere in it. All values are approximate and not trusted: they only propose
-/// multipliers.
-struct Touch {
+/// What tests of rows of an ellipsoid share: half of the work of a test.
+#[derive(Default)]
+pub struct Shared {
+    left: SharedBySide,
+    right: SharedBySide,
+}
+
+#[derive(Default)]
+struct SharedBySide {
+    factor: Option<FactorWithYFirst>,
+    /// A yaw window, and the y of the point that is farthest to the side in it.
+    farthest_y: Option<([i64; 2], i64)>,
+}
+
+/// The factor with y first, `y = Y1 v1, yaw = T1 v1 + T2 v2, x = X1 v1 + X2 v2 + X3 v3`, with x towards a side. All values are
+/// approximate and not trusted: they only propose multipliers.
+#[derive(Clone, Copy)]
+struct FactorWithYFirst {
     y1: i64,
     t1: i64,
     t2: i64,
     x: [i64; 3],
-    v: [i64; 3],
+    /// Length of `(X2, X3)`.
+    across: i64,
 }
 
-impl Touch {
-    /// Returns the point farthest along `row` where y is `edge` and the yaw lies in a window.
-    fn at(factor: &SqrtFactor, row: [i32; 3], edge: i64, [e0, e1]: [i64; 2]) -> Self {
+impl FactorWithYFirst {
+    fn new(factor: &SqrtFactor, row: [i32; 3]) -> Self {
         let yaw = i64::from(factor.yaw);
         let [row1, _, _] = row.map(i64::from);
         let [fy1, _, _] = factor.y.map(i64::from);
@@ -302,9 +334,35 @@ impl Touch {
         let x2 = ratio(yaw.wrapping_mul(row1).wrapping_sub(x1.wrapping_mul(t1)), t2);
         let across = dot(row, row).wrapping_sub(x1.wrapping_mul(x1));
         let x3 = root(across.wrapping_sub(x2.wrapping_mul(x2))).max(1);
+        Self {
+            y1,
+            t1,
+            t2,
+            x: [x1, x2, x3],
+            across: root(across).max(1),
+        }
+    }
+}
+
+/// A point v of the unit sphere. Approximate and not trusted, as the factor.
+struct Touch {
+    factor: FactorWithYFirst,
+    v: [i64; 3],
+}
+
+impl Touch {
+    /// Returns the point farthest along x where y is `edge` and the yaw lies in a window.
+    fn at(factor: FactorWithYFirst, edge: i64, [e0, e1]: [i64; 2]) -> Self {
+        let FactorWithYFirst {
+            y1,
+            t1,
+            t2,
+            x: [_, x2, _],
+            across,
+        } = factor;
         let v1 = clamped(ratio(edge.wrapping_mul(UNIT), y1), -UNIT, UNIT);
         let left = rest(v1, 0);
-        let free = ratio(left.wrapping_mul(x2), root(across).max(1));
+        let free = ratio(left.wrapping_mul(x2), across);
         // The yaw at a v2, and the v2 at a yaw.
         let at = |v2: i64| t1.wrapping_mul(v1).wrapping_add(t2.wrapping_mul(v2)) >> UNIT_BITS;
         let held = |e: i64| ratio(e.wrapping_mul(UNIT).wrapping_sub(t1.wrapping_mul(v1)), t2);
@@ -317,10 +375,7 @@ impl Touch {
         };
         let v2 = clamped(v2, left.wrapping_neg(), left);
         Self {
-            y1,
-            t1,
-            t2,
-            x: [x1, x2, x3],
+            factor,
             v: [v1, v2, rest(v1, v2)],
         }
     }
@@ -328,37 +383,43 @@ impl Touch {
     /// Returns the outward normal of the ellipsoid at v, `(along the row, along y, along yaw)`, from
     /// `F' a = k v`, scaled so that the first entry is v3.
     fn normal(&self) -> [i64; 3] {
-        let [x1, x2, x3] = self.x;
+        let FactorWithYFirst {
+            y1,
+            t1,
+            t2,
+            x: [x1, x2, x3],
+            ..
+        } = self.factor;
         let [v1, v2, v3] = self.v;
         let along = v3.max(1);
-        let yaw = ratio(
-            v2.wrapping_mul(x3).wrapping_sub(x2.wrapping_mul(along)),
-            self.t2,
-        );
+        let yaw = ratio(v2.wrapping_mul(x3).wrapping_sub(x2.wrapping_mul(along)), t2);
         let y = ratio(
             v1.wrapping_mul(x3)
                 .wrapping_sub(x1.wrapping_mul(along))
-                .saturating_sub(self.t1.saturating_mul(yaw)),
-            self.y1,
+                .saturating_sub(t1.saturating_mul(yaw)),
+            y1,
         );
         [along, y, yaw]
     }
 
     /// Returns the offset of v: along the row, y, yaw.
     fn offset(&self) -> [i64; 3] {
-        let [x1, x2, x3] = self.x;
+        let FactorWithYFirst {
+            y1,
+            t1,
+            t2,
+            x: [x1, x2, x3],
+            ..
+        } = self.factor;
         let [v1, v2, v3] = self.v;
         let sum = x1
             .wrapping_mul(v1)
             .wrapping_add(x2.wrapping_mul(v2))
             .wrapping_add(x3.wrapping_mul(v3));
-        let yaw = self
-            .t1
-            .wrapping_mul(v1)
-            .wrapping_add(self.t2.wrapping_mul(v2));
+        let yaw = t1.wrapping_mul(v1).wrapping_add(t2.wrapping_mul(v2));
         [
             sum >> UNIT_BITS,
-            self.y1.wrapping_mul(v1) >> UNIT_BITS,
+            y1.wrapping_mul(v1) >> UNIT_BITS,
             yaw >> UNIT_BITS,
         ]
     }
@@ -368,6 +429,8 @@ impl Touch {
 const LARGEST_MULTIPLIER: u64 = 1 << 31;
 
 impl Section for Ellipsoid {
+    type Shared = Shared;
+
     fn yaw_q24(&self) -> i64 {
         i64::from(self.factor.yaw)
     }
@@ -392,9 +455,9 @@ impl Section for Ellipsoid {
     /// with the maxima over the window's ends. If the right side is at most `a_x room`, no such pose
     /// has x above `room`. The last comparison is exact, so soundness does not depend on the
     /// multipliers. They come from the touching point, which makes the bound tight.
-    fn fits_row(&self, side: Side, window: &Window, room: i64) -> bool {
+    fn fits_row(&self, side: Side, window: &Window, room: i64, shared: &mut Shared) -> bool {
         let row = self.towards(side);
-        let Some(touch) = self.touch(row, window) else {
+        let Some(touch) = self.touch(side, window, shared) else {
             return false;
         };
         let [ax, ay, at] = touch.normal();
@@ -439,7 +502,7 @@ impl Section for Ellipsoid {
 
     fn row_end(&self, side: Side, window: &Window) -> Offset {
         let row = self.towards(side);
-        match self.touch(row, window) {
+        match self.touch(side, window, &mut Shared::default()) {
             None => self.offset(self.farthest(row, window.yaw)),
             Some(touch) => {
                 let [along, y, yaw] = touch.offset();

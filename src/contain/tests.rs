@@ -1,4 +1,4 @@
-use super::section::{Cut, Disc, Ellipsoid, Offset, Section, Side, Window};
+use super::section::{Cut, Disc, Ellipsoid, Offset, Section, Shared, Side, Window};
 use super::support::{SupportPoint, dot, held, reach, squared_length, wide_square};
 use super::*;
 use crate::num::BinaryAngle;
@@ -116,8 +116,8 @@ fn discs_reach_as_far_as_a_circle() {
         assert_eq!(disc.row_end(Side::Right, &window), Offset([x, y, 2]));
         assert_eq!(disc.row_end(Side::Left, &window), Offset([-x, y, 2]));
         for side in [Side::Left, Side::Right] {
-            assert!(disc.fits_row(side, &window, x));
-            assert!(!disc.fits_row(side, &window, x - 1));
+            assert!(disc.fits_row(side, &window, x, &mut Default::default()));
+            assert!(!disc.fits_row(side, &window, x - 1, &mut Default::default()));
         }
     }
 }
@@ -305,6 +305,28 @@ proptest! {
         }
     }
 
+    /// What a walk keeps from row to row changes no answer, in any order of sides, rows and slabs.
+    #[test]
+    fn shared_values_change_no_answer(
+        factor in factors(),
+        rows in proptest::collection::vec((0usize..2, 0usize..3, -1.0f64..1.0, -1.0f64..1.2), 1..12),
+    ) {
+        let section = Ellipsoid::new(factor);
+        let reach = |row: [i32; 3]| row.iter().fold(0.0, |sum: f64, v| sum.hypot(f64::from(*v)));
+        let mut shared = Shared::default();
+        for (side, slab, y, room) in rows {
+            let low = (y * reach(factor.y)) as i64;
+            let edge = |share: i64| i64::from(factor.yaw) * share / 3;
+            let slab = slab as i64 * 2 - 3;
+            let window = Window { y: [low, low + 1 + (reach(factor.y) / 50.0) as i64], yaw: [edge(slab), edge(slab + 2)] };
+            let (side, room) = ([Side::Left, Side::Right][side], (room * reach(factor.x)) as i64);
+            prop_assert_eq!(
+                section.fits_row(side, &window, room, &mut shared),
+                section.fits_row(side, &window, room, &mut Shared::default())
+            );
+        }
+    }
+
     /// The certificate of a row is never wrong, and only slightly too strict.
     #[test]
     fn ellipsoids_fit_a_row_where_they_do(
@@ -327,10 +349,10 @@ proptest! {
                 Side::Left => (reference.left(), -1.0),
                 Side::Right => (reference, 1.0),
             };
-            prop_assert!(!section.fits_row(side, &window, -(1 << 30)) || reference.farthest(y, yaw).is_none());
+            prop_assert!(!section.fits_row(side, &window, -(1 << 30), &mut Default::default()) || reference.farthest(y, yaw).is_none());
             let Some([expected, ..]) = reference.farthest(y, yaw) else { continue };
             for less in [0.5, 10.0, 1e3, 1e5, 1e8] {
-                prop_assert!(!section.fits_row(side, &window, (expected - less).floor() as i64));
+                prop_assert!(!section.fits_row(side, &window, (expected - less).floor() as i64, &mut Default::default()));
             }
             let size = reference.x.iter().fold(0.0, |sum: f64, v| sum + v.abs());
             let sums = reference.y.iter().fold(0.0, |sum: f64, v| sum + v.abs());
@@ -346,7 +368,7 @@ proptest! {
             // If the farthest point of the slab is far from the row, the row sharpens the bound.
             let [_, free, _] = reference.farthest(NO_ROW, yaw).unwrap();
             if free < y[0] - 3.0 - 1e-3 * sums || free > y[1] + 3.0 + 1e-3 * sums {
-                prop_assert!(section.fits_row(side, &window, most as i64), "{expected} {most}");
+                prop_assert!(section.fits_row(side, &window, most as i64, &mut Default::default()), "{expected} {most}");
             }
             let Offset([x, row, offset]) = section.row_end(side, &window);
             let (x, row, offset) = (sign * x as f64, row as f64, offset as f64);
@@ -412,7 +434,7 @@ fn a_row_helps_only_beside_the_farthest_point() {
     for side in [Side::Left, Side::Right] {
         let fits = |y: [i64; 2]| {
             let yaw = [-1000, 1000];
-            section.fits_row(side, &Window { y, yaw }, 1 << 30)
+            section.fits_row(side, &Window { y, yaw }, 1 << 30, &mut Default::default())
         };
         assert!(!fits([0, 50]) && !fits([-50, 0]) && !fits([-50, 50]));
         assert!(fits([1, 50]) && fits([-50, -1]));
@@ -449,7 +471,12 @@ fn multipliers_have_a_limit() {
             y: y_um,
             yaw: yaw_q24,
         };
-        Ellipsoid::new(SqrtFactor { yaw, x, y }).fits_row(Side::Right, &window, room)
+        Ellipsoid::new(SqrtFactor { yaw, x, y }).fits_row(
+            Side::Right,
+            &window,
+            room,
+            &mut Default::default(),
+        )
     };
     // The multiplier of yaw is 2^20 times the last entry of x.
     let with = |last: i32| {

@@ -47,13 +47,13 @@ def separators():
         nonlocal all_of
         all_of = separator if all_of is None else all_of & separator
 
+    # Nine constraints imply all: the robot moves in the plane, so a corner's side does not depend on its height, and a corner
+    # below the upper edge of the image is in front of the camera.
     for y in (-HALF, HALF):
-        for z in (Z - HALF, Z + HALF):
-            depth, left, up = seen(X, y, z)
-            add(at_least_zero(depth - 0.05))
-            add(at_least_zero(WIDTH / 2 * depth - F * left))
-            add(at_least_zero(WIDTH / 2 * depth + F * left))
-            add(at_least_zero(HEIGHT / 2 * depth - F * up))
+        depth, left, up = seen(X, y, Z + HALF)
+        add(at_least_zero(WIDTH / 2 * depth - F * left))
+        add(at_least_zero(WIDTH / 2 * depth + F * left))
+        add(at_least_zero(HEIGHT / 2 * depth - F * up))
     depth, left, _ = seen(X, 0.0, Z)
     distance = sqrt(sqr(X - p[0]) + sqr(p[1]) + Z * Z)
     cosine = lambda degrees: math.cos(math.radians(degrees))

@@ -71,12 +71,14 @@ fn order<'a>(site: &'a Site, task: &'a str, layout: Layout, step: Step) -> BakeI
     }
 }
 
-/// Returns the bytes, and the least seconds of three runs to bake and prove them.
+/// Returns the bytes, and the least seconds of ten runs to bake and prove them on one thread: processor time, as codac's.
 fn built(order: &BakeInput<'_>) -> (Vec<u8>, f64) {
     let mut best = (Vec::new(), f64::INFINITY);
-    for _ in 0..3 {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let one = one.expect("a thread");
+    for _ in 0..10 {
         let start = Instant::now();
-        let (bytes, _) = build(order, &|| ()).expect("a proven table");
+        let (bytes, _) = one.install(|| build(order, &|| ()).expect("a proven table"));
         best = (bytes, best.1.min(start.elapsed().as_secs_f64()));
     }
     best
@@ -92,10 +94,13 @@ fn paving(lines: &mut Lines) {
         xy: 0.01,
         yaw_deg: 0.5,
     };
-    for (name, layout, step, goals) in [
-        ("facets, 2 cm / 1 deg", Layout::Facets, coarse, true),
-        ("grid, 2 cm / 1 deg", Layout::Grid, coarse, false),
-        ("grid, 1 cm / 0.5 deg", Layout::Grid, fine, false),
+    // The chords of facets follow a curve to half of the step.
+    let finest = Step { xy: 0.004, ..fine };
+    for (name, layout, step, least) in [
+        ("facets, 2 cm / 1 deg", Layout::Facets, coarse, Some(6.16)),
+        ("facets, 4 mm / 0.5 deg", Layout::Facets, finest, Some(6.25)),
+        ("grid, 2 cm / 1 deg", Layout::Grid, coarse, None),
+        ("grid, 1 cm / 0.5 deg", Layout::Grid, fine, None),
     ] {
         let order = order(&site, "see", layout, step);
         let (bytes, seconds) = built(&order);
@@ -111,20 +116,13 @@ fn paving(lines: &mut Lines) {
         let start = Instant::now();
         verify(&bytes, &claim, &|| ()).expect("a proof");
         let proof = start.elapsed().as_secs_f64();
-        let goal = |goal| if goals { goal } else { Goal::None };
+        let (least, most) = match least {
+            Some(least) => (Goal::AtLeast(least), Goal::AtMost(0.2)),
+            None => (Goal::None, Goal::None),
+        };
         let line = |what: &str| format!("paving, {name}: {what}");
-        lines.line(
-            &line("proven inside"),
-            volume,
-            "m3",
-            goal(Goal::AtLeast(6.16)),
-        );
-        lines.line(
-            &line("baked and proven"),
-            seconds,
-            "s",
-            goal(Goal::AtMost(1.0)),
-        );
+        lines.line(&line("proven inside"), volume, "m3", least);
+        lines.line(&line("baked and proven"), seconds, "s", most);
         lines.line(&line("proven again"), proof, "s", Goal::AtMost(5.0));
         lines.line(&line("table"), bytes.len() as f64, "B", Goal::None);
     }

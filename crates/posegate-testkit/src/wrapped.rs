@@ -127,6 +127,26 @@ pub fn corner() -> Vec<u8> {
     build(&order, &|| ()).expect("a table that is proven").0
 }
 
+/// Returns a table whose cells are a narrow band from one corner to the other: a set along the band needs both tests of every row, the
+/// most expensive walk.
+pub fn diagonal() -> Vec<u8> {
+    let band = |row: u16| vec![run(row.saturating_sub(5), (row + 5).min(99))];
+    let slabs: Vec<Rows> = vec![(0..100).map(band).collect(); 2];
+    let spec = TableSpec {
+        extent: Extent {
+            x: [-1.0, 1.0],
+            y: [-1.0, 1.0],
+            yaw_deg: [-10.0, 10.0],
+        },
+        step: Step {
+            xy: 0.02,
+            yaw_deg: 10.0,
+        },
+        layout: Layout::Grid,
+    };
+    table("diagonal", [7.5, -2.25, 0.0], spec, 0.99, &slabs, None)
+}
+
 /// Returns a table of headings from 140 to 220 degrees, in the world from 157.3 to 237.3, with columns that need 16
 /// bits.
 /// Facets contain the gap between the runs, and some poses that the cells contain, too.

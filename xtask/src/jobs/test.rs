@@ -58,9 +58,9 @@ pub fn deep(_: &Arguments) -> Result {
     cmd("cargo test --release -p posegate-cli --test hostile_files crafted")
         .env("POSEGATE_DEEP", "1")
         .run()?;
-    for layout in ["grid", "facets"] {
-        suite("--test adversarial --")
-            .args(["1000000", "1", layout])
+    for (count, layout) in [("1000000", "grid"), ("10000000", "facets")] {
+        cmd("cargo test --release -p posegate --features std --test adversarial --")
+            .args([count, "1", layout])
             .print()?;
     }
     Ok(())
