@@ -149,7 +149,10 @@ fn check(seeds: u64, cases: &[(f64, f64)]) {
         ));
         // Fewer than one model in ten is refused. At 0.99 some data sets have too few independent rows.
         let least = if quantile < 0.99 { 0.9 } else { 0.6 };
-        assert!(low.models as f64 >= least * seeds as f64, "{low:?} of {seeds}");
+        assert!(
+            low.models as f64 >= least * seeds as f64,
+            "{low:?} of {seeds}"
+        );
         assert!(low.share() <= 0.05, "{quantile} {scale}: {low:?}");
     }
 }
