@@ -254,8 +254,8 @@ impl<'a> Calibration<'a> {
         Some(libm::floor(n as f64 / scores.effect(self.quantile) * known) as u64)
     }
 
-    /// Returns the factors of a cell whose own scores contradict its region's factors; `None` if they do not. Each score
-    /// counts as 1 / `effect` independent ones.
+    /// Returns the factors of a cell whose own scores contradict its region's factors; `None` if they do not. A factor that they do not
+    /// contradict stays that of the region. Each score counts as 1 / `effect` independent ones.
     fn alone(
         &self,
         scores: &[Vec<f64>; 2],
@@ -274,13 +274,17 @@ impl<'a> Calibration<'a> {
                 self.quantile,
             ) < BY_CHANCE
         };
-        if !contradicts(0) && !contradicts(1) {
+        let contradicted = [0, 1].map(contradicts);
+        if contradicted == [false; 2] {
             return Ok(None);
         }
         let independent = count(scores[0].len());
         let found = conformal_rank(independent, self.quantile);
         match found.and_then(|k| factors(scores, scaled(k, independent, n))) {
-            Some(own) => Ok(Some([0, 1].map(|i| own[i].max(of_region[i])))),
+            Some(own) => Ok(Some([0, 1].map(|i| match contradicted[i] {
+                true => own[i].max(of_region[i]),
+                false => of_region[i],
+            }))),
             None => {
                 Err("its errors are larger than its region's, and too few for themselves".into())
             }
@@ -443,4 +447,29 @@ fn emptiness(cells: &Cells, coarse: [usize; 3], places: &[[f64; 3]]) -> Option<&
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The factor of a cell is its own for the error that contradicts the region's factor, and not for the other one.
+    #[test]
+    fn only_the_contradicted_factor_of_a_cell_is_its_own() {
+        let places: Vec<[f64; 3]> = (0..400)
+            .map(|k| [1.0 + 0.01 * f64::from(k), 1.0, 30.0])
+            .collect();
+        let cells = Cells::over(&places, 400.0).unwrap();
+        let calibration = Calibration::new(&cells, [0.9, 0.95], &places, false);
+        let hundredths: Vec<f64> = (1..=100).map(|k| 0.01 * f64::from(k)).collect();
+        let scores = [hundredths.clone(), hundredths];
+        let alone = |of_region: [f64; 2]| calibration.alone(&scores, of_region, 1.0).unwrap();
+        assert_eq!(alone([0.905, 0.905]), None);
+        // Rank 91 of 100.
+        let own = |factor: f64| (0.91..0.9101).contains(&factor);
+        let [translation, yaw] = alone([0.905, 0.505]).unwrap();
+        assert!(translation == 0.905 && own(yaw), "{translation} {yaw}");
+        let [translation, yaw] = alone([0.505, 0.905]).unwrap();
+        assert!(own(translation) && yaw == 0.905, "{translation} {yaw}");
+    }
 }
