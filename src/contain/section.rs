@@ -63,7 +63,7 @@ impl Offset {
 /// A pose-set as the walk needs it. The methods that end in `_end` are for reports and decide
 /// nothing.
 pub trait Section {
-    /// What tests of rows share. It is computed at the first use, so a walk keeps it from row to row; a new one gives the same answers.
+    /// Values that the tests of all rows of a walk use, computed at their first use. Answers do not depend on them.
     type Shared: Default;
     /// Returns the largest yaw offset, 2^-24 turn.
     fn yaw_q24(&self) -> i64;
@@ -263,12 +263,18 @@ impl Ellipsoid {
         ])
     }
 
-    /// Returns approximately the touching point of a row window: the point farthest towards a side on
+    /// Returns approximately the touching point of a row window: the point farthest along `row`, which grows towards a side, on
     /// the edge of the window that is nearer to the slab's own farthest point.
     ///
     /// `None` if the slab's farthest point lies within the row: then the row does not sharpen the
     /// bound.
-    fn touch(&self, side: Side, window: &Window, shared: &mut Shared) -> Option<Touch> {
+    fn touch<'a>(
+        &self,
+        side: Side,
+        row: [i32; 3],
+        window: &Window,
+        shared: &'a mut Shared,
+    ) -> Option<Touch<'a>> {
         let shared = match side {
             Side::Left => &mut shared.left,
             Side::Right => &mut shared.right,
@@ -276,7 +282,7 @@ impl Ellipsoid {
         let farthest_y = match shared.farthest_y {
             Some((yaw, y)) if yaw == window.yaw => y,
             _ => {
-                let Offset([_, y, _]) = self.offset(self.farthest(self.towards(side), window.yaw));
+                let Offset([_, y, _]) = self.offset(self.farthest(row, window.yaw));
                 shared.farthest_y = Some((window.yaw, y));
                 y
             }
@@ -291,8 +297,8 @@ impl Ellipsoid {
         };
         let factor = shared
             .factor
-            .get_or_insert_with(|| FactorWithYFirst::new(&self.factor, self.towards(side)));
-        Some(Touch::at(*factor, edge, window.yaw))
+            .get_or_insert_with(|| FactorWithYFirst::new(&self.factor, row));
+        Some(Touch::at(factor, edge, window.yaw))
     }
 }
 
@@ -312,7 +318,6 @@ struct SharedBySide {
 
 /// The factor with y first, `y = Y1 v1, yaw = T1 v1 + T2 v2, x = X1 v1 + X2 v2 + X3 v3`, with x towards a side. All values are
 /// approximate and not trusted: they only propose multipliers.
-#[derive(Clone, Copy)]
 struct FactorWithYFirst {
     y1: i64,
     t1: i64,
@@ -345,15 +350,15 @@ impl FactorWithYFirst {
 }
 
 /// A point v of the unit sphere. Approximate and not trusted, as the factor.
-struct Touch {
-    factor: FactorWithYFirst,
+struct Touch<'a> {
+    factor: &'a FactorWithYFirst,
     v: [i64; 3],
 }
 
-impl Touch {
+impl<'a> Touch<'a> {
     /// Returns the point farthest along x where y is `edge` and the yaw lies in a window.
-    fn at(factor: FactorWithYFirst, edge: i64, [e0, e1]: [i64; 2]) -> Self {
-        let FactorWithYFirst {
+    fn at(factor: &'a FactorWithYFirst, edge: i64, [e0, e1]: [i64; 2]) -> Self {
+        let &FactorWithYFirst {
             y1,
             t1,
             t2,
@@ -366,13 +371,12 @@ impl Touch {
         // The yaw at a v2, and the v2 at a yaw.
         let at = |v2: i64| t1.wrapping_mul(v1).wrapping_add(t2.wrapping_mul(v2)) >> UNIT_BITS;
         let held = |e: i64| ratio(e.wrapping_mul(UNIT).wrapping_sub(t1.wrapping_mul(v1)), t2);
-        let v2 = if at(free) < e0 {
-            held(e0)
-        } else if at(free) > e1 {
-            held(e1)
-        } else {
-            free
+        let end = match at(free) {
+            yaw if yaw < e0 => Some(e0),
+            yaw if yaw > e1 => Some(e1),
+            _ => None,
         };
+        let v2 = end.map_or(free, held);
         let v2 = clamped(v2, left.wrapping_neg(), left);
         Self {
             factor,
@@ -383,7 +387,7 @@ impl Touch {
     /// Returns the outward normal of the ellipsoid at v, `(along the row, along y, along yaw)`, from
     /// `F' a = k v`, scaled so that the first entry is v3.
     fn normal(&self) -> [i64; 3] {
-        let FactorWithYFirst {
+        let &FactorWithYFirst {
             y1,
             t1,
             t2,
@@ -404,7 +408,7 @@ impl Touch {
 
     /// Returns the offset of v: along the row, y, yaw.
     fn offset(&self) -> [i64; 3] {
-        let FactorWithYFirst {
+        let &FactorWithYFirst {
             y1,
             t1,
             t2,
@@ -457,7 +461,7 @@ impl Section for Ellipsoid {
     /// multipliers. They come from the touching point, which makes the bound tight.
     fn fits_row(&self, side: Side, window: &Window, room: i64, shared: &mut Shared) -> bool {
         let row = self.towards(side);
-        let Some(touch) = self.touch(side, window, shared) else {
+        let Some(touch) = self.touch(side, row, window, shared) else {
             return false;
         };
         let [ax, ay, at] = touch.normal();
@@ -502,7 +506,8 @@ impl Section for Ellipsoid {
 
     fn row_end(&self, side: Side, window: &Window) -> Offset {
         let row = self.towards(side);
-        match self.touch(side, window, &mut Shared::default()) {
+        let mut shared = Shared::default();
+        match self.touch(side, row, window, &mut shared) {
             None => self.offset(self.farthest(row, window.yaw)),
             Some(touch) => {
                 let [along, y, yaw] = touch.offset();

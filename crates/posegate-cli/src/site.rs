@@ -230,6 +230,9 @@ fn merge(arguments: &Merge, files: &Files) -> Outcome {
         None => None,
     };
     files.reserve(&arguments.folder, &site_build::MERGE_WRITES)?;
+    if let Some(picture) = &arguments.picture {
+        Files::keep_outside(picture, &arguments.folder, &site_build::MERGE_WRITES)?;
+    }
     let checks = match &site {
         None => MergeChecks::Folder,
         Some(site) if arguments.prove => MergeChecks::Proof(site),

@@ -204,6 +204,15 @@ fn bytes_are_equal_for_any_number_of_shards_and_threads() {
         );
         assert!(folder.results(output) == one, "{output} with a picture");
     }
+    // No picture replaces a result, and none is written among them.
+    for file in ["manifest.json", "tables/new.svg", "proofs/a.svg"] {
+        let before = folder.results("one");
+        folder.expect(
+            2,
+            &format!("site merge one --site site.toml --picture one/{file}"),
+        );
+        assert!(folder.results("one") == before, "{file}");
+    }
     let picture = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let routes = picture("one.svg");
     assert!(routes == picture("five.svg"), "pictures");

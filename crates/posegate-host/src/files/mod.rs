@@ -294,6 +294,41 @@ impl Files {
         }
         Ok(())
     }
+
+    /// Returns an error if an output is, or is below, one of these names in a folder whose content library code reads and writes.
+    ///
+    /// # Errors
+    /// [`FileError::ReplacesInput`] for the name.
+    pub fn keep_outside(
+        output: &Output,
+        folder: &OutputFolder,
+        names: &[&str],
+    ) -> Result<(), FileError> {
+        let Some(path) = resolved(output.as_path()) else {
+            return Ok(());
+        };
+        for name in names {
+            let root = folder.as_path().join(name);
+            if resolved(&root).is_some_and(|root| path.starts_with(root)) {
+                return Err(FileError::ReplacesInput {
+                    output: output.as_path().display().to_string(),
+                    input: root.display().to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the path that an output has after links: of the file, or of its folder with its name if there is no file.
+fn resolved(path: &Path) -> Option<PathBuf> {
+    path.canonicalize().ok().or_else(|| {
+        let folder = match path.parent()? {
+            here if here.as_os_str().is_empty() => Path::new("."),
+            folder => folder,
+        };
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    })
 }
 
 /// Returns the file that an output path names at present.

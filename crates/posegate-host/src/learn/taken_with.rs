@@ -112,15 +112,8 @@ impl MountRecord {
 /// The share by which two calibrations of one camera, or two measurements of one tag, may differ.
 const EQUAL_WITHIN: f64 = 0.01;
 
-/// The distance (m) and the angle (degrees) by which the numbers of one mount may differ: what rounding to millimetres and to tenths of
-/// a degree changes.
-const SAME_MOUNT: Tolerance = Tolerance {
-    translation: 0.001,
-    turn_deg: 0.1,
-};
-
-/// A difference that is not above a limit, except for rounding (m, degrees).
-const ROUNDING: f64 = 1e-6;
+/// The distance (m) and the angle (degrees) by which arithmetic and the text of a file may change one mount.
+const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 
 impl TakenWith {
     /// Returns the fault of the description; `None` if it is valid.
@@ -137,8 +130,8 @@ impl TakenWith {
     }
 
     /// Returns a description of the first difference from another camera, another mount or other tags; `None` if all values
-    /// that both know are equal. Mounts are equal within 1 mm and 0.1 degrees, or within `mount_tolerance` if that is larger.
-    /// The bounds include the errors from this tolerance.
+    /// that both know are equal. Mounts are equal within `mount_tolerance`, whose errors the bound of a look
+    /// includes.
     #[must_use]
     pub fn difference(&self, other: &Self, mount_tolerance: Tolerance) -> Option<String> {
         let number = |name: &str, a: Option<f64>, b: Option<f64>, unit: &str| {
@@ -162,11 +155,8 @@ impl TakenWith {
         let mount = || {
             let (a, b) = (self.mount?, other.mount?);
             let [moved, turned] = a.distance(b);
-            let allowed = [
-                SAME_MOUNT.translation.max(mount_tolerance.translation),
-                SAME_MOUNT.turn_deg.max(mount_tolerance.turn_deg),
-            ];
-            (moved > allowed[0] + ROUNDING || turned > allowed[1] + ROUNDING)
+            (moved > mount_tolerance.translation + ROUNDING[0]
+                || turned > mount_tolerance.turn_deg + ROUNDING[1])
                 .then(|| format!("the camera mounted at {a}, not at {b}"))
         };
         number("fx", self.fx, other.fx, "px")
