@@ -298,7 +298,7 @@ mod firmware {
         table: &Table<'_>,
         set: &PoseSet,
     ) -> Result<(), Failure> {
-        let up_to = |limit: u32| decide(&table.clone().within(limit), set);
+        let up_to = |limit: u32| decide(&table.within(limit), set);
         let ends = |limit: u32| up_to(limit) != Decision::Outside(Cause::TooCostly);
         let (mut few, mut enough) = (0, table.worst_case().runs);
         while enough - few > 1 {
@@ -312,7 +312,7 @@ mod firmware {
         let mut highest = 0;
         for run in (1..enough).step_by(enough as usize / 64 + 1) {
             let mut cost = |limit: u32| -> Result<u64, Failure> {
-                let table = table.clone().within(limit);
+                let table = table.within(limit);
                 Ok(counter
                     .count(|| decide(black_box(&table), black_box(set)))?
                     .0)
