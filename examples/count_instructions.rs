@@ -273,6 +273,13 @@ mod firmware {
                 "instructions",
                 None,
             );
+            counter.line(
+                "deepest stack found, cells,",
+                name,
+                u64::from(deepest),
+                "B",
+                None,
+            );
         }
         counter.line(
             "bound by the table,",

@@ -7,6 +7,7 @@ use posegate::shape::{Family, Pose3Deg, Tag, Tolerance};
 use posegate_host::doctor::stated_error;
 use posegate_host::draw::{Column, Mounted, MountingSheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
+use posegate_host::learn::ErrorModel;
 use posegate_host::place::{
     Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
     PlacementProblem, PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
@@ -14,6 +15,7 @@ use posegate_host::place::{
 use posegate_host::printable::fixed;
 use posegate_host::site::{Site, pose_line};
 use serde_json::{Value, json};
+use std::cell::RefCell;
 
 /// Finds the place of a task's tag with the least expected cost of seeing it, or by another objective
 ///
@@ -342,7 +344,18 @@ fn learnt<'a>(
     let Some(name) = &arguments.error_model else {
         return Ok(None);
     };
-    let learnt = site.error_models.get(name).map(ViewBound::Learnt);
+    let own = site.error_models.get(name);
+    if let Some((difference, advice)) = own.and_then(|model| differing(site, model, task)) {
+        return Err(Failure::usage(
+            format!(
+                "{}: the error model `{name}` was learnt with {difference} as task `{}` uses",
+                arguments.site.display(),
+                arguments.task
+            ),
+            advice,
+        ));
+    }
+    let learnt = own.map(ViewBound::Learnt);
     let formula = site.error_formulas.get(name);
     let psi_max_deg = task
         .set
@@ -369,6 +382,18 @@ fn learnt<'a>(
         )
     })?;
     Ok(Some(LearntCost::new(model, c_high, task)))
+}
+
+/// Returns the first difference of a task's views of its tag from those with which a model was learnt, and what to do.
+fn differing(site: &Site, model: &ErrorModel, task: &Task) -> Option<(String, &'static str)> {
+    let found: RefCell<Option<(String, &'static str)>> = RefCell::default();
+    let _ = task.set.with_views_of(&task.tag, |view| {
+        let mut first = found.borrow_mut();
+        if first.is_none() {
+            *first = site.difference(model, view);
+        }
+    });
+    found.into_inner()
 }
 
 /// Returns `true` if a place satisfies the objective.

@@ -126,12 +126,18 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                     ))?;
                 }
                 for other in &planned.contingencies {
+                    let worst = other.plan.report().worst_margin();
+                    let worst = worst.filter(|(margin, _)| little_slack(*margin).is_some());
                     print(&format_args!(
-                        "if tag {} is lost at step {}: {} more steps, cost {:.3} from there",
+                        "if tag {} is lost at step {}: {} more steps, cost {:.3} from there{}",
                         other.tags.join(", "),
                         other.step + 1,
                         other.plan.steps.len(),
-                        other.plan.cost
+                        other.plan.cost,
+                        worst.map_or_else(String::new, |(margin, _)| format!(
+                            ", worst margin {}: little slack",
+                            margin_text(margin)
+                        ))
                     ))?;
                 }
             }

@@ -92,6 +92,29 @@ fn little_slack_is_reported_with_the_key_that_reserves_some() {
         let head = format!("[planner]\nleast_margin = {least}\n");
         text.replacen("[planner]\n", &head, 1)
     };
+    // A plan with more slack also holds for less, so plans with less are not more expensive: the library's places alone give 6.597
+    // below 1.4.
+    let tags = std::fs::read_to_string(folder.path().join("with-tags.toml")).unwrap();
+    let costs = ["1.02", "1.1", "1.3", "1.5"].map(|least| {
+        write("slack.toml", &with(&tags, least));
+        let (code, out) = posegate("plan slack.toml --to dock-2 --json");
+        assert_eq!(code, 0, "{least}: {out}");
+        let plan: Value = serde_json::from_str(&out).unwrap();
+        let limit: f64 = least.parse().unwrap();
+        let others = plan["contingencies"].as_array().unwrap().iter();
+        for plan in others.chain([&plan]) {
+            let steps = plan["steps"].as_array().unwrap().iter();
+            let mut margins = steps.filter_map(|step| step["margin"].as_f64());
+            assert!(
+                margins.all(|margin| margin >= limit - 1e-4),
+                "{least}: {plan}"
+            );
+        }
+        plan["cost"].as_f64().unwrap()
+    });
+    let most = 1.01 * costs[3];
+    assert!(costs.iter().all(|cost| *cost <= most), "{costs:?}");
+
     write("reserved.toml", &with(DOCKS, "1.1"));
     let (code, out) = posegate("cover reserved.toml --survive-lost-tags 1 -o more-tags.toml");
     assert_eq!((code, said(&out)), (0, 0), "{out}");

@@ -529,7 +529,8 @@ fn learnt_model_turns_the_tag_away_from_head_on() {
     }
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("views.csv"), csv).unwrap();
-    let learn = "learn bounds views.csv --quantile 0.95 -o model.toml";
+    let learn =
+        "learn bounds views.csv --quantile 0.95 --camera front --site site.toml -o model.toml";
     let output = run_in(folder.path(), SITE, learn, None);
     assert_eq!(output.code, 0, "{}", output.err);
     let site = SITE.to_owned() + "\n[error_model.detector]\nfile = \"model.toml\"\n";
@@ -559,6 +560,23 @@ fn learnt_model_turns_the_tag_away_from_head_on() {
         "{}",
         other.err
     );
+    // A model of another mount, calibration or tag says nothing about these views.
+    for (from, to) in [
+        ("mount = { x = 0.25", "mount = { x = 0.30"),
+        ("fx = 615.0", "fx = 800.0"),
+        ("size = 0.30", "size = 0.20"),
+        ("tag36h11", "tag25h9"),
+    ] {
+        assert!(site.contains(from));
+        let changed = site.replacen(from, to, 1);
+        let output = run_in(folder.path(), &changed, &line, None);
+        assert_eq!(output.code, 2, "{to}: {}{}", output.out, output.err);
+        assert!(
+            output.err.contains("was learnt with"),
+            "{to}: {}",
+            output.err
+        );
+    }
 }
 
 /// A formula with the paper's weights gives the paper's cost: a metre counts as 100, a degree as 1.

@@ -110,9 +110,34 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// Returns the shortest text that reads back as the number; numbers from 1e9 and below 1e-4 have an exponent.
+#[must_use]
+pub fn shortest(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || (1e-4..1e9).contains(&size) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn very_large_and_very_small_numbers_have_an_exponent() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1e6, "1000000"),
+            (0.05, "0.05"),
+            (1e300, "1e300"),
+            (2.5e-9, "2.5e-9"),
+        ] {
+            assert_eq!(shortest(value), text);
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
+        }
+    }
 
     const HOSTILE: &str = "a\u{1b}[2J\u{7f}\u{9b}\u{202e}\u{2066}\u{200f}\u{feff}\u{e0041}\r\nb\tc";
 

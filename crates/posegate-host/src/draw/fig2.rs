@@ -131,8 +131,8 @@ fn known(picture: &mut Picture, left: f64, belief: &BeliefStateF64) {
     picture.text([left, TOP + EDGE + 54.0], &text, &font);
 }
 
-/// Returns the step's margin. If the controller's table of the task gives a larger one, it is that of Fig. 3: both are
-/// proven.
+/// Returns the larger of two proven margins: that of the step, and that of the controller's table of the task, which Fig. 3
+/// shows.
 fn margin(step: &StepReport, study: &CaseStudy) -> Option<String> {
     let own = step.margin.map(factor_text);
     let [translation, yaw] = step.before.enclosing();

@@ -60,12 +60,12 @@ fn notes(site: &Site, plans: &[MergedPlan]) -> Vec<Note> {
         let MergedRoute {
             cost, worst_margin, ..
         } = found;
-        let margin = Margin::from_q16((worst_margin * 65_536.0) as u32);
-        let mut text = format!(
-            "{task} from {from}: worst margin {}, cost {cost:.3}",
-            margin_text(margin)
-        );
-        if let Some(words) = little_slack(margin) {
+        let margin = worst_margin.map(|margin| Margin::from_q16((margin * 65_536.0) as u32));
+        let margin_words = margin.map_or_else(String::new, |margin| {
+            format!("worst margin {}, ", margin_text(margin))
+        });
+        let mut text = format!("{task} from {from}: {margin_words}cost {cost:.3}");
+        if let Some(words) = margin.and_then(little_slack) {
             text += ", little slack";
             advice = advice.or(Some(words));
         }
@@ -156,8 +156,19 @@ mod tests {
         MergedRoute {
             route: Route { steps: Vec::new() },
             cost: 4.8867,
-            worst_margin,
+            worst_margin: Some(worst_margin),
         }
+    }
+
+    #[test]
+    fn plan_without_margins_states_its_cost_only() {
+        let found = MergedRoute {
+            worst_margin: None,
+            ..route(1.0)
+        };
+        let site = Site::parse(DOCK, "dock.toml").unwrap();
+        let svg = site_routes_picture(&site, &[plan("dock-1", Ok(found))]);
+        assert!(svg.contains(">dock-1 from gate: cost 4.887<"), "{svg}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::headings;
 use super::quadrature::{Approximate, Quadrature};
 use super::rays::Bodies;
 use super::rough;
+use crate::printable::shortest;
 use core::cell::Cell;
 use posegate::shape::{LineClipper, Shape, SuccessSet};
 
@@ -56,10 +57,8 @@ impl Cost {
     /// Returns the definition of the cost in words, with its unit.
     #[must_use]
     pub fn definition(&self) -> String {
-        format!(
-            "{} d^2 + {} phi^2 + {} psi^2 (m, rad), {} outside of S; no unit",
-            self.c1, self.c2, self.c3, self.c_high
-        )
+        let [c1, c2, c3, c_high] = [self.c1, self.c2, self.c3, self.c_high].map(shortest);
+        format!("{c1} d^2 + {c2} phi^2 + {c3} psi^2 (m, rad), {c_high} outside of S; no unit")
     }
 
     /// Returns the cost of a view `[d, phi, psi]`, m and rad.

@@ -208,7 +208,8 @@ impl Attempt<'_> {
             let mut walk = self.walk()?;
             self.replay(&mut walk, before)?;
             let plan = self.evaluated(walk, &other)?;
-            if self.options.survive_a_lost_tag || plan.report().succeeds() {
+            let least = self.site.planner.least_margin();
+            if self.options.survive_a_lost_tag || plan.succeeds_with(least) {
                 contingencies.push(Contingency {
                     step,
                     tags,

@@ -46,6 +46,7 @@ pub mod language {}
 mod attempt;
 mod backward;
 mod belief;
+mod better_places;
 mod bound;
 mod certificate;
 mod chain;
@@ -53,7 +54,6 @@ mod costs;
 mod crossings;
 mod endpoint;
 mod error;
-mod fewer;
 mod horizons;
 mod json;
 mod library;

@@ -68,6 +68,16 @@ pub struct Plan {
     pub risk: f64,
 }
 
+impl Plan {
+    /// Returns `true` if every step succeeds with a margin of at least `least`.
+    pub(super) fn succeeds_with(&self, least: f64) -> bool {
+        let report = self.report();
+        let least = libm::floor(least * 65_536.0) as u32;
+        let worst = report.worst_margin();
+        report.succeeds() && worst.is_none_or(|(margin, _)| margin.q16() >= least)
+    }
+}
+
 /// The plan to follow if a look fails.
 #[derive(Clone, Debug)]
 pub struct Contingency {
@@ -141,22 +151,14 @@ impl PlanResult {
             return false;
         };
         let within = |risk: f64| risk <= options.most_risk + 1e-12;
-        let least = libm::floor(least * 65_536.0) as u32;
-        let has_slack = |plan: &Plan| {
-            let worst = plan.report().worst_margin();
-            worst.is_none_or(|(margin, _)| margin.q16() >= least)
-        };
         let other = |other: &Contingency| {
-            other.plan.report().succeeds()
-                && has_slack(&other.plan)
-                && within(other.risk_before + other.plan.risk)
+            other.plan.succeeds_with(least) && within(other.risk_before + other.plan.risk)
         };
         let survives = !options.survive_a_lost_tag
             || plan.steps.iter().enumerate().all(|(number, step)| {
                 step.tags.is_empty() || self.contingencies.iter().any(|c| c.step == number)
             });
-        plan.report().succeeds()
-            && has_slack(plan)
+        plan.succeeds_with(least)
             && within(plan.risk)
             && survives
             && (!options.survive_a_lost_tag || self.contingencies.iter().all(other))

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::attempt::Attempt;
+use super::better_places::BetterPlaces;
 use super::bound::EveryChain;
 use super::costs::Costs;
-use super::fewer::FewerLooks;
 use super::horizons::Horizons;
 use super::library::Library;
 use super::map::{self, Roadmap};
@@ -29,7 +29,7 @@ pub struct Prepared<'a> {
     seen: Vec<Vec<usize>>,
     successors: Vec<Vec<usize>>,
     /// `seen` and `successors` of the tables as baked, while a stricter table is in use.
-    wider: Option<[Vec<Vec<usize>>; 2]>,
+    as_baked: Option<[Vec<Vec<usize>>; 2]>,
     model: Option<DriveModel>,
     model_from: String,
     /// Costs of a metre and of a look.
@@ -38,6 +38,12 @@ pub struct Prepared<'a> {
     finds_contingencies: bool,
     proofs: Arc<Proofs>,
 }
+
+/// The number of times that a plan's places are improved.
+const IMPROVEMENTS: usize = 4;
+
+/// The share of the cost that an improvement saves at least if another one is tried.
+const WORTH_ANOTHER: f64 = 0.002;
 
 /// The fallback if a single set cannot be proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +91,7 @@ impl<'a> Prepared<'a> {
             library,
             seen: vec![],
             successors: vec![],
-            wider: None,
+            as_baked: None,
             model,
             model_from: model_from.unwrap_or_default(),
             prices: [site.planner.metre, site.planner.look_cost],
@@ -205,12 +211,20 @@ impl<'a> Prepared<'a> {
         let every = EveryChain::of(self.site, &start, &table.success, self.model, priced);
         let bound = every.bound();
         let may_be_less = |plan: &Plan| plan.cost > bound * (1.0 + 1e-9);
-        if let Some(plan) = planned.plan.as_ref().filter(|plan| may_be_less(plan))
-            && !priced
-            && !options.survive_a_lost_tag
-            && let Some(cheaper) = self.with_fewer_looks(&start, &table, options, plan)?
-        {
-            planned = cheaper;
+        if !priced && !options.survive_a_lost_tag {
+            for _ in 0..IMPROVEMENTS {
+                let plan = planned.plan.as_ref().filter(|plan| may_be_less(plan));
+                let Some(plan) = plan else { break };
+                let before = plan.cost;
+                let Some(cheaper) = self.with_better_places(&start, &table, options, plan)? else {
+                    break;
+                };
+                planned = cheaper;
+                let after = planned.plan.as_ref().map_or(before, |plan| plan.cost);
+                if after > before * (1.0 - WORTH_ANOTHER) {
+                    break;
+                }
+            }
         }
         Ok(PlanResult {
             bound_of_all: bound,
@@ -218,16 +232,16 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Plans with additional places for chains with fewer looks than a plan's. Returns a cheaper plan, if there is
-    /// one.
-    fn with_fewer_looks(
+    /// Plans with additional places for a plan's looks and for chains with fewer looks. Returns a cheaper plan, if there
+    /// is one.
+    fn with_better_places(
         &self,
         start: &ChainStart,
         work: &TaskTable,
         options: &Options,
         plan: &Plan,
     ) -> Result<Option<PlanResult>, PlanError> {
-        let places = FewerLooks {
+        let places = BetterPlaces {
             site: self.site,
             library: &self.library,
             tables: &self.library.tables()?,
@@ -264,7 +278,7 @@ impl<'a> Prepared<'a> {
         for look in &mut self.library.looks {
             look.table.relax();
         }
-        if let Some([seen, successors]) = self.wider.take() {
+        if let Some([seen, successors]) = self.as_baked.take() {
             (self.seen, self.successors) = (seen, successors);
         }
     }
@@ -287,7 +301,7 @@ impl<'a> Prepared<'a> {
             graph.clone(),
             ProofFallback::Table,
         )?;
-        if planned.plan.is_some() || (self.wider.is_none() && !work_table.is_stricter()) {
+        if planned.plan.is_some() || (self.as_baked.is_none() && !work_table.is_stricter()) {
             return Ok(planned);
         }
         self.relax();
@@ -405,12 +419,12 @@ impl<'a> Prepared<'a> {
                 return Ok((planned, satisfies));
             }
             *graph = None;
-            if self.wider.is_none() {
+            if self.as_baked.is_none() {
                 let own = [
                     core::mem::take(&mut self.seen),
                     core::mem::take(&mut self.successors),
                 ];
-                self.wider = Some(own);
+                self.as_baked = Some(own);
             }
             self.connect()?;
         }

@@ -4,9 +4,12 @@ use super::error::SiteError;
 use super::names::{Names, named};
 use super::places::SiteModel;
 use super::reader::{Node, Table};
-use super::{ErrorBound, SiteCamera, SiteTag, keys};
+use super::{ErrorBound, Site, SiteCamera, SiteTag, keys};
 use crate::learn::{ErrorModel, TakenWith};
 use posegate::shape::{Exclusion, Shape, Visibility};
+
+/// What to do if a model was learnt with another camera, another mount or other tags.
+const LEARN_WITH_THESE: &str = "take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`. If only the size of the tags differs, `tag_size` in the [error_model] table scales the model. If the same mount was measured again, compute the errors with its new numbers, or state a `mount_tolerance` that covers the difference";
 
 /// Refuses a model whose detections were taken with another camera, another mount or other tags, if both are known.
 pub(super) fn same(
@@ -15,14 +18,7 @@ pub(super) fn same(
     camera: &SiteCamera,
     tag: &SiteTag,
 ) -> Result<(), SiteError> {
-    let here = TakenWith {
-        tag_size: Some(tag.tag.size),
-        family: Some(tag.family.clone()),
-        ..camera.taken_with()
-    };
-    let taken = model.taken_with();
-    let Some(difference) = taken.and_then(|taken| taken.difference(&here, camera.mount_tolerance))
-    else {
+    let Some(difference) = camera.difference(model, tag) else {
         return Ok(());
     };
     Err(node
@@ -31,10 +27,41 @@ pub(super) fn same(
             node.path()
         ))
         .expected("the camera, its mount and the tags with which its detections were taken")
-        .help("take detections with this camera and these tags, and learn a model from them: `posegate learn bounds`. If only the size of the tags differs, `tag_size` in the [error_model] table scales the model. If the same mount was measured again, compute the errors with its new numbers, or state a `mount_tolerance` that covers the difference"))
+        .help(LEARN_WITH_THESE))
+}
+
+impl Site {
+    /// Returns the first difference of a view's camera, mount and tag from those with which a model was learnt, and what to do;
+    /// `None` if all known values are equal. Views name no camera: a camera at the view's mount is compared, and if there are
+    /// several, one that is equal suffices.
+    #[must_use]
+    pub fn difference(
+        &self,
+        model: &ErrorModel,
+        view: &Visibility,
+    ) -> Option<(String, &'static str)> {
+        let tag = self.tags.values().find(|known| known.tag == view.tag)?;
+        let cameras = self.cameras.values();
+        let differences: Option<Vec<String>> = cameras
+            .filter(|camera| camera.mount == view.mount)
+            .map(|camera| camera.difference(model, tag))
+            .collect();
+        let first = differences?.into_iter().next()?;
+        Some((first, LEARN_WITH_THESE))
+    }
 }
 
 impl SiteCamera {
+    /// Returns the first difference of this camera, its mount and a tag from those with which a model was learnt.
+    fn difference(&self, model: &ErrorModel, tag: &SiteTag) -> Option<String> {
+        let here = TakenWith {
+            tag_size: Some(tag.tag.size),
+            family: Some(tag.family.clone()),
+            ..self.taken_with()
+        };
+        model.taken_with()?.difference(&here, self.mount_tolerance)
+    }
+
     /// Returns the description of this camera and its mount that a model learnt with it records.
     #[must_use]
     pub fn taken_with(&self) -> TakenWith {

@@ -31,7 +31,7 @@ pub struct MergedRoute {
     /// The cost of the plan.
     pub cost: f64,
     /// The smallest margin of its steps.
-    pub worst_margin: f64,
+    pub worst_margin: Option<f64>,
 }
 
 /// Returns the plans that [`merge`](super::merge()) wrote into `output` for this site, sorted by task and chain. They
@@ -80,6 +80,6 @@ fn found(plan: &Value, site: &Site, from: &str, task: &str) -> Option<Result<Mer
     Some(Ok(MergedRoute {
         route: Route::from_json(plan, &start)?,
         cost: plan["cost"].as_f64()?,
-        worst_margin: margins.fold(f64::INFINITY, f64::min),
+        worst_margin: margins.min_by(f64::total_cmp),
     }))
 }

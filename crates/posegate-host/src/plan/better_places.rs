@@ -1,8 +1,8 @@
-//! Chains with fewer looks than the plan that a search found, from places outside of the library.
+//! Better places of a plan's looks, and chains with fewer looks, from places outside of the library.
 //!
-//! The library has a few places of each look: those where the look has the most slack. A chain with fewer looks may
-//! need other places, for example at the limits of two bounds. A pattern search looks for such places. It tries the
-//! plan's looks without one of them, and single looks near the path. It only proposes: the places are added to the
+//! The library has a few places of each look: those where the look has the most slack. A cheaper chain may need other
+//! places, for example at the limits of two bounds. A pattern search looks for such places. It tries the plan's looks,
+//! the plan's looks without one of them, and single looks near the path. It only proposes: the places are added to the
 //! library, and planning runs again, with its proofs.
 
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ use posegate::table::Table;
 type PlacedLook = (usize, [f64; 3]);
 
 /// The problem whose plan is known.
-pub(super) struct FewerLooks<'a> {
+pub(super) struct BetterPlaces<'a> {
     pub site: &'a Site,
     pub library: &'a Library,
     pub tables: &'a [Table<'a>],
@@ -47,20 +47,22 @@ const SINGLES: usize = 6;
 const STEPS: [f64; 2] = [0.4, 0.2];
 const HALVINGS: u32 = 7;
 
-impl FewerLooks<'_> {
-    /// Returns places from which cheaper chains with fewer looks than the plan's may succeed, with their looks.
+impl BetterPlaces<'_> {
+    /// Returns places from which cheaper chains with the plan's looks, or with fewer, may succeed, with their looks.
     pub fn places(&self, plan: &Plan) -> Vec<PlacedLook> {
         let looks = self.looks_of(plan);
-        if looks.len() < 2 {
+        let own: Vec<usize> = looks.iter().map(|(look, _)| *look).collect();
+        if own.is_empty() {
             return vec![];
         }
-        let mut chains: Vec<Vec<usize>> = (0..looks.len())
-            .map(|removed| {
-                let others = looks.iter().enumerate();
-                let others = others.filter(|(number, _)| *number != removed);
-                others.map(|(_, (look, _))| *look).collect()
-            })
-            .collect();
+        let mut chains = vec![own.clone()];
+        if own.len() > 1 {
+            chains.extend((0..own.len()).map(|removed| {
+                let mut others = own.clone();
+                others.remove(removed);
+                others
+            }));
+        }
         chains.extend(self.singles(plan.cost).into_iter().map(|look| vec![look]));
         let mut tried: Vec<Vec<usize>> = vec![];
         let mut found: Vec<(f64, Vec<PlacedLook>)> = vec![];
