@@ -63,6 +63,50 @@ fn robot_far_from_walls_is_permitted_at_any_uncertainty_of_heading() {
     }
 }
 
+/// Sets as AMCL's: correlated positions, and a yaw of at least 5.9 degrees. The whole disc of the robot fits at each position, so every
+/// heading does.
+#[test]
+fn all_of_150_sets_with_the_spread_of_a_particle_filter_are_permitted() {
+    let site = hall::site(GOAL);
+    let bytes = hall::facets(&site, "hall", 2.5);
+    let table = Table::parse(&bytes).expect("a table");
+    assert!(table.grid().is_none());
+    let mut random = Rng::new(150);
+    let (mut sets, mut permits) = (0, 0);
+    while sets < 150 {
+        let [x, y] = [(); 2].map(|()| random.log_within(0.05, 0.2));
+        let yaw = random.within(5.9, 25.0).to_radians();
+        let (xy, share) = (random.within(-0.6, 0.6), random.within(0.0, 0.6));
+        let direction = random.within(0.0, TAU);
+        let (xt, yt) = (share * direction.cos(), share * direction.sin());
+        let covariance = [
+            [x * x, xy * x * y, xt * x * yaw],
+            [xy * x * y, y * y, yt * y * yaw],
+            [xt * x * yaw, yt * y * yaw, yaw * yaw],
+        ];
+        let [from_x, from_y] = [(); 2].map(|()| random.within(-1.2, 1.2));
+        let (half, apart) = (0.5 * (x * x + y * y), 0.5 * (x * x - y * y));
+        let longest = (half + apart.hypot(xy * x * y)).sqrt();
+        if from_x.hypot(from_y) + 3.3683 * longest + 0.5 > hall::TO_WALL_M - 0.01 {
+            continue;
+        }
+        let estimate = Estimate {
+            x_m: 0.5 + from_x,
+            y_m: -0.25 + from_y,
+            yaw_rad: random.within(-3.0, 3.0),
+        };
+        let uncertainty = Uncertainty::Gaussian(covariance);
+        let belief = PoseEstimate::new(estimate, uncertainty);
+        let Ok(set) = belief.pose_set(table.radius_squared(), Trust::FULL) else {
+            continue; // Correlations that no distribution has.
+        };
+        sets += 1;
+        let confirmed = second::opinion(&bytes, &belief, Trust::FULL) == second::INSIDE;
+        permits += u32::from(decide(&table, &set) == Decision::Inside && confirmed);
+    }
+    assert_eq!(permits, sets);
+}
+
 /// Near a wall a corner touches it at some heading: the worst pose is outside of the set.
 #[test]
 fn worst_pose_near_a_wall_fails() {
