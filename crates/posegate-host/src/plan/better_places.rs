@@ -9,10 +9,12 @@ use rayon::prelude::*;
 
 use super::costs::distance;
 use super::library::{facing, needed};
+use super::planner::WORTH_IT;
 use super::problem::drive_to;
 use super::{BeliefStateF64, Library, Options, Plan, StepKind};
 use crate::site::{ChainStart, DriveModel, Site};
 use posegate::contain::{Decision, decide, examine};
+use posegate::set::PoseSet;
 use posegate::table::Table;
 
 /// A look, by number, and the place from which it is made.
@@ -52,17 +54,16 @@ impl BetterPlaces<'_> {
     pub fn places(&self, plan: &Plan) -> Vec<PlacedLook> {
         let looks = self.looks_of(plan);
         let own: Vec<usize> = looks.iter().map(|(look, _)| *look).collect();
-        if own.is_empty() {
+        // Better places of a single look saved at most 0.1 % where it was tried.
+        if own.len() < 2 {
             return vec![];
         }
         let mut chains = vec![own.clone()];
-        if own.len() > 1 {
-            chains.extend((0..own.len()).map(|removed| {
-                let mut others = own.clone();
-                others.remove(removed);
-                others
-            }));
-        }
+        chains.extend((0..own.len()).map(|removed| {
+            let mut others = own.clone();
+            others.remove(removed);
+            others
+        }));
         chains.extend(self.singles(plan.cost).into_iter().map(|look| vec![look]));
         let mut tried: Vec<Vec<usize>> = vec![];
         let mut found: Vec<(f64, Vec<PlacedLook>)> = vec![];
@@ -71,7 +72,8 @@ impl BetterPlaces<'_> {
                 continue;
             }
             let (value, places) = self.best(&chain, &looks);
-            if value < plan.cost * (1.0 - 1e-6) {
+            let saved = if chain == own { WORTH_IT } else { 1e-6 };
+            if value < plan.cost * (1.0 - saved) {
                 found.push((value, chain.iter().copied().zip(places).collect()));
             }
             tried.push(chain);
@@ -125,7 +127,7 @@ impl BetterPlaces<'_> {
         let mut begun: Vec<(f64, Vec<[f64; 3]>)> = self
             .beginnings(chain, known)
             .into_iter()
-            .map(|places| (self.value(chain, &places), places))
+            .map(|places| (self.value(chain, &places, f64::INFINITY), places))
             .collect();
         begun.sort_by(|a, b| a.0.total_cmp(&b.0));
         begun.truncate(BEGINNINGS);
@@ -177,7 +179,7 @@ impl BetterPlaces<'_> {
                 for number in 0..places.len() {
                     for moved in self.moves(chain[number], places[number], scale) {
                         let kept = core::mem::replace(&mut places[number], moved);
-                        let value = self.value(chain, places);
+                        let value = self.value(chain, places, best);
                         if value < best {
                             best = value;
                         } else {
@@ -216,18 +218,24 @@ impl BetterPlaces<'_> {
     }
 
     /// Returns the cost of a chain. If sets do not fit or the risk is too high, the value is above all costs, and
-    /// smaller the nearer the sets are to fitting.
-    fn value(&self, chain: &[usize], places: &[[f64; 3]]) -> f64 {
+    /// smaller the nearer the sets are to fitting. A value that is not below `best` may be any that is not.
+    fn value(&self, chain: &[usize], places: &[[f64; 3]], best: f64) -> f64 {
+        let stops = || places.iter().copied().chain([self.goal]);
+        let starts = [self.begin].into_iter().chain(places.iter().copied());
+        let metres = starts
+            .zip(stops())
+            .map(|(from, to)| distance(from, to))
+            .sum();
+        let cost = self.price(metres, chain.len());
+        if cost >= best {
+            return f64::INFINITY;
+        }
         let mut belief = BeliefStateF64::at_start(self.begin, self.start.spread, &self.start.known);
-        let (mut metres, mut risk, mut misfit) = (0.0, 0.0, 0.0);
-        let targets = chain
-            .iter()
-            .zip(places)
-            .map(|(look, place)| (Some(*look), *place));
-        for (look, place) in targets.chain([(None, self.goal)]) {
-            let length = distance(belief.pose, place);
+        let (mut risk, mut misfit) = (0.0, 0.0);
+        let looks = chain.iter().map(|look| Some(*look)).chain([None]);
+        for (look, place) in looks.zip(stops()) {
             if belief.pose != place {
-                if length > self.site.planner.range {
+                if distance(belief.pose, place) > self.site.planner.range {
                     return f64::INFINITY;
                 }
                 let navigation = &self.site.navigation;
@@ -239,10 +247,16 @@ impl BetterPlaces<'_> {
                 };
                 belief = there;
             }
-            metres += length;
             let table = look.map_or(self.work, |look| &self.tables[look]);
             let scale = SCALE * self.site.planner.least_margin();
-            misfit += missing_scale(table, &belief, scale);
+            let missing = match needed(&belief, scale) {
+                Some(set) if decide(table, &set) == Decision::Inside => 0.0,
+                // Of chains that fit, only cheaper ones that fit are of use.
+                _ if best < MISFIT => return f64::INFINITY,
+                Some(set) => missing_scale(table, &set),
+                None => 2.0,
+            };
+            misfit += missing;
             risk += belief.risk();
             if let Some(look) = look {
                 let bound = self.library.looks[look].bound;
@@ -250,7 +264,6 @@ impl BetterPlaces<'_> {
                 belief = belief.localized(bound.metres_radians());
             }
         }
-        let cost = self.price(metres, chain.len());
         if risk > self.options.most_risk {
             f64::INFINITY
         } else if misfit > 0.0 {
@@ -261,14 +274,8 @@ impl BetterPlaces<'_> {
     }
 }
 
-/// Returns the difference of the required scale and that of a belief's set; 0 if the set fits.
-fn missing_scale(table: &Table<'_>, belief: &BeliefStateF64, scale: f64) -> f64 {
-    let Some(set) = needed(belief, scale) else {
-        return 2.0;
-    };
-    if decide(table, &set) == Decision::Inside {
-        return 0.0;
-    }
-    let fits = f64::from(examine(table, &set).margin.q16()) / 65_536.0;
+/// Returns the difference of the required scale and that of a set that does not fit.
+fn missing_scale(table: &Table<'_>, set: &PoseSet) -> f64 {
+    let fits = f64::from(examine(table, set).margin.q16()) / 65_536.0;
     (1.0 - fits).max(1e-3)
 }

@@ -42,8 +42,8 @@ pub struct Prepared<'a> {
 /// The number of times that a plan's places are improved.
 const IMPROVEMENTS: usize = 4;
 
-/// The share of the cost that an improvement saves at least if another one is tried.
-const WORTH_ANOTHER: f64 = 0.002;
+/// The share of the cost that better places of the same looks must save.
+pub(super) const WORTH_IT: f64 = 0.005;
 
 /// The fallback if a single set cannot be proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -210,7 +210,7 @@ impl<'a> Prepared<'a> {
         let priced = !options.costs.is_empty();
         let every = EveryChain::of(self.site, &start, &table.success, self.model, priced);
         let bound = every.bound();
-        let may_be_less = |plan: &Plan| plan.cost > bound * (1.0 + 1e-9);
+        let may_be_less = |plan: &Plan| plan.cost > bound * (1.0 + WORTH_IT);
         if !priced && !options.survive_a_lost_tag {
             for _ in 0..IMPROVEMENTS {
                 let plan = planned.plan.as_ref().filter(|plan| may_be_less(plan));
@@ -221,7 +221,7 @@ impl<'a> Prepared<'a> {
                 };
                 planned = cheaper;
                 let after = planned.plan.as_ref().map_or(before, |plan| plan.cost);
-                if after > before * (1.0 - WORTH_ANOTHER) {
+                if after > before * (1.0 - 2.0 * WORTH_IT) {
                     break;
                 }
             }

@@ -1,0 +1,133 @@
+use super::*;
+use crate::contain::exact::cases::Case;
+use crate::contain::facets::margin_q10;
+use crate::num::BinaryAngle;
+use crate::pose::Pose;
+use crate::set::{Extent, PoseSet};
+use crate::table::{Axes, Facet, Table};
+
+fn seen(bend: i32, rest: i32) -> FramePoints {
+    FramePoints {
+        axes: Axes::World,
+        x: 0,
+        y: 0,
+        lever: [0; 2],
+        rest,
+        bend,
+    }
+}
+
+#[test]
+fn scales_are_what_is_spared_for_a_facets_needs() {
+    for (spare, extent, bend, rest, scale) in [
+        (1000, 250, 0, 0, 4096),
+        (-1, 250, 0, 0, 0),
+        (1 << 22, 1 << 10, 0, 0, MOST_Q10),
+        (1 << 21, 1, 0, 0, MOST_Q10),
+        (1000, 0, 0, 0, 0),
+        // The limit is 4: 250 + 4 (100 + 1) + 1, and 250 + 4 (4 * 100 + 1) + 1.
+        (1000, 250, 100, 0, 1_024_000 / 655),
+        (1000, 250, 0, 100, 1_024_000 / 1855),
+        // At most 64.
+        (1 << 20, 1, 1, 0, 1 << 16),
+        // Values that do not fit in 16 bits, and the largest that do: half of them and one.
+        (
+            1 << 19,
+            1 << 20,
+            0,
+            0xffff,
+            (1 << 29) / ((1 << 20) + 16_385),
+        ),
+        (1 << 19, 1 << 20, 0, 0x1_0000, 0),
+        (
+            1 << 19,
+            1 << 20,
+            0xfffe,
+            0,
+            (1 << 29) / ((1 << 20) + 32_768),
+        ),
+        (1 << 19, 1 << 20, 0xffff, 0, 0),
+    ] {
+        let found = scale_q10(spare, extent, &seen(bend, rest));
+        assert_eq!(found, scale, "{spare} {extent} {bend} {rest}");
+    }
+}
+
+/// A disc of 100 um at the goal, 5 mm from the border.
+fn case(yaw_q24: i32) -> Case {
+    let facet = Facet {
+        x: 16_384,
+        y: 0,
+        b: 5000,
+    };
+    Case {
+        unit: 0,
+        reach: 1,
+        arm: 0,
+        farthest: 0,
+        axes: Axes::World,
+        point: [0; 2],
+        facet,
+        goal: Pose::default(),
+        mean: Pose::default(),
+        extent: Extent::Bounded {
+            translation_um: 100,
+            yaw_q24,
+        },
+    }
+}
+
+#[test]
+fn the_nearest_border_counts() {
+    let margin = |case: Case| {
+        let bytes = case.bytes();
+        let table = Table::parse(&bytes).unwrap();
+        margin_q10(table.facets().unwrap(), &case.set(), case.goal)
+    };
+    // 101 is at most 104 along a normal that is too long, and 12 are added for roundings.
+    assert_eq!(margin(case(1)), Some(5000 * 1024 / 116));
+    // Without a lever no turn is too large.
+    assert_eq!(margin(case(1 << 20)), Some(5000 * 1024 / 116));
+    // The bounds of the margin are weaker than the decision.
+    assert_eq!(margin(case(1).with_b(113)), Some(1024));
+    assert_eq!(margin(case(1).with_b(100)), None);
+}
+
+#[test]
+fn the_nearer_end_of_an_arc_counts() {
+    let case = case(1 << 14);
+    let bytes = case.bytes();
+    let table = Table::parse(&bytes).unwrap();
+    let layout = table.facets().unwrap();
+    let at = |yaw: u32| {
+        let mean = Pose {
+            yaw: BinaryAngle(yaw),
+            ..case.mean
+        };
+        PoseSet::of(mean, case.extent)
+    };
+    let told = |from: u32, width: u32, yaw: u32, turns: bool| {
+        let set = at(yaw);
+        let set = QuantizedPoseSet::of(layout, &set, case.goal).unwrap();
+        let mut piece = layout.pieces().next().unwrap();
+        (piece.from, piece.width) = (from, width);
+        let mut nearest = Nearest::new();
+        // As a previous piece may leave it.
+        nearest.least = 1;
+        nearest.piece(&piece, &set, turns);
+        assert_eq!(nearest.least, i32::MAX);
+        nearest.scale_q10
+    };
+    let scale = |from, width, yaw| told(from, width, yaw, true);
+    // The reach is 2^22; 2^-10 of it is 2^12, and one more for rounding up.
+    assert_eq!(scale(5, 1 << 30, 5 + (1 << 28)), ((1 << 28) - 8) / 4097);
+    assert_eq!(
+        scale(5, 1 << 29, 5 + (1 << 28) + 4096),
+        ((1 << 28) - 4104) / 4097
+    );
+    assert_eq!(scale(5, 1 << 30, 5), 0);
+    // Half a radian, of 6.1 mrad.
+    assert_eq!(scale(5, u32::MAX, 5), (1 << 24) / 202);
+    assert_eq!(told(5, u32::MAX, 5, false), MOST_Q10);
+    assert_eq!(scale(5, 1 << 31, 5 + (1 << 30)), (1 << 24) / 202);
+}
