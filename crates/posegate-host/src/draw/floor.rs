@@ -128,6 +128,12 @@ fn leader(at: [f64; 2], [left, top, right, bottom]: [f64; 4]) -> Option<[[f64; 2
 
 /// Returns `true` if a line crosses a box: tests every second pixel of the line.
 fn crosses([from, to]: [[f64; 2]; 2], [left, top, right, bottom]: [f64; 4]) -> bool {
+    let apart = |axis: usize, low: f64, high: f64| {
+        from[axis].max(to[axis]) <= low || high <= from[axis].min(to[axis])
+    };
+    if apart(0, left, right) || apart(1, top, bottom) {
+        return false;
+    }
     let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
     let count = libm::ceil(0.5 * length).clamp(1.0, 1000.0) as u32;
     (0..=count).any(|k| {
