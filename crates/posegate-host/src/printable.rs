@@ -110,9 +110,9 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Returns the shortest text that reads back as the number; numbers from 1e9 and below 1e-4 have an exponent.
+/// Returns a number with as few digits as read back as it. Numbers from 1e9 and below 1e-4 have an exponent.
 #[must_use]
-pub fn shortest(value: f64) -> String {
+pub fn fewest_digits(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-4..1e9).contains(&size) {
         format!("{value}")
@@ -134,7 +134,7 @@ mod tests {
             (1e300, "1e300"),
             (2.5e-9, "2.5e-9"),
         ] {
-            assert_eq!(shortest(value), text);
+            assert_eq!(fewest_digits(value), text);
             assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
         }
     }

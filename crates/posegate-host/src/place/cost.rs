@@ -6,7 +6,7 @@ use super::headings;
 use super::quadrature::{Approximate, Quadrature};
 use super::rays::Bodies;
 use super::rough;
-use crate::printable::shortest;
+use crate::printable::fewest_digits;
 use core::cell::Cell;
 use posegate::shape::{LineClipper, Shape, SuccessSet};
 
@@ -57,7 +57,7 @@ impl Cost {
     /// Returns the definition of the cost in words, with its unit.
     #[must_use]
     pub fn definition(&self) -> String {
-        let [c1, c2, c3, c_high] = [self.c1, self.c2, self.c3, self.c_high].map(shortest);
+        let [c1, c2, c3, c_high] = [self.c1, self.c2, self.c3, self.c_high].map(fewest_digits);
         format!("{c1} d^2 + {c2} phi^2 + {c3} psi^2 (m, rad), {c_high} outside of S; no unit")
     }
 

@@ -3,7 +3,7 @@
 use super::objective::{Task, ViewCost};
 use super::quadrature::Quadrature;
 use crate::learn::ErrorModel;
-use crate::printable::shortest;
+use crate::printable::fewest_digits;
 use core::cell::RefCell;
 use posegate::shape::{self, Visibility};
 
@@ -88,7 +88,7 @@ impl ViewCost for LearntCost<'_> {
     fn definition(&self) -> String {
         format!(
             "100 times the error model's bound in metres plus its bound in degrees, {} outside of S; no unit",
-            shortest(self.c_high)
+            fewest_digits(self.c_high)
         )
     }
 

@@ -31,12 +31,14 @@ pub(super) struct BetterPlaces<'a> {
     pub begin: [f64; 3],
     pub goal: [f64; 3],
     pub options: &'a Options,
+    /// The cost of the plan. The search compares costs over it, so it does not depend on their unit.
+    pub unit: f64,
 }
 
 /// The scale at which sets must fit: the proofs and the core's integers need a little more than 1.
 const SCALE: f64 = 1.02;
 
-/// A value above all costs, for each set that does not fit.
+/// A value above all costs in use, for each set that does not fit: this many times the plan's cost.
 const MISFIT: f64 = 1e6;
 
 /// Places from which a pattern search begins.
@@ -55,7 +57,7 @@ impl BetterPlaces<'_> {
         let looks = self.looks_of(plan);
         let own: Vec<usize> = looks.iter().map(|(look, _)| *look).collect();
         // Better places of a single look saved at most 0.1 % where it was tried.
-        if own.len() < 2 {
+        if own.len() < 2 || !(self.unit > 0.0) {
             return vec![];
         }
         let mut chains = vec![own.clone()];
@@ -73,7 +75,7 @@ impl BetterPlaces<'_> {
             }
             let (value, places) = self.best(&chain, &looks);
             let saved = if chain == own { WORTH_IT } else { 1e-6 };
-            if value < plan.cost * (1.0 - saved) {
+            if value < 1.0 - saved {
                 found.push((value, chain.iter().copied().zip(places).collect()));
             }
             tried.push(chain);
@@ -122,7 +124,7 @@ impl BetterPlaces<'_> {
         self.site.planner.metre * metres + self.site.planner.look_cost * looks as f64
     }
 
-    /// Returns the best places found for a chain of looks, and the cost; at least [`MISFIT`] if the chain fails.
+    /// Returns the best places found for a chain of looks, and the cost over that of the plan; at least [`MISFIT`] if the chain fails.
     fn best(&self, chain: &[usize], known: &[PlacedLook]) -> (f64, Vec<[f64; 3]>) {
         let mut begun: Vec<(f64, Vec<[f64; 3]>)> = self
             .beginnings(chain, known)
@@ -217,7 +219,7 @@ impl BetterPlaces<'_> {
         moves
     }
 
-    /// Returns the cost of a chain. If sets do not fit or the risk is too high, the value is above all costs, and
+    /// Returns the cost of a chain over that of the plan. If sets do not fit or the risk is too high, the value is above all costs, and
     /// smaller the nearer the sets are to fitting. A value that is not below `best` may be any that is not.
     fn value(&self, chain: &[usize], places: &[[f64; 3]], best: f64) -> f64 {
         let stops = || places.iter().copied().chain([self.goal]);
@@ -226,7 +228,7 @@ impl BetterPlaces<'_> {
             .zip(stops())
             .map(|(from, to)| distance(from, to))
             .sum();
-        let cost = self.price(metres, chain.len());
+        let cost = self.price(metres, chain.len()) / self.unit;
         if cost >= best {
             return f64::INFINITY;
         }

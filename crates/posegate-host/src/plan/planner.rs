@@ -39,10 +39,11 @@ pub struct Prepared<'a> {
     proofs: Arc<Proofs>,
 }
 
-/// The number of times that a plan's places are improved.
+/// The largest number of times that a plan's places are improved.
 const IMPROVEMENTS: usize = 4;
 
-/// The share of the cost that better places of the same looks must save.
+/// The share of the cost that better places of the same looks must save. They are not searched for if a plan is within this share of
+/// the bound of every chain, and not again after a round that saved less than twice this share.
 pub(super) const WORTH_IT: f64 = 0.005;
 
 /// The fallback if a single set cannot be proven.
@@ -251,6 +252,7 @@ impl<'a> Prepared<'a> {
             begin: world(start.pose),
             goal: world(work.success.goal),
             options,
+            unit: plan.cost,
         }
         .places(plan);
         if places.is_empty() {

@@ -32,19 +32,26 @@ pub(super) fn same(
 
 impl Site {
     /// Returns the first difference of a view's camera, mount and tag from those with which a model was learnt, and what to do;
-    /// `None` if all known values are equal. Views name no camera: a camera at the view's mount is compared, and if there are
-    /// several, one that is equal suffices.
+    /// `None` if all known values are equal. Views name neither camera nor tag: those of the site that equal the view's are
+    /// compared, and a camera at its mount if a border narrows its image. If there are several, one that is equal suffices.
     #[must_use]
     pub fn difference(
         &self,
         model: &ErrorModel,
         view: &Visibility,
     ) -> Option<(String, &'static str)> {
-        let tag = self.tags.values().find(|known| known.tag == view.tag)?;
-        let cameras = self.cameras.values();
-        let differences: Option<Vec<String>> = cameras
-            .filter(|camera| camera.mount == view.mount)
-            .map(|camera| camera.difference(model, tag))
+        let at_mount = |camera: &&SiteCamera| camera.mount == view.mount;
+        let same_image = |camera: &&SiteCamera| at_mount(camera) && camera.camera == view.camera;
+        let mut cameras: Vec<&SiteCamera> = self.cameras.values().filter(same_image).collect();
+        if cameras.is_empty() {
+            cameras = self.cameras.values().filter(at_mount).collect();
+        }
+        let tags = || self.tags.values().filter(|known| known.tag == view.tag);
+        let pairs = cameras
+            .iter()
+            .flat_map(|camera| tags().map(move |tag| (camera, tag)));
+        let differences: Option<Vec<String>> = pairs
+            .map(|(camera, tag)| camera.difference(model, tag))
             .collect();
         let first = differences?.into_iter().next()?;
         Some((first, LEARN_WITH_THESE))
