@@ -113,16 +113,16 @@ fn little_slack_is_reported_with_the_key_that_reserves_some() {
         plan["cost"].as_f64().unwrap()
     });
     // The unit of the cost is the user's.
-    let large = with(&tags, "1.1").replacen(
+    let large = with(&tags, "1.5").replacen(
         "[planner]\n",
-        "[planner]\nmetre = 1000000.0\nlook_cost = 1000000.0\n",
+        "[planner]\nmetre = 100000000.0\nlook_cost = 100000000.0\n",
         1,
     );
     write("large.toml", &large);
     let (_, out) = posegate("plan large.toml --to dock-2 --json");
     let plan: Value = serde_json::from_str(&out).unwrap();
-    let cost = 1e-6 * plan["cost"].as_f64().unwrap();
-    assert!((cost - costs[1]).abs() < 1e-6 * cost, "{cost} {costs:?}");
+    let cost = 1e-8 * plan["cost"].as_f64().unwrap();
+    assert!((cost - costs[3]).abs() < 1e-6 * cost, "{cost} {costs:?}");
 
     let most = 1.01 * costs[3];
     assert!(costs.iter().all(|cost| *cost <= most), "{costs:?}");
