@@ -16,6 +16,19 @@ impl SuccessSet {
         tags
     }
 
+    /// Returns the set's views of a tag, in order of occurrence; those of exclusions included.
+    #[must_use]
+    pub fn views_of(&self, tag: &Tag) -> Vec<Visibility> {
+        let mut views = Vec::new();
+        let mut set = self.clone();
+        each_view(&mut set.shape, &mut |view| {
+            if view.tag == *tag {
+                views.push(*view);
+            }
+        });
+        views
+    }
+
     /// Returns the set with every view of a tag changed: the tag's pose, its size, its tolerance. Walls in front of the
     /// tag stay. An allowed error of an observation also applies to the changed tag: views from too far are then
     /// outside.

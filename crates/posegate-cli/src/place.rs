@@ -15,7 +15,6 @@ use posegate_host::place::{
 use posegate_host::printable::fixed;
 use posegate_host::site::{Site, pose_line};
 use serde_json::{Value, json};
-use std::cell::RefCell;
 
 /// Finds the place of a task's tag with the least expected cost of seeing it, or by another objective
 ///
@@ -386,14 +385,8 @@ fn learnt<'a>(
 
 /// Returns the first difference of a task's views of its tag from those with which a model was learnt, and what to do.
 fn differing(site: &Site, model: &ErrorModel, task: &Task) -> Option<(String, &'static str)> {
-    let found: RefCell<Option<(String, &'static str)>> = RefCell::default();
-    let _ = task.set.with_views_of(&task.tag, |view| {
-        let mut first = found.borrow_mut();
-        if first.is_none() {
-            *first = site.difference(model, view);
-        }
-    });
-    found.into_inner()
+    let views = task.set.views_of(&task.tag);
+    views.iter().find_map(|view| site.difference(model, view))
 }
 
 /// Returns `true` if a place satisfies the objective.

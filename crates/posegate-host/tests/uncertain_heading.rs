@@ -12,6 +12,11 @@ use std::f64::consts::TAU;
 /// The goal of the hall: x, y in metres, yaw in degrees.
 const GOAL: [f64; 3] = [0.5, -0.25, 30.0];
 
+/// Returns the proven table of the hall: facets alone.
+fn hall_table() -> Vec<u8> {
+    hall::facets(&hall::site(GOAL), "hall", 2.5)
+}
+
 fn set(estimate: Estimate, uncertainty: Uncertainty, table: &Table<'_>) -> PoseSet {
     let belief = PoseEstimate::new(estimate, uncertainty);
     belief
@@ -32,8 +37,7 @@ fn uncertainties(sigma: f64, sigma_yaw: f64) -> [Uncertainty; 2] {
 
 #[test]
 fn robot_far_from_walls_is_permitted_at_any_uncertainty_of_heading() {
-    let site = hall::site(GOAL);
-    let bytes = hall::facets(&site, "hall", 2.5);
+    let bytes = hall_table();
     let table = Table::parse(&bytes).expect("a table");
     assert!(table.grid().is_none());
     for sigma_yaw_deg in [
@@ -63,12 +67,11 @@ fn robot_far_from_walls_is_permitted_at_any_uncertainty_of_heading() {
     }
 }
 
-/// Sets as AMCL's: correlated positions, and a yaw of at least 5.9 degrees. The whole disc of the robot fits at each position, so every
-/// heading does.
+/// AMCL's sets have correlated positions and a sigma of the yaw of at least 5.9 degrees. Here the circle around the robot lies in the
+/// hall at each position of a set, so every heading succeeds.
 #[test]
 fn all_of_150_sets_with_the_spread_of_a_particle_filter_are_permitted() {
-    let site = hall::site(GOAL);
-    let bytes = hall::facets(&site, "hall", 2.5);
+    let bytes = hall_table();
     let table = Table::parse(&bytes).expect("a table");
     assert!(table.grid().is_none());
     let mut random = Rng::new(150);
@@ -97,9 +100,7 @@ fn all_of_150_sets_with_the_spread_of_a_particle_filter_are_permitted() {
         };
         let uncertainty = Uncertainty::Gaussian(covariance);
         let belief = PoseEstimate::new(estimate, uncertainty);
-        let Ok(set) = belief.pose_set(table.radius_squared(), Trust::FULL) else {
-            continue; // Correlations that no distribution has.
-        };
+        let set = set(estimate, uncertainty, &table);
         sets += 1;
         let confirmed = second::opinion(&bytes, &belief, Trust::FULL) == second::INSIDE;
         permits += u32::from(decide(&table, &set) == Decision::Inside && confirmed);
@@ -110,9 +111,9 @@ fn all_of_150_sets_with_the_spread_of_a_particle_filter_are_permitted() {
 /// Near a wall a corner touches it at some heading: the worst pose is outside of the set.
 #[test]
 fn worst_pose_near_a_wall_fails() {
-    let site = hall::site(GOAL);
-    let bytes = hall::facets(&site, "hall", 2.5);
+    let bytes = hall_table();
     let table = Table::parse(&bytes).expect("a table");
+    let site = hall::site(GOAL);
     let success = &site.task("hall").expect("a task").success;
     let mut denied = 0;
     for sigma_yaw_deg in [5.9, 12.0, 20.0, 40.0, 60.0f64] {
@@ -155,8 +156,7 @@ fn worst_pose_near_a_wall_fails() {
 /// permits.
 #[test]
 fn permits_of_sets_with_large_yaw_errors_are_confirmed() {
-    let site = hall::site(GOAL);
-    let bytes = hall::facets(&site, "hall", 2.5);
+    let bytes = hall_table();
     let table = Table::parse(&bytes).expect("a table");
     let mut random = Rng::new(20);
     let (mut permits, mut beyond_half_a_turn) = (0, 0);

@@ -21,11 +21,8 @@ const SAME: f64 = 1e-3;
 /// camera at the goal sees.
 pub(super) fn grid(task: &Task, space: &Space, most: usize) -> Vec<Vec<f64>> {
     let mut points = space.grid(OF_SPACE.min(most / 2));
-    let seen = core::cell::RefCell::new(Vec::new());
-    let _ = task.set.with_views_of(&task.tag, |view| {
-        seen.borrow_mut().extend(in_view(task, view));
-    });
-    let seen: Vec<Pose3Deg> = seen.into_inner();
+    let views = task.set.views_of(&task.tag);
+    let seen: Vec<Pose3Deg> = views.iter().flat_map(|view| in_view(task, view)).collect();
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for pose in &seen {
         let point = space.point(pose);

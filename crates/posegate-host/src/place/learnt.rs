@@ -4,7 +4,6 @@ use super::objective::{Task, ViewCost};
 use super::quadrature::Quadrature;
 use crate::learn::ErrorModel;
 use crate::printable::fewest_digits;
-use core::cell::RefCell;
 use posegate::shape::{self, Visibility};
 
 /// A bound on the error of an observation by d, phi and psi ([`posegate::shape::Sight`]).
@@ -45,26 +44,22 @@ impl<'a> LearntCost<'a> {
     /// Creates the cost of a task's views; `c_high` is the cost of a miss.
     #[must_use]
     pub fn new(model: ViewBound<'a>, c_high: f64, task: &Task) -> Self {
-        let views: RefCell<Vec<Visibility>> = RefCell::default();
-        let _ = task.set.with_views_of(&task.tag, |view| {
-            if view.is_exact() {
-                return;
-            }
-            let mut level = *view;
+        let mut views: Vec<Visibility> = Vec::new();
+        let all = task.set.views_of(&task.tag).into_iter();
+        for mut level in all.filter(|view| !view.is_exact()) {
             level.tag.pose.z = level.mount.z;
             let same = |known: &&mut Visibility| {
                 known.mount == level.mount && known.mount_tolerance == level.mount_tolerance
             };
-            let mut views = views.borrow_mut();
             match views.iter_mut().find(same) {
                 Some(known) => known.phi_max_deg = known.phi_max_deg.max(level.phi_max_deg),
                 None => views.push(level),
             }
-        });
+        }
         Self {
             model,
             c_high,
-            views: views.into_inner(),
+            views,
         }
     }
 }

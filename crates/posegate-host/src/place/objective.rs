@@ -125,14 +125,10 @@ impl Task {
     /// Returns the tag's tolerance in a success set, or [`Self::USUAL_RESERVE`] if it has none.
     #[must_use]
     pub fn usual_reserve(set: &SuccessSet, tag: &Tag) -> Tolerance {
-        let found = Cell::new(Tolerance::NONE);
-        let _ = set.with_views_of(tag, |view| found.set(view.tag_tolerance));
-        let found = found.get();
-        if found.is_none() {
-            Self::USUAL_RESERVE
-        } else {
-            found
-        }
+        let stated = set.views_of(tag).last().map(|view| view.tag_tolerance);
+        stated
+            .filter(|tolerance| !tolerance.is_none())
+            .unwrap_or(Self::USUAL_RESERVE)
     }
 
     /// Returns the success set with the tag exactly at a pose, or within its tolerance, but at most the reserve.

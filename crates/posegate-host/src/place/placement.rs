@@ -431,9 +431,9 @@ impl PlacementProblem<'_> {
 impl Task {
     /// Returns poses straight in front of the camera at the goal, facing it, at distances up to the largest one.
     fn ahead(&self) -> Vec<Pose3Deg> {
-        let places = core::cell::RefCell::new(Vec::new());
+        let mut places = Vec::new();
         let goal = self.set.goal;
-        let _ = self.set.with_views_of(&self.tag, |view| {
+        for view in self.set.views_of(&self.tag) {
             let mount = &view.mount;
             let yaw_deg = goal.yaw_deg + mount.yaw_deg;
             let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
@@ -442,7 +442,7 @@ impl Task {
                 goal.y + s * mount.x + c * mount.y,
             ];
             let [c, s] = f64::cos_sin_deg(yaw_deg);
-            places.borrow_mut().extend((0..AHEAD).map(|k| {
+            places.extend((0..AHEAD).map(|k| {
                 let share = f64::from(k) / f64::from(AHEAD - 1);
                 let far = view.d_max * libm::pow(20.0, share - 1.0);
                 Pose3Deg {
@@ -453,17 +453,12 @@ impl Task {
                     ..self.tag.pose
                 }
             }));
-        });
-        places.into_inner()
+        }
+        places
     }
 
     fn asks_for_sharpness(&self) -> bool {
-        let asked = core::cell::Cell::new(false);
-        let _ = self.set.with_views_of(&self.tag, |view| {
-            if view.sharpness.is_some() {
-                asked.set(true);
-            }
-        });
-        asked.get()
+        let views = self.set.views_of(&self.tag);
+        views.iter().any(|view| view.sharpness.is_some())
     }
 }

@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use super::costs::distance;
 use super::library::{facing, needed};
-use super::planner::WORTH_IT;
 use super::problem::drive_to;
 use super::{BeliefStateF64, Library, Options, Plan, StepKind};
 use crate::site::{ChainStart, DriveModel, Site};
@@ -31,9 +30,12 @@ pub(super) struct BetterPlaces<'a> {
     pub begin: [f64; 3],
     pub goal: [f64; 3],
     pub options: &'a Options,
-    /// The cost of the plan. The search compares costs over it, so it does not depend on their unit.
-    pub unit: f64,
+    /// The plan. The search compares costs over its cost, so it does not depend on their unit.
+    pub plan: &'a Plan,
 }
+
+/// The share of the cost that better places of the same looks must save.
+pub(super) const WORTH_IT: f64 = 0.005;
 
 /// The scale at which sets must fit: the proofs and the core's integers need a little more than 1.
 const SCALE: f64 = 1.02;
@@ -53,11 +55,11 @@ const HALVINGS: u32 = 7;
 
 impl BetterPlaces<'_> {
     /// Returns places from which cheaper chains with the plan's looks, or with fewer, may succeed, with their looks.
-    pub fn places(&self, plan: &Plan) -> Vec<PlacedLook> {
-        let looks = self.looks_of(plan);
+    pub fn places(&self) -> Vec<PlacedLook> {
+        let looks = self.looks();
         let own: Vec<usize> = looks.iter().map(|(look, _)| *look).collect();
-        // Better places of a single look saved at most 0.1 % where it was tried.
-        if own.len() < 2 || !(self.unit > 0.0) {
+        // The library's places of a single look were as good wherever others were tried.
+        if own.len() < 2 || !(self.plan.cost > 0.0) {
             return vec![];
         }
         let mut chains = vec![own.clone()];
@@ -66,7 +68,7 @@ impl BetterPlaces<'_> {
             others.remove(removed);
             others
         }));
-        chains.extend(self.singles(plan.cost).into_iter().map(|look| vec![look]));
+        chains.extend(self.singles().into_iter().map(|look| vec![look]));
         let mut tried: Vec<Vec<usize>> = vec![];
         let mut found: Vec<(f64, Vec<PlacedLook>)> = vec![];
         for chain in chains {
@@ -84,9 +86,9 @@ impl BetterPlaces<'_> {
         found.into_iter().flat_map(|(_, places)| places).collect()
     }
 
-    /// The looks of a plan and their places.
-    fn looks_of(&self, plan: &Plan) -> Vec<PlacedLook> {
-        let looks = plan.steps.iter().map(|step| &step.report);
+    /// The looks of the plan and their places.
+    fn looks(&self) -> Vec<PlacedLook> {
+        let looks = self.plan.steps.iter().map(|step| &step.report);
         let looks = looks.filter(|report| report.kind == StepKind::Localization);
         let looks = looks.filter_map(|report| {
             let known = self.library.looks.iter();
@@ -98,8 +100,8 @@ impl BetterPlaces<'_> {
         looks.collect()
     }
 
-    /// The looks that may be cheaper alone than a cost, those nearest to the path first.
-    fn singles(&self, cost: f64) -> Vec<usize> {
+    /// The looks that may be cheaper alone than the plan, those nearest to the path first.
+    fn singles(&self) -> Vec<usize> {
         let [begin, goal] = [self.begin, self.goal];
         let looks = self.library.looks.iter().enumerate();
         let mut near: Vec<(f64, usize)> = looks
@@ -112,7 +114,7 @@ impl BetterPlaces<'_> {
                     number,
                 )
             })
-            .filter(|(least, ..)| self.price(*least, 1) < cost)
+            .filter(|(least, ..)| self.price(*least, 1) < self.plan.cost)
             .map(|(_, by, number)| (by, number))
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -124,7 +126,8 @@ impl BetterPlaces<'_> {
         self.site.planner.metre * metres + self.site.planner.look_cost * looks as f64
     }
 
-    /// Returns the best places found for a chain of looks, and the cost over that of the plan; at least [`MISFIT`] if the chain fails.
+    /// Returns the best places found for a chain of looks, and the cost over that of the plan; at least [`MISFIT`] if the
+    /// chain fails.
     fn best(&self, chain: &[usize], known: &[PlacedLook]) -> (f64, Vec<[f64; 3]>) {
         let mut begun: Vec<(f64, Vec<[f64; 3]>)> = self
             .beginnings(chain, known)
@@ -219,8 +222,9 @@ impl BetterPlaces<'_> {
         moves
     }
 
-    /// Returns the cost of a chain over that of the plan. If sets do not fit or the risk is too high, the value is above all costs, and
-    /// smaller the nearer the sets are to fitting. A value that is not below `best` may be any that is not.
+    /// Returns the cost of a chain over that of the plan. If sets do not fit or the risk is too high, the value is above
+    /// all costs, and smaller the nearer the sets are to fitting. The value is infinite if it is known early that it is
+    /// not below `best`.
     fn value(&self, chain: &[usize], places: &[[f64; 3]], best: f64) -> f64 {
         let stops = || places.iter().copied().chain([self.goal]);
         let starts = [self.begin].into_iter().chain(places.iter().copied());
@@ -228,7 +232,7 @@ impl BetterPlaces<'_> {
             .zip(stops())
             .map(|(from, to)| distance(from, to))
             .sum();
-        let cost = self.price(metres, chain.len()) / self.unit;
+        let cost = self.price(metres, chain.len()) / self.plan.cost;
         if cost >= best {
             return f64::INFINITY;
         }

@@ -164,3 +164,25 @@ impl PlanResult {
             && (!options.survive_a_lost_tag || self.contingencies.iter().all(other))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Prepared;
+    use crate::site::Site;
+
+    const PAPER: &str = include_str!("../../../../examples/sites/paper-chain.toml");
+
+    #[test]
+    fn plan_succeeds_with_its_least_margin_and_with_no_larger_one() {
+        let site = Site::parse(PAPER, "site.toml").unwrap();
+        let start = &site.chains["back-to-dock"].start;
+        let mut prepared = Prepared::of(&site, Some("back-to-dock")).unwrap();
+        let planned = prepared.plan(start, "dock", &Options::default()).unwrap();
+        let plan = planned.plan.unwrap();
+        let (least, _) = plan.report().worst_margin().unwrap();
+        let least = f64::from(least.q16()) / 65_536.0;
+        assert!(plan.succeeds_with(1.0) && plan.succeeds_with(least));
+        assert!(!plan.succeeds_with(least + 1e-4));
+    }
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::attempt::Attempt;
-use super::better_places::BetterPlaces;
+use super::better_places::{BetterPlaces, WORTH_IT};
 use super::bound::EveryChain;
 use super::costs::Costs;
 use super::horizons::Horizons;
@@ -41,10 +41,6 @@ pub struct Prepared<'a> {
 
 /// The largest number of times that a plan's places are improved.
 const IMPROVEMENTS: usize = 4;
-
-/// The share of the cost that better places of the same looks must save. They are not searched for if a plan is within this share of
-/// the bound of every chain, and not again after a round that saved less than twice this share.
-pub(super) const WORTH_IT: f64 = 0.005;
 
 /// The fallback if a single set cannot be proven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -211,26 +207,38 @@ impl<'a> Prepared<'a> {
         let priced = !options.costs.is_empty();
         let every = EveryChain::of(self.site, &start, &table.success, self.model, priced);
         let bound = every.bound();
-        let may_be_less = |plan: &Plan| plan.cost > bound * (1.0 + WORTH_IT);
         if !priced && !options.survive_a_lost_tag {
-            for _ in 0..IMPROVEMENTS {
-                let plan = planned.plan.as_ref().filter(|plan| may_be_less(plan));
-                let Some(plan) = plan else { break };
-                let before = plan.cost;
-                let Some(cheaper) = self.with_better_places(&start, &table, options, plan)? else {
-                    break;
-                };
-                planned = cheaper;
-                let after = planned.plan.as_ref().map_or(before, |plan| plan.cost);
-                if after > before * (1.0 - 2.0 * WORTH_IT) {
-                    break;
-                }
-            }
+            let worth = bound * (1.0 + WORTH_IT);
+            planned = self.improved(planned, &start, &table, options, worth)?;
         }
         Ok(PlanResult {
             bound_of_all: bound,
             ..planned
         })
+    }
+
+    /// Improves the places of a plan until it costs no more than `worth`, or an improvement saves little.
+    fn improved(
+        &self,
+        mut planned: PlanResult,
+        start: &ChainStart,
+        work: &TaskTable,
+        options: &Options,
+        worth: f64,
+    ) -> Result<PlanResult, PlanError> {
+        for _ in 0..IMPROVEMENTS {
+            let plan = planned.plan.as_ref().filter(|plan| plan.cost > worth);
+            let Some(plan) = plan else { break };
+            let enough = plan.cost * (1.0 - 2.0 * WORTH_IT);
+            let Some(cheaper) = self.with_better_places(start, work, options, plan)? else {
+                break;
+            };
+            planned = cheaper;
+            if planned.plan.as_ref().is_some_and(|plan| plan.cost > enough) {
+                break;
+            }
+        }
+        Ok(planned)
     }
 
     /// Plans with additional places for a plan's looks and for chains with fewer looks. Returns a cheaper plan, if there
@@ -252,9 +260,9 @@ impl<'a> Prepared<'a> {
             begin: world(start.pose),
             goal: world(work.success.goal),
             options,
-            unit: plan.cost,
+            plan,
         }
-        .places(plan);
+        .places();
         if places.is_empty() {
             return Ok(None);
         }
