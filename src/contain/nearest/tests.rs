@@ -106,7 +106,7 @@ fn the_nearer_end_of_an_arc_counts() {
         };
         PoseSet::of(mean, case.extent)
     };
-    let told = |from: u32, width: u32, yaw: u32, turns: bool| {
+    let scale_in_q10 = |from: u32, width: u32, yaw: u32, turns: bool| {
         let set = at(yaw);
         let set = QuantizedPoseSet::of(layout, &set, case.goal).unwrap();
         let mut piece = layout.pieces().next().unwrap();
@@ -118,7 +118,7 @@ fn the_nearer_end_of_an_arc_counts() {
         assert_eq!(nearest.least, i32::MAX);
         nearest.scale_q10
     };
-    let scale = |from, width, yaw| told(from, width, yaw, true);
+    let scale = |from, width, yaw| scale_in_q10(from, width, yaw, true);
     // The reach is 2^22; 2^-10 of it is 2^12, and one more for rounding up.
     assert_eq!(scale(5, 1 << 30, 5 + (1 << 28)), ((1 << 28) - 8) / 4097);
     assert_eq!(
@@ -128,6 +128,6 @@ fn the_nearer_end_of_an_arc_counts() {
     assert_eq!(scale(5, 1 << 30, 5), 0);
     // Half a radian, of 6.1 mrad.
     assert_eq!(scale(5, u32::MAX, 5), (1 << 24) / 202);
-    assert_eq!(told(5, u32::MAX, 5, false), MOST_Q10);
+    assert_eq!(scale_in_q10(5, u32::MAX, 5, false), MOST_Q10);
     assert_eq!(scale(5, 1 << 31, 5 + (1 << 30)), (1 << 24) / 202);
 }

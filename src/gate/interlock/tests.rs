@@ -223,9 +223,11 @@ fn a_welded_contact_is_found_under_an_output_that_flaps() {
     for start in [0, u32::MAX - 45] {
         let flaps = |levels: [bool; 12]| -> Vec<_> {
             let time = |k: usize| start.wrapping_add(10 * k as u32);
-            let told = |k| if k % 2 == 0 { OPEN } else { SHUT };
+            let commanded = |k| if k % 2 == 0 { OPEN } else { SHUT };
             let shown = levels.into_iter().enumerate();
-            shown.map(|(k, level)| (time(k), told(k), level)).collect()
+            shown
+                .map(|(k, level)| (time(k), commanded(k), level))
+                .collect()
         };
         let welded = [
             false, true, true, true, true, true, true, true, true, true, true, true,
