@@ -6,8 +6,10 @@ use posegate_host::learn::{
     BoundsSettings, Detection, Detections, ErrorModel, Runs, TakenWith, learn_bounds,
 };
 use posegate_host::log::corners::{MountedCamera, TagObservation, locate};
+use posegate_testkit::counts;
 use posegate_testkit::oracle::Rng;
 use rayon::prelude::*;
+use std::sync::LazyLock;
 
 const QUANTILE: f64 = 0.9;
 const FOCAL: f64 = 615.0;
@@ -91,6 +93,12 @@ fn detections_of(mount: Pose3Deg, size: f64, seed: u64, rows: u64) -> Detections
     }
 }
 
+/// Returns the model of detections of tags of 0.1 m, which is learnt once.
+fn learnt_of_small_tags() -> &'static ErrorModel {
+    static MODEL: LazyLock<ErrorModel> = LazyLock::new(|| learnt(0.1));
+    &MODEL
+}
+
 fn learnt(size: f64) -> ErrorModel {
     let settings = BoundsSettings {
         quantile: QUANTILE,
@@ -123,7 +131,7 @@ fn held(model: &ErrorModel, later: &Detections) -> ([f64; 3], f64) {
 #[test]
 fn bounds_are_scaled_to_tags_of_another_size() {
     let lever = MOUNT.x.abs();
-    let small = learnt(0.1);
+    let small = learnt_of_small_tags();
     let large = detections(0.2, 2, 6_000);
     let scaled = small.for_tags_of(0.2, lever, 0.0).unwrap();
     let (share, count) = held(&scaled, &large);
@@ -174,7 +182,10 @@ fn bounds_are_scaled_to_tags_of_another_size() {
         same.bounds_deg([3.0, 10.0, 30.0]),
         large.bounds_deg([3.0, 10.0, 30.0])
     );
-    assert_eq!(scaled.reach()[0][0], 2.0 * learnt(0.1).reach()[0][0]);
+    assert_eq!(
+        scaled.reach()[0][0],
+        2.0 * learnt_of_small_tags().reach()[0][0]
+    );
     assert!(same.write().is_err() && large.write().is_ok());
     for (size, lever) in [
         (0.0, 0.0),
@@ -190,30 +201,32 @@ fn bounds_are_scaled_to_tags_of_another_size() {
 /// before the reference point instead of behind it, or a metre farther away, they are not.
 #[test]
 fn bounds_are_not_valid_for_another_mount() {
-    let model = learnt(0.1);
+    let model = learnt_of_small_tags();
     let of = |x: f64, yaw_deg: f64| {
         let mount = Pose3Deg {
             x,
             yaw_deg,
             ..MOUNT
         };
-        let (share, count) = held(&model, &detections_of(mount, 0.1, 4, 6_000));
+        let (share, count) = held(model, &detections_of(mount, 0.1, 4, 6_000));
         println!("mounted at {x} m, {yaw_deg} deg: {share:?} of {count}");
         assert!(count > 1_000.0, "{count}");
         share
     };
-    for (x, yaw_deg) in [
+    let mounted_alike = [
         (MOUNT.x, 0.0),
         (MOUNT.x - 0.001, 0.1),
         (MOUNT.x + 0.001, -0.1),
-    ] {
+    ];
+    for (x, yaw_deg) in counts::one_a_day(&mounted_alike) {
         let share = of(x, yaw_deg);
         assert!(
             share[1] >= QUANTILE - 0.01 && share[2] >= QUANTILE - 0.01,
             "{share:?}"
         );
     }
-    for (x, yaw_deg) in [(-MOUNT.x, 0.0), (MOUNT.x - 1.0, 0.0), (MOUNT.x, 90.0)] {
+    let mounted_elsewhere = [(-MOUNT.x, 0.0), (MOUNT.x - 1.0, 0.0), (MOUNT.x, 90.0)];
+    for (x, yaw_deg) in counts::one_a_day(&mounted_elsewhere) {
         let share = of(x, yaw_deg);
         assert!(share[1] < QUANTILE - 0.05, "{share:?}");
     }

@@ -12,6 +12,7 @@ pub mod dock;
 pub mod estimates;
 pub mod firmware;
 pub mod gate;
+#[cfg(feature = "host")]
 pub mod hall;
 pub mod judge;
 pub mod looks;
@@ -21,6 +22,7 @@ pub mod oracle;
 pub mod planning_sites;
 pub mod plant;
 pub mod replay;
+#[cfg(feature = "host")]
 pub mod sites;
 pub mod stepped;
 pub mod vectors;

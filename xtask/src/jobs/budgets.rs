@@ -18,7 +18,7 @@ pub fn budgets(_: &Arguments) -> Result {
     let none = Arguments::new(Vec::new(), ".".into(), "budgets", "")?;
     let mut report = Report::default();
     release_program()?;
-    let host = cmd("cargo run --release -p posegate-host --example budgets").print_code()?;
+    let host = program_at(&release("examples/budgets")).print_code()?;
     report.require(host == 0, "host");
     let folder = Scratch::new()?;
     let begun = Instant::now();

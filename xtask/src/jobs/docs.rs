@@ -4,7 +4,7 @@ use crate::arguments::Arguments;
 use crate::files::{self, Scratch, root, target_folder};
 use crate::need::{self, THUMBS};
 use crate::report::Report;
-use crate::shell::{Result, cmd};
+use crate::shell::{Result, cmd, program_at};
 use std::path::Path;
 
 /// Sample files that the pages name.
@@ -24,6 +24,15 @@ const PROGRAMS: [&str; 5] = [
     "cargo build ",
     "cargo rustc ",
     "make ",
+];
+
+/// Commands that build and run a program, and the program that [`release_program`] built.
+const BUILT: [(&str, &str); 2] = [
+    ("cargo run --release -- ", "posegate"),
+    (
+        "cargo run --release -p posegate-host --example drive_bag -- ",
+        "drive_bag",
+    ),
 ];
 
 /// The page that `cargo xtask python` runs, since it needs the wheel.
@@ -47,8 +56,10 @@ pub fn docs(_: &Arguments) -> Result {
     }
     let mut report = Report::default();
     check_front_pages(&mut report)?;
-    // Its lines are the README's.
-    cmd("cargo run -p posegate --features std --example may_dock").run()?;
+    // Its lines are the README's. Built with the features of the fast suite, so that nothing is built twice.
+    cmd("cargo build --workspace --exclude posegate-peers --profile test --example may_dock")
+        .run()?;
+    program_at(&target_folder().join("debug/examples/may_dock")).run()?;
     release_program()?;
     let mut pages = files::files_ending("docs", ".md")?;
     pages.retain(|page| !page.ends_with(OF_PYTHON));
@@ -105,9 +116,10 @@ fn check_front_pages(report: &mut Report) -> Result {
     Ok(())
 }
 
-/// Builds the program, and the example that the pages run.
+/// Builds the program, the example that the pages run, and that of the budgets. In one command, so that all have the same features.
 pub fn release_program() -> Result {
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example drive_bag")
+    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate")
+        .words("--example drive_bag --example budgets")
         .run()
 }
 
@@ -148,9 +160,11 @@ fn command(line: &str) -> Result<Option<String>> {
     if !PROGRAMS.iter().any(|program| line.starts_with(program)) {
         return Err(format!("a command that is not run: {line}").into());
     }
-    // The program is built already. Other cargo commands run in this workspace.
-    if let Some(rest) = line.strip_prefix("cargo run --release -- ") {
-        return Ok(Some(format!("posegate {rest}")));
+    // The program and the example are built already. Other cargo commands run in this workspace.
+    for (start, built) in BUILT {
+        if let Some(rest) = line.strip_prefix(start) {
+            return Ok(Some(format!("{built} {rest}")));
+        }
     }
     let mut words = line.splitn(3, ' ');
     Ok(Some(match (words.next(), words.next(), words.next()) {
@@ -167,7 +181,8 @@ fn run(commands: &[String], folder: &Path) -> Result {
         files::copy(sample, folder.join(files::name(Path::new(sample))))?;
     }
     let old = std::env::var_os("PATH").unwrap_or_default();
-    let paths = std::iter::once(target_folder().join("release")).chain(std::env::split_paths(&old));
+    let built = ["release", "release/examples"].map(|folder| target_folder().join(folder));
+    let paths = built.into_iter().chain(std::env::split_paths(&old));
     let path = std::env::join_paths(paths)?;
     for line in commands {
         let code = cmd("bash -c")
@@ -192,13 +207,14 @@ mod tests {
 
     #[test]
     fn commands_are_those_of_shell_blocks() {
-        let page = "```sh\nposegate demo -o x   # a comment\n\n./ci.sh docs\ncargo run --release -- check s.toml\ncargo build -p posegate-c\n```\n```toml\nx = 1\n```\n";
+        let page = "```sh\nposegate demo -o x   # a comment\n\n./ci.sh docs\ncargo run --release -- check s.toml\ncargo run --release -p posegate-host --example drive_bag -- a b\ncargo build -p posegate-c\n```\n```toml\nx = 1\n```\n";
         let found = commands(page).unwrap().unwrap();
-        assert_eq!(found.len(), 3);
+        assert_eq!(found.len(), 4);
         assert_eq!(found[0].trim(), "posegate demo -o x");
         assert_eq!(found[1], "posegate check s.toml");
+        assert_eq!(found[2], "drive_bag a b");
         assert_eq!(
-            found[2],
+            found[3],
             "cargo build --manifest-path \"$POSEGATE/Cargo.toml\" -p posegate-c"
         );
     }

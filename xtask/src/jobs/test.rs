@@ -29,7 +29,8 @@ pub fn alone(_: &Arguments) -> Result {
 pub fn peers(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
-    cmd("cargo build --bin posegate --profile test").run()?;
+    // With the features of the fast suite, which has built it.
+    cmd("cargo build --workspace --exclude posegate-peers --bin posegate --profile test").run()?;
     cmd("cargo test -p posegate-peers").run()
 }
 
@@ -40,11 +41,11 @@ pub fn deep(_: &Arguments) -> Result {
         .words("--test cheapest_chains --test pose_set_proofs --test stricter_sets --test worst_pose")
         .env("POSEGATE_DEEP", "1")
         .run()?;
-    cmd("cargo test --release -p posegate-cli --test learn -- --ignored many").run()?;
     let tests = [
         "chains",
         "cover",
         "demo",
+        "learn",
         "place",
         "standard_output",
         "tag_tolerance",

@@ -5,6 +5,7 @@ use crate::distribution::{Distribution, HEAD_ON, Random, SQUARES};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, LearnError, clopper_pearson, learn_bounds,
 };
+use posegate_testkit::counts;
 
 fn learnt(detections: &Detections, quantile: f64) -> ErrorModel {
     let settings = BoundsSettings {
@@ -17,9 +18,8 @@ fn learnt(detections: &Detections, quantile: f64) -> ErrorModel {
 /// Both bounds have their coverage on new detections, overall and in each region.
 #[test]
 fn bounds_hold_overall_and_in_each_region() {
-    for (distribution, quantile, seed) in
-        [(HEAD_ON, 0.95, 1), (SQUARES, 0.95, 3), (SQUARES, 0.99, 4)]
-    {
+    let cases = [(HEAD_ON, 0.95, 1), (SQUARES, 0.95, 3), (SQUARES, 0.99, 4)];
+    for (distribution, quantile, seed) in counts::one_a_day(&cases) {
         let model = learnt(&distribution.views(12_000, seed, |_| true), quantile);
         let regions = model.regions().count();
         assert!(regions >= 3, "{regions}");
@@ -185,7 +185,7 @@ fn region_with_too_few_data_is_refused() {
 #[test]
 fn gap_of_the_data_is_refused() {
     const MARGIN: [f64; 3] = [0.05, 0.5, 0.5];
-    for (axis, low, high, quantile) in [
+    let gaps = [
         (0, 2.3, 4.7, 0.9),
         (0, 2.0, 5.0, 0.95),
         (1, 5.0, 20.0, 0.9),
@@ -193,7 +193,9 @@ fn gap_of_the_data_is_refused() {
         (1, 16.0, 20.0, 0.99),
         (2, 20.0, 50.0, 0.9),
         (2, 10.0, 60.0, 0.95),
-    ] {
+    ];
+    let (skipped, step) = counts::part(4);
+    for (axis, low, high, quantile) in gaps.into_iter().skip(skipped).step_by(step) {
         let gap = |at: [f64; 3]| at[axis] > low && at[axis] < high;
         let model = learnt(&SQUARES.views(6000, 54, |at| !gap(at)), quantile);
         let mut random = Random(55);

@@ -5,6 +5,7 @@ use crate::distribution::{Distribution, HEAD_ON, Random, SQUARES};
 use posegate_host::learn::{
     BoundsSettings, Detections, ErrorModel, LearnError, RunSource, Runs, acceptance, learn_bounds,
 };
+use posegate_testkit::counts;
 use std::sync::OnceLock;
 
 /// The places of many approaches, at which the share of errors within a bound is computed exactly.
@@ -159,7 +160,10 @@ fn check(seeds: u64, cases: &[(f64, f64)]) {
 
 #[test]
 fn regions_hold_if_frames_depend_on_each_other() {
-    check(6, &[(0.0, 0.9), (0.3, 0.9), (0.0, 0.95)]);
+    check(
+        6,
+        &counts::one_a_day(&[(0.0, 0.9), (0.3, 0.9), (0.0, 0.95)]),
+    );
 }
 
 #[test]
@@ -170,13 +174,13 @@ fn regions_hold_if_frames_depend_on_each_other_in_many_data_sets() {
 }
 
 /// With independent rows each bound holds with the stated confidence, at every share, also where tags flip.
-fn check_independent(seeds: u64) {
+fn check_independent(seeds: u64, quantiles: &[f64]) {
     for (name, distribution) in [("errors of squares", SQUARES), ("flips head-on", HEAD_ON)] {
         let mut random = Random(2002);
         let places: Vec<[f64; 3]> = (0..40_000)
             .map(|_| Distribution::place(&mut random))
             .collect();
-        for quantile in QUANTILES {
+        for quantile in quantiles.iter().copied() {
             let mut low = Low::default();
             for seed in 0..seeds {
                 let model = learnt(
@@ -199,13 +203,13 @@ fn check_independent(seeds: u64) {
 
 #[test]
 fn regions_hold_if_rows_are_independent() {
-    check_independent(3);
+    check_independent(3, &counts::one_a_day(&QUANTILES));
 }
 
 #[test]
 #[ignore = "takes minutes: ./ci.sh deep"]
 fn regions_hold_if_rows_are_independent_in_many_data_sets() {
-    check_independent(60);
+    check_independent(60, &QUANTILES);
 }
 
 /// The test above finds rows that are wrongly taken as independent.

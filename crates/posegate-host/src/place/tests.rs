@@ -1,6 +1,7 @@
 use super::*;
 use crate::site::{SAMPLE, Site};
 use posegate::shape::{Shape, SuccessSet};
+use posegate_testkit::counts;
 
 mod small;
 
@@ -251,12 +252,12 @@ fn narrow_set_is_found_from_outside() {
 #[test]
 fn errors_are_at_most_the_reported_ones() {
     for (name, set) in sets() {
-        for sigmas in [
+        for sigmas in counts::one_a_day(&[
             [0.1, 0.1, 1.0],
             [0.3, 0.2, 4.0],
             [0.6, 0.6, 12.0],
             [1.5, 0.01, 0.1],
-        ] {
+        ]) {
             let belief = self::sigmas(sigmas);
             let exact = cost(&set, &belief, 1e-6);
             for accuracy in [1e-3, 1e-4] {

@@ -134,7 +134,7 @@ fn main() -> ExitCode {
         .filter(|a| !a.starts_with("--") && alone.as_ref() != Some(a))
         .map(|a| a.parse().expect("accuracy [N [SEED]] [unions|turning]"))
         .collect();
-    let count = arguments.first().copied().unwrap_or(200);
+    let count = arguments.first().copied().unwrap_or(40);
     let seed = arguments.get(1).copied().unwrap_or(1);
     if let Some(part) = alone {
         let run = if part == "unions" {

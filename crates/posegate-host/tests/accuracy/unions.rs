@@ -1,7 +1,7 @@
 //! The same ratio for unions: a lane and a bay that share a face or overlap, also with different yaw ranges, two tags
 //! of which one must be seen, and a footprint that may be across two regions.
 
-use crate::oracle::{Camera, Pose, PoseSet, Rng, SetDeg, World, union_scale, union_slack};
+use crate::oracle::{Camera, Constraints, Pose, PoseSet, Rng, SetDeg, union_scale, union_slack};
 use crate::{Case, core_set, q16, world};
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::contain::{Decision, decide, examine, second};
@@ -113,8 +113,8 @@ type Scene = (&'static str, Box<dyn Fn(Pose) -> f64 + Sync>);
 
 fn scenes() -> [Scene; 4] {
     let of = |sets: [SetDeg; 2]| {
-        let worlds: Vec<World> = sets.iter().map(world).collect();
-        Box::new(move |pose: Pose| union_slack(&worlds, pose)) as Box<dyn Fn(Pose) -> f64 + Sync>
+        let sets = sets.map(|set| Constraints::of(&world(&set).set));
+        Box::new(move |pose: Pose| union_slack(&sets, pose)) as Box<dyn Fn(Pose) -> f64 + Sync>
     };
     let lane = boxes([-2.0, 0.0], [-0.5, 0.5], 25.0);
     let bay = |from: f64, yaw: f64| boxes([from, 0.8], [-0.15, 0.15], yaw);
@@ -170,7 +170,7 @@ fn case(rng: &mut Rng, slack: &(dyn Fn(Pose) -> f64 + Sync), near: bool) -> Case
     }
 }
 
-/// Prints a line for each set. Returns `true` if one misses its goals.
+/// Prints a line for each set. Returns `true` if one misses its goals; that of the least holds for 60 sets and more.
 pub fn unions(count: u64, seed: u64) -> bool {
     let site = Site::parse(SITE, "site.toml").expect("the site is valid");
     let mut short = false;
@@ -196,7 +196,7 @@ pub fn unions(count: u64, seed: u64) -> bool {
         };
         let bytes = build(&order, &|| ()).expect("a table").0;
         let table = Table::parse(&bytes).expect("a table");
-        let mut results: Vec<(f64, bool)> = (0..count.max(SETS))
+        let mut results: Vec<(f64, bool)> = (0..count)
             .into_par_iter()
             .map(|i| {
                 let mut rng = Rng::new(seed.wrapping_mul(9_000_011).wrapping_add(i));
@@ -252,7 +252,7 @@ pub fn unions(count: u64, seed: u64) -> bool {
             bytes.len()
         );
         short |= !(mean >= 0.95
-            && least_of_sixty >= 0.85
+            && (count < SETS || least_of_sixty >= 0.85)
             && largest <= 1.0 + 1e-6
             && outside_share >= 0.9);
     }

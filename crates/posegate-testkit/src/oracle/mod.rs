@@ -17,7 +17,7 @@ pub use random::{
     random_world,
 };
 pub use scale::{Effort, below, min_slack_over, scale, scale_with};
-pub use sets::{Camera, Set, Sight, World, inside, sight, slack};
+pub use sets::{Camera, Constraints, Set, Sight, World, inside, sight, slack};
 pub use union::{Slack, union_scale, union_slack};
 pub use written::{PoseSetDeg, SetDeg, pose_from_deg, pose_set_from_deg, set_from_deg};
 

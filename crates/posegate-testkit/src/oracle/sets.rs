@@ -59,6 +59,30 @@ impl World {
     }
 }
 
+/// All constraints of a success set, in the goal frame.
+#[derive(Clone, Debug)]
+pub struct Constraints {
+    all: Vec<Constraint>,
+    arc: Option<Arc>,
+}
+
+impl Constraints {
+    pub fn of(set: &Set) -> Self {
+        let (all, arc) = constraints(set);
+        Self { all, arc }
+    }
+
+    /// Returns the least of all signed slacks of a goal-frame pose, in metres or radians; at least 0 inside.
+    pub fn slack(&self, pose: Pose) -> f64 {
+        let arc = self.arc.as_ref();
+        let turned = arc.map_or(f64::INFINITY, |arc| {
+            arc.half - wrap(pose[2] - arc.mid).abs()
+        });
+        let values = self.all.iter().map(|constraint| constraint.value(pose));
+        values.fold(turned, f64::min)
+    }
+}
+
 /// `value(x, y, a) = offset + n(a).(x, y) + cos cos(a) + sin sin(a) - weight |r|`, where
 /// `n(a) = fixed + R(a) turning` and `r = (tag - (x, y) - R(a) mount, rise)` runs from the camera to
 /// the tag. For a fixed yaw it is concave in (x, y), and affine when `weight` is 0.
@@ -240,9 +264,7 @@ fn merge(ray: Constraint, part: Constraint) -> Constraint {
 
 /// Returns the least of all signed slacks of a goal-frame pose, in metres or radians; at least 0 inside.
 pub fn slack(set: &Set, q: Pose) -> f64 {
-    let (all, arc) = constraints(set);
-    let turned = arc.map_or(f64::INFINITY, |a| a.half - wrap(q[2] - a.mid).abs());
-    all.iter().map(|c| c.value(q)).fold(turned, f64::min)
+    Constraints::of(set).slack(q)
 }
 
 /// Returns `true` if a goal-frame pose is in the set (sets are closed).

@@ -1,4 +1,5 @@
 use super::*;
+use posegate_testkit::counts;
 use rayon::prelude::*;
 
 /// The chi-square quantile for 3 degrees of freedom at 0.99.
@@ -121,7 +122,8 @@ fn covariance_equals_that_of_simulated_noise() {
     let eye = eye();
     let pose = [0.3, -0.2, 0.1];
     let (one, two) = (tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0));
-    for (tags, sigma, seed) in [(&[one][..], 0.3, 1), (&[one, two][..], 0.5, 2)] {
+    let cases = [(&[one][..], 0.3, 1), (&[one, two][..], 0.5, 2)];
+    for (tags, sigma, seed) in counts::one_a_day(&cases) {
         let rounds = 4000;
         let mut noise = normal(0x9e37_79b9_7f4a_7c15 + seed);
         let mut scaled = || sigma * noise();

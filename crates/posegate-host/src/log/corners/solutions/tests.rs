@@ -3,6 +3,7 @@
 use super::super::locate;
 use super::*;
 use posegate::shape::{Camera, Pose3Deg, Tag, Tolerance};
+use posegate_testkit::counts;
 use rayon::prelude::*;
 
 /// The chi-square quantile for 3 degrees of freedom at 0.99.
@@ -300,10 +301,12 @@ fn union_of_sets_contains_truth_under_stated_noise() {
         [-1.5, 0.3, 0.05],
     ];
     let rounds = crate::rounds(1000, 2);
-    let counted: Vec<[f64; 4]> = poses
+    let (skipped, step) = counts::part(3);
+    let tried: Vec<usize> = (0..poses.len()).skip(skipped).step_by(step).collect();
+    let counted: Vec<[f64; 4]> = tried
         .par_iter()
-        .enumerate()
-        .map(|(k, pose)| {
+        .map(|&k| {
+            let pose = &poses[k];
             let mut random = Random(0x9e37_79b9_7f4a_7c15 + 2 * k as u64);
             let exact = projected(&CAMERA, &LEVEL, &tag, *pose, 75.0).unwrap();
             let mut counts = [0.0; 4];
@@ -320,14 +323,19 @@ fn union_of_sets_contains_truth_under_stated_noise() {
             counts
         })
         .collect();
-    for ([given, held, two, refused], pose) in counted.iter().zip(poses) {
+    for ([given, held, two, refused], &k) in counted.iter().zip(&tried) {
+        let pose = poses[k];
         std::println!("{pose:?}: {held} of {given} held, {two} with two, {refused} refused");
         // With a coverage of 99 %, fewer hits than this happen once in 1,000 times (3.1 standard deviations, and one).
         let least = 0.99 * given - 3.1 * libm::sqrt(0.0099 * given) - 1.0;
         assert!(*held >= least, "{pose:?}: {held} of {given}");
         assert!(*refused <= 0.05 * f64::from(rounds), "{pose:?}: {refused}");
     }
-    assert!(cfg!(miri) || counted[4][2] > 100.0, "{counted:?}");
+    // Of one pose the second solution fits often.
+    let fits_twice = tried.iter().position(|k| *k == 4);
+    if let Some(at) = fits_twice.filter(|_| !cfg!(miri)) {
+        assert!(counted[at][2] > 100.0, "{counted:?}");
+    }
 }
 
 /// Tag and camera at the ends of their tolerances: the union contains the pose, even if the mirrored pose then fits
