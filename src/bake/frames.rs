@@ -142,12 +142,26 @@ fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
 /// optical axis at its centre, and of distance and obliqueness at the camera.
 fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Option<Vec<Draft>> {
     let tag: Resolved<f64> = shape.resolve(goal);
-    let camera = shape.camera;
+    let mut frames = of_image_edges(shape, &tag, extent)?;
+    frames.push(of_optical_axis(shape, &tag, extent));
+    frames.push(of_tag_cone(shape, &tag, extent));
+    Some(frames)
+}
+
+/// Returns the camera's axes in those of the robot: forward, left, up.
+fn camera_axes(tag: &Resolved<f64>) -> [[f64; 3]; 3] {
     let [rx, ry, rz] = tag.axes;
-    let axis = |i: usize| [rx[i], ry[i], rz[i]];
-    let (forward, left, up) = (axis(0), axis(1), axis(2));
+    [0, 1, 2].map(|i| [rx[i], ry[i], rz[i]])
+}
+
+/// Returns a frame for each place of corners: the edges of the image, and the least depth. `None` if no position sees a corner.
+fn of_image_edges(
+    shape: &Visibility,
+    tag: &Resolved<f64>,
+    extent: [[f64; 2]; 2],
+) -> Option<Vec<Draft>> {
+    let [forward, left, up] = camera_axes(tag);
     let [mx, my, mz] = tag.mount;
-    let arm = libm::hypot(mx, my);
     // Corners above each other have the same position on the floor.
     let mut places: Vec<([f64; 2], Vec<f64>)> = Vec::new();
     for [x, y, z] in tag.corners {
@@ -188,7 +202,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
                     offset > 1e-9 * size
                 }
             };
-            let window = camera.view();
+            let window = shape.camera.view();
             let holds = side([1.0, 0.0, 0.0], shape.z_near)
                 && window
                     .planes()
@@ -206,9 +220,16 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
             window: around(farthest(place, extent)),
         });
     }
+    Some(frames)
+}
+
+/// Returns the frame of the angle between the optical axis and the ray to the tag's centre.
+fn of_optical_axis(shape: &Visibility, tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Draft {
+    let [forward, ..] = camera_axes(tag);
+    let [mx, my, mz] = tag.mount;
     let [cx, cy, cz] = tag.centre;
     let height = cz - mz;
-    let (cos_phi, cos_psi, less) = (tag.cos_phi, tag.cos_psi, tag.less);
+    let (cos_phi, less) = (tag.cos_phi, tag.less);
     let mut window = around(farthest([cx, cy], extent));
     // The camera is in front of the tag, so the cone's other half and its tip are excluded.
     let flat = libm::hypot(forward[0], forward[1]);
@@ -220,7 +241,7 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
             offset: -near - normal[0] * mx - normal[1] * my,
         });
     }
-    frames.push(Draft {
+    Draft {
         axes: Axes::Robot,
         point: [cx, cy],
         planes: Vec::new(),
@@ -230,7 +251,15 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
             forward[0] * ray[0] + forward[1] * ray[1] + forward[2] * ray[2] - cos_phi * length(ray)
         })],
         window,
-    });
+    }
+}
+
+/// Returns the frame of distance and obliqueness at the camera, and of the ball that the camera must be in.
+fn of_tag_cone(shape: &Visibility, tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Draft {
+    let [mx, my, mz] = tag.mount;
+    let [cx, cy, cz] = tag.centre;
+    let height = cz - mz;
+    let (cos_psi, less) = (tag.cos_psi, tag.less);
     let normal = tag.normal;
     let d_max = shape.d_max - less.ray;
     // The vector to the camera from a point in front of the tag's centre.
@@ -249,14 +278,13 @@ fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Op
     if let Some([middle, radius]) = tag.ball {
         curves.push(Box::new(move |p| radius - length(back(p, middle))));
     }
-    frames.push(Draft {
+    Draft {
         axes: Axes::World,
         point: [mx, my],
         planes: Vec::new(),
         curves,
-        window: grown(extent, arm),
-    });
-    Some(frames)
+        window: grown(extent, libm::hypot(mx, my)),
+    }
 }
 
 /// Returns a depth at which a tag is certain to fill more than the image.

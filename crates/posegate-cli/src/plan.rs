@@ -5,8 +5,10 @@ use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on, 
 use posegate_host::draw::{chain_picture, success_of};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::plan::{
-    Options, PlanError, Status, crossing_notes, little_slack, margin_text, plan_near,
+    Options, Plan, PlanError, PlanResult, Status, crossing_notes, little_slack, margin_text,
+    plan_near,
 };
+use posegate_host::site::Site;
 use std::collections::BTreeMap;
 
 /// Finds the cheapest chain of looks and drives after which a work task is certain to succeed
@@ -95,54 +97,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     if arguments.json {
         print_json(&planned.to_json())?;
+    } else if let Some(plan) = &planned.plan {
+        print_plan(&site, &planned, plan)?;
     } else {
-        match &planned.plan {
-            Some(plan) => {
-                for line in sentences(&plan.report()) {
-                    print(&line)?;
-                }
-                print(&format_args!(
-                    "cost {:.3} ({} a metre, {} a look), {}; no chain at all costs less than {:.3} (gap {:.1} %)",
-                    plan.cost,
-                    site.planner.metre,
-                    site.planner.look_cost,
-                    match planned.status {
-                        Status::Optimal => "optimal among the chains of the library".to_owned(),
-                        _ => format!(
-                            "no chain of the library is cheaper than {:.3}",
-                            planned.bound.unwrap_or(0.0)
-                        ),
-                    },
-                    planned.bound_of_all,
-                    100.0 * planned.gap().unwrap_or(0.0)
-                ))?;
-                if let Some((margin, step)) = plan.report().worst_margin()
-                    && let Some(advice) = little_slack(margin)
-                {
-                    print(&format_args!(
-                        "worst margin {} at step {}: {advice}",
-                        margin_text(margin),
-                        step + 1
-                    ))?;
-                }
-                for other in &planned.contingencies {
-                    let worst = other.plan.report().worst_margin();
-                    let worst = worst.filter(|(margin, _)| little_slack(*margin).is_some());
-                    print(&format_args!(
-                        "if tag {} is lost at step {}: {} more steps, cost {:.3} from there{}",
-                        other.tags.join(", "),
-                        other.step + 1,
-                        other.plan.steps.len(),
-                        other.plan.cost,
-                        worst.map_or_else(String::new, |(margin, _)| format!(
-                            ", worst margin {}: little slack",
-                            margin_text(margin)
-                        ))
-                    ))?;
-                }
-            }
-            None => print(&planned.why_not())?,
-        }
+        print(&planned.why_not())?;
     }
     if let Some(plan) = &planned.plan {
         for note in crossing_notes(&plan.report(), &site) {
@@ -150,6 +108,53 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         }
     }
     Ok(answer(planned.plan.is_some()))
+}
+
+/// Prints the steps of a plan, its cost with the lower bound, little slack, and the plans for a lost tag.
+fn print_plan(site: &Site, planned: &PlanResult, plan: &Plan) -> Result<(), Failure> {
+    for line in sentences(&plan.report()) {
+        print(&line)?;
+    }
+    print(&format_args!(
+        "cost {:.3} ({} a metre, {} a look), {}; no chain at all costs less than {:.3} (gap {:.1} %)",
+        plan.cost,
+        site.planner.metre,
+        site.planner.look_cost,
+        match planned.status {
+            Status::Optimal => "optimal among the chains of the library".to_owned(),
+            _ => format!(
+                "no chain of the library is cheaper than {:.3}",
+                planned.bound.unwrap_or(0.0)
+            ),
+        },
+        planned.bound_of_all,
+        100.0 * planned.gap().unwrap_or(0.0)
+    ))?;
+    if let Some((margin, step)) = plan.report().worst_margin()
+        && let Some(advice) = little_slack(margin)
+    {
+        print(&format_args!(
+            "worst margin {} at step {}: {advice}",
+            margin_text(margin),
+            step + 1
+        ))?;
+    }
+    for other in &planned.contingencies {
+        let worst = other.plan.report().worst_margin();
+        let worst = worst.filter(|(margin, _)| little_slack(*margin).is_some());
+        print(&format_args!(
+            "if tag {} is lost at step {}: {} more steps, cost {:.3} from there{}",
+            other.tags.join(", "),
+            other.step + 1,
+            other.plan.steps.len(),
+            other.plan.cost,
+            worst.map_or_else(String::new, |(margin, _)| format!(
+                ", worst margin {}: little slack",
+                margin_text(margin)
+            ))
+        ))?;
+    }
+    Ok(())
 }
 
 /// Reads the user's costs of drives.

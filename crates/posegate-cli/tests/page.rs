@@ -4,20 +4,41 @@
 use posegate_host::page::{CORE, Contents, PageError, PageInput, page};
 use posegate_host::site::{SAMPLE, Site};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::process::Command;
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// A site, and the contents of its page.
+type Prepared = (Site, Result<Contents, PageError>);
+
+/// Returns a site file's tables and plans, which all tests of that file share.
+fn prepared(text: &str) -> Arc<OnceLock<Prepared>> {
+    static FILES: Mutex<BTreeMap<String, Arc<OnceLock<Prepared>>>> = Mutex::new(BTreeMap::new());
+    let of_file = {
+        let mut files = FILES.lock().expect("no test panics here");
+        Arc::clone(files.entry(text.into()).or_default())
+    };
+    of_file.get_or_init(|| {
+        let site = Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}"));
+        let contents = Contents::of(&site, &|_| ());
+        (site, contents)
+    });
+    of_file
+}
 
 fn made(text: &str, change: impl FnOnce(&mut PageInput<'_>)) -> Result<String, PageError> {
-    let site = Site::parse(text, "site.toml").unwrap_or_else(|error| panic!("{error}"));
-    let contents = Contents::of(&site, &|_| ())?;
+    let of_file = prepared(text);
+    let (site, contents) = of_file.get().expect("it is prepared");
+    let contents = contents.as_ref().map_err(Clone::clone)?;
     let mut order = PageInput {
-        site: &site,
+        site,
         file: "folder/hall.toml".into(),
         title: "Hall".into(),
         placements: vec![],
         pictures: vec![],
     };
     change(&mut order);
-    page(&order, &contents)
+    page(&order, contents)
 }
 
 /// Returns the data of the page's script.

@@ -208,27 +208,12 @@ pub fn place(
         polished = core::mem::take(&mut found);
     }
     // Each solution has its own budgets, so the solutions can be polished in parallel with the same results.
-    let polish = |Solution { point, .. }: Solution| {
-        let budget = Budget::new(share(DESCENT), progress);
-        let value = budget.values(&searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
-        let from = Solution { point, value };
-        let found = Descent { from, sigma: 0.01 }.search(&searched, &budget, seed);
-        let mut spent = budget.spent();
-        let mut ends = Vec::new();
-        for from in found {
-            let budget = Budget::new(share(LAST), progress);
-            let last = Polish {
-                from,
-                step: 1e-3,
-                smallest: 1e-8,
-            };
-            ends.extend(last.search(&searched, &budget, seed));
-            spent += budget.spent();
-        }
-        (ends, spent)
-    };
-    let ends: Vec<(Vec<Solution>, u64)> =
-        found.into_par_iter().with_max_len(1).map(polish).collect();
+    let budgets = [DESCENT, LAST].map(share);
+    let ends: Vec<(Vec<Solution>, u64)> = found
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|solution| polish(&searched, solution.point, budgets, seed, progress))
+        .collect();
     for (ends, spent) in ends {
         polished.extend(ends);
         total += spent;
@@ -241,10 +226,52 @@ pub fn place(
             Some(order.placed(pose))
         })
         .collect();
-    let mut placed = placed;
-    if matches!(order.objective, Objective::Cost | Objective::ContainedCost) {
-        // Full accuracy decides. A solution that cannot be evaluated comes first, so that its error is reported.
-        let contained = order.objective == Objective::ContainedCost;
+    let mut placed = best_first(placed, order.objective).into_iter();
+    let best = placed.next().ok_or(PlaceError::NoCandidates)??;
+    Ok(Placement {
+        best,
+        others: placed.collect::<Result<_, _>>()?,
+        restarts,
+        evaluations: total,
+    })
+}
+
+/// Improves a solution in two steps, a descent and a polish of what it finds, with a budget of evaluations for each. Returns the ends,
+/// and the evaluations that were spent.
+fn polish(
+    searched: &Searched<'_>,
+    point: Vec<f64>,
+    [descent, last]: [u64; 2],
+    seed: u64,
+    progress: &(dyn Fn(u64) + Sync),
+) -> (Vec<Solution>, u64) {
+    let budget = Budget::new(descent, progress);
+    let value = budget.values(searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
+    let from = Solution { point, value };
+    let found = Descent { from, sigma: 0.01 }.search(searched, &budget, seed);
+    let mut spent = budget.spent();
+    let mut ends = Vec::new();
+    for from in found {
+        let budget = Budget::new(last, progress);
+        let last = Polish {
+            from,
+            step: 1e-3,
+            smallest: 1e-8,
+        };
+        ends.extend(last.search(searched, &budget, seed));
+        spent += budget.spent();
+    }
+    (ends, spent)
+}
+
+/// Sorts places by their cost at full accuracy, if the objective is a cost. A place that cannot be evaluated comes first, so that its
+/// error is reported.
+fn best_first(
+    mut placed: Vec<Result<Placed, PlaceError>>,
+    objective: Objective,
+) -> Vec<Result<Placed, PlaceError>> {
+    if matches!(objective, Objective::Cost | Objective::ContainedCost) {
+        let contained = objective == Objective::ContainedCost;
         placed.sort_by(|a, b| match (a, b) {
             (Ok(a), Ok(b)) => {
                 let cost = |one: &Placed| one.mean.map_or(one.cost_at_goal, |mean| mean.value);
@@ -255,14 +282,7 @@ pub fn place(
             _ => a.is_ok().cmp(&b.is_ok()),
         });
     }
-    let mut placed = placed.into_iter();
-    let best = placed.next().ok_or(PlaceError::NoCandidates)??;
-    Ok(Placement {
-        best,
-        others: placed.collect::<Result<_, _>>()?,
-        restarts,
-        evaluations: total,
-    })
+    placed
 }
 
 /// Evaluates each of the given poses. Returns the index of the best, and the results in the order of the poses.
