@@ -28,12 +28,14 @@ use crate::num::{product, sqrt_ceil};
 use crate::parts;
 use crate::pose::Pose;
 use crate::set::PoseSet;
-use crate::table::{Axes, Facet, Facets, MOST_UNION_SLABS, Piece};
+use crate::table::{Axes, Facet, Facets, MOST_UNION_STEPS, Piece};
 
 /// Most by which rounding in a weighted sum of two sections can lower a bound, fine units.
 const WEIGHED: i64 = 4;
 /// Fraction bits of a weight.
 const WEIGHT_BITS: u32 = 12;
+/// The largest weight, times a square of 24 bits.
+const FAR: i32 = 1 << 29;
 /// Fraction bits of u.
 const U: u32 = 15;
 /// Largest number of halvings of the range of u.
@@ -74,14 +76,15 @@ pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
     };
     let above_goal = pose.yaw.minus(goal.yaw).0;
     let turn = pose.yaw.cos_sin_q30();
-    let depths = facets
-        .pieces()
-        .filter(|piece| in_arc(piece, above_goal, 0))
-        .map(|piece| {
-            let spares = bounds(&piece).map(|bound| bound.spare(at, turn));
-            spares.fold(i64::MAX, i64::min)
-        });
-    depths.fold(i64::MIN, i64::max)
+    let mut most = i64::MIN;
+    for piece in facets.pieces() {
+        if in_arc(&piece, above_goal, 0)
+            && let Some(depth) = depth_in(&piece, at, turn, most)
+        {
+            most = depth;
+        }
+    }
+    most
 }
 
 /// Returns `Ok` if the pieces together contain the set, or the offset of a pose for which no piece was found. `None` without a
@@ -98,7 +101,8 @@ fn search(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Result<(), [
         facets,
         above_goal: set.mean().yaw.minus(goal.yaw).0,
         range: [-(1 << U), 1 << U],
-        slabs: MOST_UNION_SLABS,
+        steps: MOST_UNION_STEPS,
+        choice: facets.steps_of_choice(),
         lost: At { x: 0, y: 0, u: 0 },
     };
     search.lost = search.centre(0);
@@ -172,8 +176,10 @@ struct Search<'a> {
     above_goal: u32,
     /// u of the first and the last heading, 2^-15.
     range: [i32; 2],
-    /// Number of slabs that may still be evaluated.
-    slabs: u32,
+    /// Number of steps that remain ([`MOST_UNION_STEPS`]).
+    steps: u32,
+    /// Number of steps of the choice of a piece.
+    choice: u32,
     /// The last pose for which a piece was searched.
     lost: At,
 }
@@ -250,21 +256,19 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the piece, except those in `not`, that contains the range of headings and in which a pose is deepest. `None` if no piece
-    /// contains the range.
+    /// contains the range, or if no steps remain.
     #[inline(never)]
     fn deepest(&mut self, at: At, not: &[usize]) -> Option<(usize, Piece<'a>)> {
         self.lost = at;
-        let [c, s] = self.sweep.turned_to(at.u);
+        self.steps = self.steps.checked_sub(self.choice)?;
+        let turn = self.sweep.turned_to(at.u);
         let mut best = None;
         let mut most = OUTSIDE;
         for (number, piece) in (0..usize::MAX).zip(self.facets.pieces()) {
-            if not.contains(&number) || !self.is_in_arc(&piece) {
-                continue;
-            }
-            let depth = bounds(&piece)
-                .map(|bound| bound.spare(at, [c, s]))
-                .fold(i64::MAX, i64::min);
-            if depth > most {
+            if !not.contains(&number)
+                && self.is_in_arc(&piece)
+                && let Some(depth) = depth_in(&piece, at, turn, most)
+            {
                 (best, most) = (Some((number, piece)), depth);
             }
         }
@@ -288,14 +292,14 @@ impl<'a> Search<'a> {
             let e = (middle as i32).wrapping_sub(1 << U);
             let is_empty = e.wrapping_add(width.in_u) <= from || e.wrapping_sub(width.in_u) >= to;
             if !is_empty {
-                let Some(left) = self.slabs.checked_sub(1) else {
+                if self.steps == 0 {
                     return Err(self.centre(e));
-                };
-                self.slabs = left;
-                if let Err((slab, at)) = self.slab_holds(bound, beyond, e, &width) {
+                }
+                let found = self.slab_holds(bound, beyond, e, &width, depth == first);
+                if found != Slab::Inside {
                     let is_within = from <= e && e <= to;
-                    if depth >= DEEPEST || is_within && slab == Slab::Outside {
-                        return Err(at);
+                    if depth >= DEEPEST || is_within && found == Slab::Outside {
+                        return Err(self.outermost(bound, beyond, e));
                     }
                     depth = depth.wrapping_add(1);
                     index = index.wrapping_mul(2);
@@ -304,6 +308,7 @@ impl<'a> Search<'a> {
                 }
             }
             // The next slab: up from each second half.
+            let was = depth;
             while depth > first && index & 1 == 1 {
                 depth = depth.wrapping_sub(1);
                 index >>= 1;
@@ -312,11 +317,13 @@ impl<'a> Search<'a> {
             if index.wrapping_shr(depth) != 0 {
                 return Ok(());
             }
-            width = sweep.width(depth);
+            if depth != was {
+                width = sweep.width(depth);
+            }
         }
     }
 
-    /// As [`Search::holds`], within a slab. The error is the result of the middle section, and its farthest pose.
+    /// As [`Search::holds`], within a slab. `Outside` if a pose of the middle section is beyond all of them, to within the weights.
     #[inline(never)]
     fn slab_holds(
         &mut self,
@@ -324,57 +331,76 @@ impl<'a> Search<'a> {
         beyond: &[Bound],
         e: i32,
         width: &Width,
-    ) -> Result<(), (Slab, At)> {
-        let sweep = self.sweep;
-        let own = bound.section(sweep, e);
-        let found = own.slab(sweep, e, width);
-        if found == Slab::Inside {
-            return Ok(());
+        is_first: bool,
+    ) -> Slab {
+        let own = bound.section(self.sweep, e);
+        // Most facets hold for the whole set. In a half of the slab, the sum of the least weight is the facet itself.
+        if is_first || beyond.is_empty() {
+            let found = self.slab(&own, e, width);
+            if found == Slab::Inside || beyond.is_empty() {
+                return found;
+            }
         }
         // The poses beyond all of them form a polygon at each heading. If the set's section, which is convex, does not meet it, two of
         // its sides show that.
-        let mut outermost = (found, self.farthest(&own, e));
+        let mut found = Slab::Unsure;
         let mut first = None;
         for other in beyond {
-            let other = other.section(sweep, e);
-            if other.slab(sweep, e, width) == Slab::Inside
-                || self.excludes(&own, &other, e, width)
-                || first.is_some_and(|first| self.excludes(&first, &other, e, width))
+            let other = other.section(self.sweep, e);
+            found = self.sum_holds(&own, &other, e, width);
+            if found == Slab::Inside
+                || first
+                    .is_some_and(|first| self.sum_holds(&first, &other, e, width) == Slab::Inside)
             {
-                return Ok(());
+                return Slab::Inside;
             }
-            outermost = self.outermost(&own, &other, e);
             first = Some(other);
         }
-        Err(outermost)
+        if found == Slab::Outside && first.is_some_and(|last| !self.is_beyond(&own, &last, e)) {
+            return Slab::Unsure;
+        }
+        found
     }
 
-    /// Returns `true` if no pose of a slab is beyond both facets, by their best weighted sum.
-    #[inline(never)]
-    fn excludes(&mut self, first: &Section, second: &Section, e: i32, width: &Width) -> bool {
-        self.slabs = self.slabs.saturating_sub(1);
-        let turn = self.sweep.turn();
-        let weight = first.weight(second, turn, self.root(e), width.in_u);
-        let sum = first.weighed(second, weight);
-        sum.slab(self.sweep, e, width) == Slab::Inside
+    /// Returns the result of a slab's test of a section, which takes a step.
+    fn slab(&mut self, section: &Section, e: i32, width: &Width) -> Slab {
+        self.steps = self.steps.saturating_sub(1);
+        section.slab(self.sweep, e, width)
     }
 
-    /// Returns `Outside` if a pose of a section is beyond both facets, and the farthest pose by their best weighted sum there.
+    /// Returns `Inside` if no pose of a slab is beyond both facets, by their best weighted sum.
     #[inline(never)]
-    fn outermost(&self, first: &Section, second: &Section, e: i32) -> (Slab, At) {
-        let weight = first.weight(second, self.sweep.turn(), self.root(e), 0);
-        let sum = first.weighed(second, weight);
+    fn sum_holds(&mut self, first: &Section, second: &Section, e: i32, width: &Width) -> Slab {
+        let sum = self.sum(first, second, e, width.in_u);
+        self.slab(&sum, e, width)
+    }
+
+    /// Returns `true` if a pose of a section is beyond both facets, to within the weight of their best sum there.
+    #[inline(never)]
+    fn is_beyond(&self, first: &Section, second: &Section, e: i32) -> bool {
         let root = if self.sweep.radius.is_some() {
             Root::CYLINDER
         } else {
             Root::of(e)
         };
-        let found = if sum.is_outside(&root) {
-            Slab::Outside
-        } else {
-            Slab::Unsure
+        self.sum(first, second, e, 0).is_outside(&root)
+    }
+
+    /// Returns the weighted sum that says most about the poses beyond both facets, over a slab or (for 0) at its middle.
+    fn sum(&self, first: &Section, second: &Section, e: i32, half: i32) -> Section {
+        let weight = first.weight(second, self.sweep.turn(), self.root(e), half);
+        first.weighed(second, weight)
+    }
+
+    /// Returns the pose of a section that is farthest beyond the facets, by the best weighted sum of the first and the last.
+    #[inline(never)]
+    fn outermost(&self, bound: Bound, beyond: &[Bound], e: i32) -> At {
+        let own = bound.section(self.sweep, e);
+        let section = match beyond.last() {
+            Some(last) => self.sum(&own, &last.section(self.sweep, e), e, 0),
+            None => own,
         };
-        (found, self.farthest(&sum, e))
+        self.farthest(&section, e)
     }
 
     /// Returns `sqrt(1 - e^2)`, 2^-15; for a cylinder 1.
@@ -430,23 +456,36 @@ impl<'a> Search<'a> {
 
     /// Returns `true` if the headings of the range lie in a piece's arc.
     fn is_in_arc(&self, piece: &Piece<'_>) -> bool {
-        let [first, last] = self.range;
-        piece.is_whole_circle()
-            || self
-                .arcs(piece)
-                .iter()
-                .any(|[from, to]| *from <= first && last <= *to)
+        if piece.is_whole_circle() {
+            return true;
+        }
+        let reach = self.reach();
+        let [first, last] = self.range.map(|u| i64::from(u).wrapping_mul(reach));
+        self.turned_arcs(piece)
+            .iter()
+            .any(|[from, to]| from.wrapping_shl(U) <= first && last <= to.wrapping_shl(U))
+    }
+
+    /// Returns the largest heading offset, 2^-32 turn.
+    fn reach(&self) -> i64 {
+        (i64::from(self.sweep.yaw) << 8).max(1)
+    }
+
+    /// Returns a piece's arc relative to the estimate's heading, less its slack, 2^-32 turn: as it is, and a turn below and above.
+    fn turned_arcs(&self, piece: &Piece<'_>) -> [[i64; 2]; 3] {
+        let from = i64::from(piece.from.wrapping_sub(self.above_goal));
+        let slack = ARC_SLACK.wrapping_add(self.sweep.swing());
+        [-1i64, 0, -2].map(|turns| {
+            let from = from.wrapping_add(turns << 32);
+            let to = from.wrapping_add(i64::from(piece.width));
+            [from.wrapping_add(slack), to.wrapping_sub(slack)]
+        })
     }
 
     /// Returns a piece's arc as ranges of u, 2^-15, within the arc: as it is, and a turn below and above.
     fn arcs(&self, piece: &Piece<'_>) -> [[i32; 2]; 3] {
-        let reach = (i64::from(self.sweep.yaw) << 8).max(1);
-        let from = i64::from(piece.from.wrapping_sub(self.above_goal));
-        [-1i64, 0, -2].map(|turns| {
-            let from = from.wrapping_add(turns << 32);
-            let to = from.wrapping_add(i64::from(piece.width));
-            let slack = ARC_SLACK.wrapping_add(self.sweep.swing());
-            let (from, to) = (from.wrapping_add(slack), to.wrapping_sub(slack));
+        let reach = self.reach();
+        self.turned_arcs(piece).map(|[from, to]| {
             // Towards the middle of the arc: up at its start, down at its end.
             let down = |v: i64| v.wrapping_shl(U).checked_div_euclid(reach).unwrap_or(0);
             let up = |v: i64| down(v.wrapping_neg()).wrapping_neg();
@@ -455,51 +494,47 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns every facet of a piece with its point.
-fn bounds<'a>(piece: &Piece<'a>) -> impl Iterator<Item = Bound> + use<'a> {
-    piece.frames().flat_map(|frame| {
-        frame.facets().map(move |facet| Bound {
-            facet,
-            axes: frame.axes,
-            point: [i32::from(frame.x), i32::from(frame.y)],
-        })
-    })
+/// Returns the depth of a pose in a piece: the least slack of its facets, length units times 2^28. `None` unless it is above `least`.
+/// `turn` is the cosine and sine of the pose's heading, 2^-30.
+#[inline(never)]
+fn depth_in(piece: &Piece<'_>, at: At, [c, s]: [i32; 2], least: i64) -> Option<i64> {
+    let mut depth = i64::MAX;
+    for frame in piece.frames() {
+        let [px, py] = [frame.x, frame.y].map(|v| i32::from(v) << 14);
+        // Below 2^31: an estimate within reach, the set's offset and a point of the robot.
+        let (ax, ay) = (at.x as i32, at.y as i32);
+        let turned = |x: i32, y: i32, s: i32| {
+            let x_at = product(c, x).wrapping_sub(product(s, y)) >> 30;
+            let y_at = product(s, x).wrapping_add(product(c, y)) >> 30;
+            [x_at as i32, y_at as i32]
+        };
+        let [x, y] = match frame.axes {
+            Axes::World => {
+                let [x, y] = turned(px, py, s);
+                [x.wrapping_add(ax), y.wrapping_add(ay)]
+            }
+            Axes::Robot => turned(ax.wrapping_sub(px), ay.wrapping_sub(py), s.wrapping_neg()),
+        };
+        for facet in frame.facets() {
+            let along = product(facet.x.into(), x).wrapping_add(product(facet.y.into(), y));
+            depth = depth.min((i64::from(facet.b) << 28).wrapping_sub(along));
+            if depth <= least {
+                return None;
+            }
+        }
+    }
+    Some(depth)
 }
 
 impl Bound {
     fn section(&self, sweep: &Sweep, e: i32) -> Section {
         sweep.section(self.facet, self.axes, self.point, e)
     }
-
-    /// Returns the slack of the facet at a pose, length units times 2^28; `turn` is the cosine and sine of its heading, 2^-30.
-    fn spare(&self, at: At, [c, s]: [i32; 2]) -> i64 {
-        let (c, s) = (i64::from(c), i64::from(s));
-        let [px, py] = self.point.map(|v| i64::from(v) << 14);
-        let turned = |x: i64, y: i64, s: i64| {
-            let x_at = c.wrapping_mul(x).wrapping_sub(s.wrapping_mul(y)) >> 30;
-            let y_at = s.wrapping_mul(x).wrapping_add(c.wrapping_mul(y)) >> 30;
-            [x_at, y_at]
-        };
-        let [x, y] = match self.axes {
-            Axes::World => {
-                let [x, y] = turned(px, py, s);
-                [x.wrapping_add(at.x), y.wrapping_add(at.y)]
-            }
-            Axes::Robot => turned(
-                at.x.wrapping_sub(px),
-                at.y.wrapping_sub(py),
-                s.wrapping_neg(),
-            ),
-        };
-        let along = i64::from(self.facet.x)
-            .wrapping_mul(x)
-            .wrapping_add(i64::from(self.facet.y).wrapping_mul(y));
-        (i64::from(self.facet.b) << 28).wrapping_sub(along)
-    }
 }
 
 impl Section {
     /// Returns the section of `(1 - weight) self + weight other`, the weight in 2^-12.
+    #[inline(never)]
     fn weighed(&self, other: &Self, weight: i32) -> Self {
         let own = i64::from((1i32 << WEIGHT_BITS).wrapping_sub(weight));
         let weight = i64::from(weight);
@@ -545,51 +580,75 @@ impl Section {
     #[inline(never)]
     fn weight(&self, other: &Self, turn: i64, root: i64, half: i32) -> i32 {
         let reach = |section: &Self| {
-            let [a, b] = section.along.map(|v| i64::from(v).wrapping_mul(root) >> U);
+            let [a, b] = section.along.map(|v| (product(v, root as i32) >> U) as i32);
             let slope = turn.wrapping_mul(i64::from(section.s)) >> 28;
             let slope = i64::from(section.g).wrapping_add(slope);
-            [slope.wrapping_mul(i64::from(half)) >> U, a, b]
+            [(slope.wrapping_mul(i64::from(half)) >> U) as i32, a, b]
         };
         let left = other.left.wrapping_sub(i64::from(other.c));
         let (p, q) = (reach(self), reach(other));
-        let largest = p
-            .iter()
-            .chain(&q)
-            .fold(left.unsigned_abs(), |most, v| most | v.unsigned_abs());
-        // To 15 bits: squares of lengths below 2^31.6.
-        let by = 49u32.saturating_sub(largest.leading_zeros());
-        let small = |v: i64| v.wrapping_shr(by);
-        let (p, q, left) = (p.map(small), q.map(small), small(left));
-        let dot = |a: [i64; 3], b: [i64; 3]| {
-            let products = a.iter().zip(&b).map(|(a, b)| a.wrapping_mul(*b));
-            products.fold(0i64, i64::wrapping_add)
+        let largest = |v: [i32; 3]| v.iter().fold(1u32, |most, v| most | v.unsigned_abs());
+        let far = i64::from(largest(q)) << 2;
+        if left >= far {
+            return 1 << WEIGHT_BITS;
+        }
+        if left <= far.wrapping_neg() {
+            return 0;
+        }
+        // Each to 12 bits, with a scale of its own.
+        let bits = |v: [i32; 3]| 20u32.saturating_sub(largest(v).leading_zeros());
+        let (by_p, by_q) = (bits(p), bits(q));
+        let left = (left >> by_q) as i32;
+        let [rise, px, py] = p.map(|v| v >> by_p);
+        let [slope, qx, qy] = q.map(|v| v >> by_q);
+        // The same with both slopes turned round: p does not fall towards the end.
+        let (rise, slope) = if rise < 0 {
+            (rise.wrapping_neg(), slope.wrapping_neg())
+        } else {
+            (rise, slope)
         };
-        let (pp, pq, qq) = (dot(p, p), dot(p, q), dot(q, q));
-        if qq == 0 {
-            return 0;
+        let pq = px.wrapping_mul(qx).wrapping_add(py.wrapping_mul(qy));
+        let qq = qx.wrapping_mul(qx).wrapping_add(qy.wrapping_mul(qy));
+        let across = px.wrapping_mul(qy).wrapping_sub(py.wrapping_mul(qx));
+        // lambda |q|^2 at an end where the other facet has this slack: below 2^30.
+        let best = |left: i32| {
+            let open = qq.wrapping_sub(left.wrapping_mul(left));
+            if open <= 0 {
+                return if left < 0 { 0 } else { FAR };
+            }
+            let open = sqrt_ceil(open.unsigned_abs().into()) as u32;
+            // 2^18 * 2^12.5.
+            let sum = (across.unsigned_abs() >> 7)
+                .wrapping_mul(left.unsigned_abs())
+                .checked_div(open)
+                .unwrap_or(0)
+                .min(FAR.unsigned_abs() >> 7)
+                .wrapping_shl(7) as i32;
+            let sum = if left < 0 { sum.wrapping_neg() } else { sum };
+            sum.wrapping_sub(pq).clamp(0, FAR)
+        };
+        let rises = |sum: i32| product(rise, qq).wrapping_add(product(slope, sum));
+        let (mut sum, mut whole) = (best(left.wrapping_sub(slope)), qq);
+        if rises(sum) < 0 {
+            sum = best(left.wrapping_add(slope));
+            if rises(sum) > 0 {
+                (sum, whole) = (rise, slope.wrapping_neg());
+            }
         }
-        let open = qq.wrapping_sub(left.wrapping_mul(left));
-        if open <= 0 && left < 0 {
-            return 0;
+        // lambda / (1 + lambda), with lambda in the same scale as 1.
+        let apart = by_p.abs_diff(by_q).min(31);
+        if by_p > by_q {
+            whole = whole.wrapping_shr(apart);
+        } else {
+            sum = sum.wrapping_shr(apart);
         }
-        let open = sqrt_ceil(open.max(qq >> 8).max(1).unsigned_abs());
-        let across = sqrt_ceil(
-            pp.unsigned_abs()
-                .wrapping_mul(qq.unsigned_abs())
-                .wrapping_sub(pq.unsigned_abs().wrapping_mul(pq.unsigned_abs())),
-        );
-        // Below 2^32 * 2^15.
-        let sum = across.wrapping_mul(left).checked_div(open.max(1));
-        let sum = sum.unwrap_or(0).wrapping_sub(pq);
-        if sum <= 0 {
-            return 0;
-        }
-        // lambda / (1 + lambda).
-        let share = sum
+        let all = sum.wrapping_add(whole).unsigned_abs().max(1);
+        let down = 20u32.saturating_sub(all.leading_zeros());
+        sum.unsigned_abs()
+            .wrapping_shr(down)
             .wrapping_shl(WEIGHT_BITS)
-            .checked_div(qq.wrapping_add(sum))
-            .unwrap_or(0);
-        share.min((1 << WEIGHT_BITS) - 1) as i32
+            .checked_div(all.wrapping_shr(down))
+            .map_or(0, |share| share.min(1 << WEIGHT_BITS) as i32)
     }
 }
 

@@ -68,7 +68,7 @@ pub use self::sight::{
     SightRecord,
 };
 pub use self::worst::WorstCase;
-pub(crate) use self::worst::{MOST_SLABS, MOST_UNION_SLABS};
+pub(crate) use self::worst::{MOST_SLABS, MOST_UNION_STEPS};
 
 mod bytes;
 mod checksum;

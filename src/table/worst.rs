@@ -1,11 +1,14 @@
 //! The largest cost of a decision on a table, from the contents of the table.
 
-use super::{Axes, Table};
+use super::{Axes, Facets, Table};
 
 /// Largest number of slabs of headings of one pose-set that are evaluated.
 pub(crate) const MOST_SLABS: u32 = 33;
-/// Largest number of slabs, and of pairs of facets on slabs, that are evaluated if several pieces may contain a pose-set together.
-pub(crate) const MOST_UNION_SLABS: u32 = 96;
+/// Largest number of steps that are taken if several pieces may contain a pose-set together: tests of a facet, or of a pair of
+/// facets, on a slab of headings. The choice of a piece also takes some ([`Facets::steps_of_choice`]).
+pub(crate) const MOST_UNION_STEPS: u32 = 72;
+/// Price of such a step, and of a piece's arc, in slabs.
+const SLABS_OF_STEP: u32 = 2;
 
 /// The largest number of steps of each kind in a decision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,6 +73,20 @@ impl WorstCase {
     }
 }
 
+impl Facets<'_> {
+    /// Returns the number of steps that the choice of a piece for a pose counts as: at least their cost, with that of the cheapest
+    /// tests of the piece's facets.
+    pub(crate) fn steps_of_choice(&self) -> u32 {
+        let all = self
+            .frame_count()
+            .saturating_mul(4)
+            .saturating_add(self.facet_count());
+        u32::try_from(all >> 5)
+            .unwrap_or(u32::MAX)
+            .saturating_add(1)
+    }
+}
+
 impl Table<'_> {
     /// Returns the largest number of steps of a decision on this table, within its limit ([`Table::within`]). Reads the whole table: for start-up, or
     /// for the host.
@@ -93,7 +110,8 @@ impl Table<'_> {
             worst.heading_slabs = MOST_SLABS;
         }
         if worst.pieces > 1 {
-            let slabs = MOST_UNION_SLABS.saturating_mul(5);
+            let steps = MOST_UNION_STEPS.saturating_add(worst.pieces);
+            let slabs = steps.saturating_mul(SLABS_OF_STEP);
             worst.heading_slabs = worst.heading_slabs.saturating_add(slabs);
         }
         if let Some(grid) = self.grid() {

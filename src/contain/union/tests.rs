@@ -5,6 +5,17 @@ use super::super::heading::tests::{
 use super::*;
 use std::vec::Vec;
 
+/// Returns every facet of a piece with its point.
+fn bounds<'a>(piece: &Piece<'a>) -> impl Iterator<Item = Bound> + use<'a> {
+    piece.frames().flat_map(|frame| {
+        frame.facets().map(move |facet| Bound {
+            facet,
+            axes: frame.axes,
+            point: [i32::from(frame.x), i32::from(frame.y)],
+        })
+    })
+}
+
 /// A set with up to three facets; every other set is a cylinder.
 fn with_facets(random: &mut Random, count: usize) -> (Sweep, Vec<Bound>) {
     let (mut sweep, ..) = case(random);
@@ -66,7 +77,7 @@ fn no_bound_of_a_weighed_sum_is_below_the_truth() {
                 };
                 sum.weight(&section, sweep.turn(), root, width.in_u)
             };
-            assert!((0..1 << WEIGHT_BITS).contains(&weight));
+            assert!((0..=1 << WEIGHT_BITS).contains(&weight));
             sum = sum.weighed(&section, weight);
             let share = f64::from(weight) / 4_096.0;
             for (_, part) in &mut parts {
