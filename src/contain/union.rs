@@ -4,14 +4,21 @@
 //! one piece, the one in which the estimate lies deepest, each facet that does not hold cuts off a *cap* of the set.
 //! Another piece must contain that cap, except for a cap of the cap, which a third piece must contain.
 //!
-//! A facet `a . P <= b` holds on a cap, the poses of the set with `a1 . P >= b1`, if for some `beta` in `[0, 1)`
+//! A facet `a . P <= b` holds on a cap, the poses of the set with `a1 . P > b1`, if for some `beta` in `[0, 1]`
 //!
 //! `(1 - beta) a . P + beta a1 . P <= (1 - beta) b + beta b1`
 //!
 //! holds on the whole set (weak duality; for any beta this is an upper bound, and at a single heading the best beta makes it
 //! exact). Both sides are sums of terms that [`super::heading`] bounds slab by slab, so the numbers of two facets
-//! are added up for each slab ([`Section::weighed`]), with a beta of the slab's own.
-//! A cap of a cap needs two such sums, one after the other.
+//! are added up for each slab ([`Section::weighed`]), with a beta of the slab's own. For beta = 0 the facet holds on the whole slab,
+//! and for beta = 1 the slab has no pose in the cap.
+//! In a cap of a cap, one of three such sums must hold: of the facet and either of the others, or of these two.
+//!
+//! # Cost
+//! The search takes at most [`MOST_UNION_STEPS`] steps. A test of a section or of a sum on a slab is a step, and the choice of a piece
+//! for a pose is one or more ([`Facets::steps_of_choice`]). A slab is first tested with the facet alone, because most facets hold on
+//! the whole set. Its halves are tested with the sum alone, because the weight is 0 if the facet alone decides. Sets that barely
+//! fit need the most steps. If no steps remain, the set is denied.
 //!
 //! If pieces have arcs, the headings of the set are cut at the ends of these arcs.
 //!
@@ -34,7 +41,7 @@ use crate::table::{Axes, Facet, Facets, MOST_UNION_STEPS, Piece};
 const WEIGHED: i64 = 4;
 /// Fraction bits of a weight.
 const WEIGHT_BITS: u32 = 12;
-/// The largest weight, times a square of 24 bits.
+/// An upper limit of lambda times a square of 25 bits, in [`Section::weight`]; two of them fit into 31 bits.
 const FAR: i32 = 1 << 29;
 /// Fraction bits of u.
 const U: u32 = 15;
@@ -344,7 +351,7 @@ impl<'a> Search<'a> {
         // The poses beyond all of them form a polygon at each heading. If the set's section, which is convex, does not meet it, two of
         // its sides show that.
         let mut found = Slab::Unsure;
-        let mut first = None;
+        let mut first: Option<Section> = None;
         for other in beyond {
             let other = other.section(self.sweep, e);
             found = self.sum_holds(&own, &other, e, width);
@@ -536,13 +543,13 @@ impl Section {
     /// Returns the section of `(1 - weight) self + weight other`, the weight in 2^-12.
     #[inline(never)]
     fn weighed(&self, other: &Self, weight: i32) -> Self {
-        let own = i64::from((1i32 << WEIGHT_BITS).wrapping_sub(weight));
-        let weight = i64::from(weight);
+        let own = (1i32 << WEIGHT_BITS).wrapping_sub(weight);
+        let rounded = |sum: i64| sum.wrapping_add(1 << (WEIGHT_BITS - 1)) >> WEIGHT_BITS;
         let wide = |a: i64, b: i64| {
-            let sum = a.wrapping_mul(own).wrapping_add(b.wrapping_mul(weight));
-            sum.wrapping_add(1 << (WEIGHT_BITS - 1)) >> WEIGHT_BITS
+            let (own, weight) = (i64::from(own), i64::from(weight));
+            rounded(a.wrapping_mul(own).wrapping_add(b.wrapping_mul(weight)))
         };
-        let sum = |a: i32, b: i32| wide(i64::from(a), i64::from(b)) as i32;
+        let sum = |a: i32, b: i32| rounded(product(a, own).wrapping_add(product(b, weight))) as i32;
         let pair = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [sum(a, c), sum(b, d)];
         let turns = self.turns || other.turns;
         // The part that does not turn, among normals that turn.
@@ -572,18 +579,26 @@ impl Section {
         }
     }
 
-    /// Returns the weight of another section, 2^-12 and below 1, with which the sum says most about the poses beyond the
-    /// other: over a slab of half width `half`, or at its middle alone for 0. Any weight is sound.
+    /// Returns the weight of another section, 2^-12, from 0 to 1, with which the sum says most about the poses beyond the
+    /// other: over a slab of half width `half`, or at its middle alone for 0. Any weight from 0 to 1 is sound.
     ///
-    /// With p and q the reaches of both facets as vectors, and d the slack of the other at the estimate, the largest value of the sum is
-    /// least where `p + lambda q` is at an angle to q whose cosine is `d / |q|`.
+    /// With p and q the reaches of both facets along the other two columns, f and g their changes from the middle of the slab to its
+    /// end, and d the slack of the other at the middle, the largest value of `first + lambda other` over the slab is, up to a constant,
+    /// `|p + lambda q| + |f + lambda g| - lambda d`. It is least at one of:
+    ///
+    /// - the lambda with `p + lambda q` at an angle to q whose cosine is `(d - g) / |q|`, if `f + lambda g >= 0` there;
+    /// - the same with `(d + g) / |q|`, if `f + lambda g <= 0` there;
+    /// - `lambda = -f / g` otherwise.
+    ///
+    /// The signs are such that `f >= 0`. Twelve bits of each vector are enough: near its least value the sum hardly depends on lambda.
     #[inline(never)]
     fn weight(&self, other: &Self, turn: i64, root: i64, half: i32) -> i32 {
         let reach = |section: &Self| {
             let [a, b] = section.along.map(|v| (product(v, root as i32) >> U) as i32);
-            let slope = turn.wrapping_mul(i64::from(section.s)) >> 28;
-            let slope = i64::from(section.g).wrapping_add(slope);
-            [(slope.wrapping_mul(i64::from(half)) >> U) as i32, a, b]
+            let slope = product(turn as i32, section.s) >> 28;
+            // Halved to fit.
+            let slope = i64::from(section.g).wrapping_add(slope) >> 1;
+            [(product(slope as i32, half) >> (U - 1)) as i32, a, b]
         };
         let left = other.left.wrapping_sub(i64::from(other.c));
         let (p, q) = (reach(self), reach(other));
@@ -601,7 +616,7 @@ impl Section {
         let left = (left >> by_q) as i32;
         let [rise, px, py] = p.map(|v| v >> by_p);
         let [slope, qx, qy] = q.map(|v| v >> by_q);
-        // The same with both slopes turned round: p does not fall towards the end.
+        // At the other end of the slab both slopes have the other sign.
         let (rise, slope) = if rise < 0 {
             (rise.wrapping_neg(), slope.wrapping_neg())
         } else {
@@ -610,7 +625,7 @@ impl Section {
         let pq = px.wrapping_mul(qx).wrapping_add(py.wrapping_mul(qy));
         let qq = qx.wrapping_mul(qx).wrapping_add(qy.wrapping_mul(qy));
         let across = px.wrapping_mul(qy).wrapping_sub(py.wrapping_mul(qx));
-        // lambda |q|^2 at an end where the other facet has this slack: below 2^30.
+        // lambda |q|^2, at most [`FAR`], if the other facet has this slack.
         let best = |left: i32| {
             let open = qq.wrapping_sub(left.wrapping_mul(left));
             if open <= 0 {

@@ -403,3 +403,157 @@ fn what_pieces_hold_together_has_no_pose_outside() {
         "{single} {together} {cut} {grown}"
     );
 }
+
+/// A layout, a set and its search at some range of headings.
+fn searched(random: &mut Random, bytes: &[u8], test: impl Fn(&mut Search<'_>, &mut Random)) {
+    let cells = crate::table::Cells {
+        x_lo_um: 0,
+        y_lo_um: 0,
+        step_um: 1,
+        columns: 1,
+        rows: 1,
+        yaw_lo: crate::num::BinaryAngle(0),
+        yaw_span: 1 << 32,
+        slabs: 1,
+    };
+    let facets = Facets::parse(bytes, &cells).expect("a layout");
+    let (sweep, ..) = case(random);
+    let mut search = Search {
+        sweep: &sweep,
+        facets: &facets,
+        above_goal: (random.within(-0.06, 0.06) * 4_294_967_296.0) as i64 as u32,
+        range: [-(1 << U), 1 << U],
+        steps: MOST_UNION_STEPS,
+        choice: facets.steps_of_choice(),
+        lost: At { x: 0, y: 0, u: 0 },
+    };
+    test(&mut search, random);
+}
+
+/// A range of headings lies in a piece's arc exactly if it lies in the arc's range of u, rounded towards its middle. Every other range
+/// begins or ends at the arc's own end.
+#[test]
+fn range_is_in_arc_if_and_only_if_within_its_range_of_u() {
+    let mut random = Random(37);
+    let (inside, outside) = (core::cell::Cell::new(0u32), core::cell::Cell::new(0u32));
+    for number in 0..crate::test_iterations(20_000, 20) {
+        let bytes = layout(&mut random, 4_000.0);
+        let one = 1i32 << U;
+        searched(&mut random, &bytes, |search, random| {
+            for piece in search.facets.pieces() {
+                let arcs = search.arcs(&piece);
+                let u = |random: &mut Random| random.within(-32_768.0, 32_768.0) as i32;
+                let mut range = [u(random), u(random)];
+                range.sort_unstable();
+                if number % 2 == 0 {
+                    let near = random.within(-2.0, 2.0) as i32;
+                    let [from, to] = arcs[number as usize / 2 % 3];
+                    range = [(from + near).clamp(-one, one), to.clamp(-one, one)];
+                }
+                search.range = range;
+                let expected = piece.is_whole_circle()
+                    || arcs
+                        .iter()
+                        .any(|[from, to]| *from <= range[0] && range[1] <= *to);
+                assert_eq!(
+                    search.is_in_arc(&piece),
+                    expected,
+                    "{number}: {range:?} {arcs:?} {piece:?}"
+                );
+                if !piece.is_whole_circle() {
+                    inside.set(inside.get() + u32::from(expected));
+                    outside.set(outside.get() + u32::from(!expected));
+                }
+            }
+        });
+    }
+    let (inside, outside) = (inside.get(), outside.get());
+    assert!(
+        cfg!(miri) || (inside > 500 && outside > 500),
+        "{inside} {outside}"
+    );
+}
+
+/// The chosen piece is the deepest, to within two length units, of those that are not excluded. Without steps none is chosen.
+#[test]
+fn chosen_piece_is_deepest_and_takes_steps() {
+    let mut random = Random(41);
+    let chosen = core::cell::Cell::new(0u32);
+    for number in 0..crate::test_iterations(20_000, 20) {
+        let bytes = layout(&mut random, 4_000.0);
+        searched(&mut random, &bytes, |search, random| {
+            search.range = [0, 0];
+            let at = search.centre(0);
+            let [c, s] = search
+                .sweep
+                .turned_to(0)
+                .map(|v| f64::from(v) / 2f64.powi(30));
+            let not = [random.within(0.0, 5.0) as usize];
+            let of_piece = |piece: &Piece<'_>| {
+                let spares = bounds(piece).map(|bound| {
+                    let [px, py] = bound.point.map(f64::from);
+                    let [x, y] = [at.x, at.y].map(|v| v as f64 / 16_384.0);
+                    let [x, y] = match bound.axes {
+                        Axes::World => [x + c * px - s * py, y + s * px + c * py],
+                        Axes::Robot => {
+                            let (x, y) = (x - px, y - py);
+                            [c * x + s * y, c * y - s * x]
+                        }
+                    };
+                    let along = f64::from(bound.facet.x) * x + f64::from(bound.facet.y) * y;
+                    f64::from(bound.facet.b) - along / 16_384.0
+                });
+                spares.fold(f64::INFINITY, f64::min)
+            };
+            let depths: Vec<(usize, f64)> = (0..)
+                .zip(search.facets.pieces())
+                .filter(|(number, piece)| !not.contains(number) && search.is_in_arc(piece))
+                .map(|(number, piece)| (number, of_piece(&piece)))
+                .collect();
+            let most = depths
+                .iter()
+                .map(|(_, depth)| *depth)
+                .fold(f64::NEG_INFINITY, f64::max);
+            let before = search.steps;
+            match search.deepest(at, &not) {
+                Some((found, _)) => {
+                    let depth = depths.iter().find(|(number, _)| *number == found);
+                    let depth = depth.expect("a piece that may be chosen").1;
+                    assert!(
+                        depth >= most - 2.0 && depth >= -6.0,
+                        "{number}: {depth} {most}"
+                    );
+                    chosen.set(chosen.get() + 1);
+                }
+                None => assert!(most <= -2.0, "{number}: {most}"),
+            }
+            assert_eq!(search.steps, before - search.choice);
+            search.steps = search.choice - 1;
+            assert!(search.deepest(at, &not).is_none());
+        });
+    }
+    assert!(cfg!(miri) || chosen.get() > 500, "{}", chosen.get());
+}
+
+/// A weight of 1 leaves the other facet alone: a slab on which the sum holds then has no pose beyond that facet. A weight of 0
+/// leaves the first.
+#[test]
+fn weights_of_zero_and_one_leave_one_facet() {
+    let mut random = Random(43);
+    for _ in 0..crate::test_iterations(2_000, 20) {
+        let (sweep, bounds) = with_facets(&mut random, 2);
+        let [first, second] = [0, 1].map(|i: usize| bounds[i].section(&sweep, 1 << (U - 1)));
+        for (weight, alone) in [(0, first), (1 << WEIGHT_BITS, second)] {
+            let sum = first.weighed(&second, weight);
+            assert_eq!(sum.left, alone.left - WEIGHED);
+            assert_eq!(
+                [sum.c, sum.s, sum.g, sum.h, sum.g_turning],
+                [alone.c, alone.s, alone.g, alone.h, alone.g_turning]
+            );
+            assert_eq!(
+                [sum.along, sum.ahead, sum.normal],
+                [alone.along, alone.ahead, alone.normal]
+            );
+        }
+    }
+}
