@@ -259,11 +259,11 @@ mod firmware {
             let limits = match (is_union, M4F) {
                 (false, true) => [20_000, 29_000],
                 (false, false) => [60_000, 112_000],
-                (true, true) => [20_000, 303_000],
-                (true, false) => [60_000, 1_210_000],
+                (true, true) => [20_000, 125_000],
+                (true, false) => [60_000, 450_000],
             };
             counter.short_of(cost, search.cost(), "instructions", limits);
-            let most = if is_union { 2_176 } else { 1_024 };
+            let most = if is_union { 2_112 } else { 1_024 };
             counter.short_of(depth, u64::from(deepest), "B", [512, most]);
         } else {
             counter.line(
