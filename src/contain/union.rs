@@ -508,8 +508,9 @@ fn depth_in(piece: &Piece<'_>, at: At, [c, s]: [i32; 2], least: i64) -> Option<i
     let mut depth = i64::MAX;
     for frame in piece.frames() {
         let [px, py] = [frame.x, frame.y].map(|v| i32::from(v) << 14);
-        // Below 2^31: an estimate within reach, the set's offset and a point of the robot.
-        let (ax, ay) = (at.x as i32, at.y as i32);
+        // A point is nearer than 2^29 and a set within reach than 2^30 on each axis, so all vectors are shorter than 2^31. A pose
+        // that is farther (in reports) is outside of every piece.
+        let [ax, ay] = [at.x, at.y].map(|v| v.clamp(-(1 << 30), 1 << 30) as i32);
         let turned = |x: i32, y: i32, s: i32| {
             let x_at = product(c, x).wrapping_sub(product(s, y)) >> 30;
             let y_at = product(s, x).wrapping_add(product(c, y)) >> 30;

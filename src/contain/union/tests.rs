@@ -557,3 +557,28 @@ fn weights_of_zero_and_one_leave_one_facet() {
         }
     }
 }
+
+/// A pose far from the goal is outside, however far it is.
+#[test]
+fn far_pose_is_outside_of_every_piece() {
+    let mut random = Random(47);
+    let goal = Pose {
+        x_um: 0,
+        y_um: 0,
+        yaw: crate::num::BinaryAngle(0),
+    };
+    for number in 0..crate::test_iterations(2_000, 20) {
+        let bytes = layout(&mut random, 4_000.0);
+        searched(&mut random, &bytes, |search, random| {
+            let direction = random.within(0.0, core::f64::consts::TAU);
+            let far = random.within(2e7, 2e9);
+            let pose = Pose {
+                x_um: (far * direction.cos()) as i32,
+                y_um: (far * direction.sin()) as i32,
+                yaw: crate::num::BinaryAngle(0),
+            };
+            let inside = depth(search.facets, pose, goal);
+            assert!(inside < 0, "{number}: {inside} at {pose:?}");
+        });
+    }
+}
