@@ -263,7 +263,7 @@ mod firmware {
                 (true, false) => [60_000, 450_000],
             };
             counter.short_of(cost, search.cost(), "instructions", limits);
-            let most = if is_union { 2_112 } else { 1_024 };
+            let most = if is_union { 2_168 } else { 1_024 };
             counter.short_of(depth, u64::from(deepest), "B", [512, most]);
         } else {
             counter.line(
