@@ -49,6 +49,11 @@ const U: u32 = 15;
 const DEEPEST: u32 = 6;
 /// A pose farther than this outside of every piece is outside of the union: length units, times 2^28.
 const OUTSIDE: i64 = -(4 << 28);
+/// A pose that is farther than this on an axis is treated as at this coordinate by the choice of a piece: length units times 2^14. A
+/// choice is no proof. Points and offsets of a table have 16 bits, so that few poses in it are farther.
+const FARTHEST: i64 = 7 << 27;
+// From the farthest point to the farthest pose, in any direction, is less than 2^31.
+const _: () = assert!(2 * (FARTHEST + (1 << 29)) * (FARTHEST + (1 << 29)) < 1 << 62);
 /// Slack of an arc, 2^-32 turn, as for a single piece.
 const ARC_SLACK: i64 = 3;
 /// Largest number of facets that a pose is beyond, in the search, when another piece must contain it.
@@ -508,9 +513,8 @@ fn depth_in(piece: &Piece<'_>, at: At, [c, s]: [i32; 2], least: i64) -> Option<i
     let mut depth = i64::MAX;
     for frame in piece.frames() {
         let [px, py] = [frame.x, frame.y].map(|v| i32::from(v) << 14);
-        // A point is nearer than 2^29 and a set within reach than 2^30 on each axis, so all vectors are shorter than 2^31. A pose
-        // that is farther (in reports) is outside of every piece.
-        let [ax, ay] = [at.x, at.y].map(|v| v.clamp(-(1 << 30), 1 << 30) as i32);
+        // A point is at most 2^29 from the goal on each axis, so all vectors fit into 32 bits.
+        let [ax, ay] = [at.x, at.y].map(|v| v.clamp(-FARTHEST, FARTHEST) as i32);
         let turned = |x: i32, y: i32, s: i32| {
             let x_at = product(c, x).wrapping_sub(product(s, y)) >> 30;
             let y_at = product(s, x).wrapping_add(product(c, y)) >> 30;
