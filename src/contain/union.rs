@@ -15,10 +15,11 @@
 //! In a cap of a cap, one of three such sums must hold: of the facet and either of the others, or of these two.
 //!
 //! # Cost
-//! The search takes at most [`MOST_UNION_STEPS`] steps. A test of a section or of a sum on a slab is a step, and the choice of a piece
-//! for a pose is one or more ([`Facets::steps_of_choice`]). A slab is first tested with the facet alone, because most facets hold on
-//! the whole set. Its halves are tested with the sum alone, because the weight is 0 if the facet alone decides. Sets that barely
-//! fit need the most steps. If no steps remain, the set is denied.
+//! The search takes at most [`MOST_UNION_STEPS`] steps, and up to three more in its last slab. A test of a section or of a sum on a
+//! slab is a step, and the choice of a piece for a pose is one or more ([`Facets::steps_of_choice`]). A slab is first tested with the
+//! facet alone, because most facets hold on the whole set. Its halves are tested with the sums alone, because the best sum decides at
+//! least as well, apart from rounding. Sets that barely fit need the most steps. If no steps remain, the set is denied. A layout whose
+//! frames, at four facets each, and facets are 1,152 or more cannot permit a set in several pieces: two choices take all steps.
 //!
 //! If pieces have arcs, the headings of the set are cut at the ends of these arcs.
 //!
@@ -74,7 +75,8 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<
     search(facets, set, goal)?.err()
 }
 
-/// Returns the depth of a pose in the piece where it is deepest: length units times 2^28, below zero outside of every piece. For reports.
+/// Returns the depth of a pose in the piece where it is deepest: length units times 2^28, below zero outside of every piece. A pose
+/// beyond [`FARTHEST`] is treated as at it. For reports.
 pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
     let unit = u32::from(facets.unit());
     let fine = |at: i32, goal: i32| {
@@ -346,7 +348,7 @@ impl<'a> Search<'a> {
         is_first: bool,
     ) -> Slab {
         let own = bound.section(self.sweep, e);
-        // Most facets hold for the whole set. In a half of the slab, the sum of the least weight is the facet itself.
+        // Most facets hold for the whole set. In a half of the slab, the best sum decides at least as well, apart from rounding.
         if is_first || beyond.is_empty() {
             let found = self.slab(&own, e, width);
             if found == Slab::Inside || beyond.is_empty() {
@@ -601,7 +603,7 @@ impl Section {
         let reach = |section: &Self| {
             let [a, b] = section.along.map(|v| (product(v, root as i32) >> U) as i32);
             let slope = product(turn as i32, section.s) >> 28;
-            // Halved to fit.
+            // Halved to fit, up to an offset of 5.6 rad. Beyond, the weight can be a bad one, which costs a permit only.
             let slope = i64::from(section.g).wrapping_add(slope) >> 1;
             [(product(slope as i32, half) >> (U - 1)) as i32, a, b]
         };

@@ -7,6 +7,8 @@ pub(crate) const MOST_SLABS: u32 = 33;
 /// Largest number of steps that are taken if several pieces may contain a pose-set together: tests of a facet, or of a pair of
 /// facets, on a slab of headings. The choice of a piece also takes some ([`Facets::steps_of_choice`]).
 pub(crate) const MOST_UNION_STEPS: u32 = 72;
+/// Most steps by which the tests of the last slab can exceed that number.
+const STEPS_BEYOND: u32 = 3;
 /// Price of such a step, and of the cut of the headings at a piece's arc, in slabs: two sections, their weight, their sum and its
 /// test.
 const SLABS_OF_STEP: u32 = 3;
@@ -111,7 +113,9 @@ impl Table<'_> {
             worst.heading_slabs = MOST_SLABS;
         }
         if worst.pieces > 1 {
-            let steps = MOST_UNION_STEPS.saturating_add(worst.pieces);
+            let steps = MOST_UNION_STEPS
+                .saturating_add(STEPS_BEYOND)
+                .saturating_add(worst.pieces);
             let slabs = steps.saturating_mul(SLABS_OF_STEP);
             worst.heading_slabs = worst.heading_slabs.saturating_add(slabs);
         }

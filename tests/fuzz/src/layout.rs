@@ -138,7 +138,7 @@ fn facets(table: &Table<'_>, worst: &mut WorstCase) {
         worst.heading_slabs += 33;
     }
     if worst.pieces > 1 {
-        worst.heading_slabs += 3 * (72 + worst.pieces);
+        worst.heading_slabs += 3 * (72 + 3 + worst.pieces);
     }
     assert_eq!(worst.frames as usize, layout.frame_count());
     assert_eq!(

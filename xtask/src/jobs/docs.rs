@@ -60,6 +60,8 @@ pub fn docs(_: &Arguments) -> Result {
     cmd("cargo build --workspace --exclude posegate-peers --profile test --example may_dock")
         .run()?;
     program_at(&target_folder().join("debug/examples/may_dock")).run()?;
+    // Its command on the pages is replaced below, but its features must be enough.
+    cmd("cargo check -p posegate-host --example drive_bag").run()?;
     release_program()?;
     let mut pages = files::files_ending("docs", ".md")?;
     pages.retain(|page| !page.ends_with(OF_PYTHON));

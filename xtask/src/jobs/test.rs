@@ -41,11 +41,14 @@ pub fn deep(_: &Arguments) -> Result {
         .words("--test cheapest_chains --test other_tags --test pose_set_proofs --test stricter_sets --test worst_pose")
         .env("POSEGATE_DEEP", "1")
         .run()?;
+    // Those of recordings are run by `recorded`.
+    cmd("cargo test --release -p posegate-cli --test learn -- --include-ignored --skip recorded::")
+        .env("POSEGATE_DEEP", "1")
+        .run()?;
     let tests = [
         "chains",
         "cover",
         "demo",
-        "learn",
         "place",
         "standard_output",
         "tag_tolerance",

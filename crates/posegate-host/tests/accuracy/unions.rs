@@ -174,6 +174,7 @@ fn case(rng: &mut Rng, slack: &(dyn Fn(Pose) -> f64 + Sync), near: bool) -> Case
 pub fn unions(count: u64, seed: u64) -> bool {
     let site = Site::parse(SITE, "site.toml").expect("the site is valid");
     let mut short = false;
+    assert!(count > 0, "no sets");
     for (name, slack) in scenes() {
         let task = site.task(name).expect("a task");
         let order = BakeInput {
