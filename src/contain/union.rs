@@ -18,8 +18,7 @@
 //! The search takes at most [`MOST_UNION_STEPS`] steps, and up to three more in its last slab. A test of a section or of a sum on a
 //! slab is a step, and the choice of a piece for a pose is one or more ([`Facets::steps_of_choice`]). A slab is first tested with the
 //! facet alone, because most facets hold on the whole set. Its halves are tested with the sums alone, because the best sum decides at
-//! least as well, apart from rounding. Sets that barely fit need the most steps. If no steps remain, the set is denied. A layout whose
-//! frames, at four facets each, and facets are 1,152 or more cannot permit a set in several pieces: two choices take all steps.
+//! least as well, apart from rounding. Sets that barely fit need the most steps. If no steps remain, the set is denied.
 //!
 //! If pieces have arcs, the headings of the set are cut at the ends of these arcs.
 //!

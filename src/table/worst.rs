@@ -7,6 +7,9 @@ pub(crate) const MOST_SLABS: u32 = 33;
 /// Largest number of steps that are taken if several pieces may contain a pose-set together: tests of a facet, or of a pair of
 /// facets, on a slab of headings. The choice of a piece also takes some ([`Facets::steps_of_choice`]).
 pub(crate) const MOST_UNION_STEPS: u32 = 72;
+/// Largest number of steps that a choice counts as. With very many facets it costs more ([`Facets::uncounted_steps`]): if all of that
+/// counted, a set in two pieces would be denied.
+const MOST_STEPS_OF_CHOICE: u32 = 8;
 /// Most steps by which the tests of the last slab can exceed that number.
 const STEPS_BEYOND: u32 = 3;
 /// Price of such a step, and of the cut of the headings at a piece's arc, in slabs: two sections, their weight, their sum and its
@@ -77,9 +80,14 @@ impl WorstCase {
 }
 
 impl Facets<'_> {
-    /// Returns the number of steps that the choice of a piece for a pose counts as. They cost more than the depths of the pose in all
-    /// pieces with the cheapest tests of all facets: a frame costs as much as four facets, and 32 facets less than a step.
+    /// Returns the number of steps that the choice of a piece for a pose counts as.
     pub(crate) fn steps_of_choice(&self) -> u32 {
+        self.cost_of_choice().min(MOST_STEPS_OF_CHOICE)
+    }
+
+    /// Returns a number of steps that cost more than a choice: the depths of the pose in all pieces, with the cheapest tests of all
+    /// facets. A frame costs as much as four facets, and 32 facets less than a step.
+    fn cost_of_choice(&self) -> u32 {
         let all = self
             .frame_count()
             .saturating_mul(4)
@@ -87,6 +95,13 @@ impl Facets<'_> {
         u32::try_from(all >> 5)
             .unwrap_or(u32::MAX)
             .saturating_add(1)
+    }
+
+    /// Returns the most steps that all choices of one set cost beyond those that they count as.
+    fn uncounted_steps(&self) -> u32 {
+        const MOST_CHOICES: u32 = MOST_UNION_STEPS / MOST_STEPS_OF_CHOICE;
+        let more = self.cost_of_choice().saturating_sub(MOST_STEPS_OF_CHOICE);
+        more.saturating_mul(MOST_CHOICES)
     }
 }
 
@@ -112,10 +127,11 @@ impl Table<'_> {
         if self.facets().is_some_and(|layout| layout.lever() > 0) {
             worst.heading_slabs = MOST_SLABS;
         }
-        if worst.pieces > 1 {
+        if let Some(layout) = self.facets().filter(|_| worst.pieces > 1) {
             let steps = MOST_UNION_STEPS
                 .saturating_add(STEPS_BEYOND)
-                .saturating_add(worst.pieces);
+                .saturating_add(worst.pieces)
+                .saturating_add(layout.uncounted_steps());
             let slabs = steps.saturating_mul(SLABS_OF_STEP);
             worst.heading_slabs = worst.heading_slabs.saturating_add(slabs);
         }

@@ -30,15 +30,19 @@ fn made(text: &str, change: impl FnOnce(&mut PageInput<'_>)) -> Result<String, P
     let of_file = prepared(text);
     let (site, contents) = of_file.get().expect("it is prepared");
     let contents = contents.as_ref().map_err(Clone::clone)?;
-    let mut order = PageInput {
+    let mut order = input(site);
+    change(&mut order);
+    page(&order, contents)
+}
+
+fn input(site: &Site) -> PageInput<'_> {
+    PageInput {
         site,
         file: "folder/hall.toml".into(),
         title: "Hall".into(),
         placements: vec![],
         pictures: vec![],
-    };
-    change(&mut order);
-    page(&order, contents)
+    }
 }
 
 /// Returns the data of the page's script.
@@ -89,14 +93,7 @@ fn page_shows_every_task_and_fetches_nothing() {
     assert!(page.contains("default-src 'none'") && !page.contains("{{"));
     // A second run gives the same bytes.
     let again = Contents::of(&site, &|_| ()).expect("contents");
-    let order = PageInput {
-        site: &site,
-        file: "folder/hall.toml".into(),
-        title: "Hall".into(),
-        placements: vec![],
-        pictures: vec![],
-    };
-    assert_eq!(page, self::page(&order, &again).expect("a page"));
+    assert_eq!(page, self::page(&input(&site), &again).expect("a page"));
 }
 
 #[test]

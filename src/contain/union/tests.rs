@@ -275,16 +275,7 @@ fn what_pieces_hold_together_has_no_pose_outside() {
     for number in 0..crate::test_iterations(60_000, 8) {
         let size = 4_000.0;
         let bytes = layout(&mut random, size);
-        let cells = crate::table::Cells {
-            x_lo_um: 0,
-            y_lo_um: 0,
-            step_um: 1,
-            columns: 1,
-            rows: 1,
-            yaw_lo: crate::num::BinaryAngle(0),
-            yaw_span: 1 << 32,
-            slabs: 1,
-        };
+        let cells = one_cell();
         let facets = Facets::parse(&bytes, &cells).expect("a layout");
         // Length units of 2^10 um to metres.
         let metres = 1_024e-6;
@@ -404,9 +395,73 @@ fn what_pieces_hold_together_has_no_pose_outside() {
     );
 }
 
-/// A layout, a set and its search at some range of headings.
-fn searched(random: &mut Random, bytes: &[u8], test: impl Fn(&mut Search<'_>, &mut Random)) {
-    let cells = crate::table::Cells {
+/// Returns a layout of boxes `[x, y]` in length units of 2^10 um, each a piece with four facets for every heading.
+fn layout_of_boxes(boxes: &[[[i16; 2]; 2]]) -> Vec<u8> {
+    let count = boxes.len() as u8;
+    let mut bytes = std::vec![10u8, count, count, 0];
+    bytes.extend((4 * u16::from(count)).to_le_bytes());
+    for limit in [12_000u16, 3_600, 16_000] {
+        bytes.extend(limit.to_le_bytes());
+    }
+    for _ in boxes {
+        bytes.extend(0u32.to_le_bytes());
+        bytes.extend(u32::MAX.to_le_bytes());
+        bytes.extend([1, 0, 4, 0]);
+    }
+    for _ in boxes {
+        bytes.extend([0, 4, 0, 0, 0, 0]);
+    }
+    for [x, y] in boxes {
+        let one = 16_384i16;
+        let facets = [
+            [one, 0, x[1]],
+            [-one, 0, -x[0]],
+            [0, one, y[1]],
+            [0, -one, -y[0]],
+        ];
+        bytes.extend(facets.iter().flatten().flat_map(|v| v.to_le_bytes()));
+    }
+    bytes
+}
+
+/// A lane and a bay contain a set together, also in a layout with many other pieces: if the whole cost of the choice of a piece
+/// counted, no steps would remain.
+#[test]
+fn many_other_pieces_do_not_deny_a_set_in_two() {
+    let goal = Pose {
+        x_um: 0,
+        y_um: 0,
+        yaw: crate::num::BinaryAngle(0),
+    };
+    let estimate = crate::set::Estimate {
+        x_m: -0.1,
+        y_m: 0.0,
+        yaw_rad: 0.0,
+    };
+    let set = PoseSet::bounded(estimate, 0.3, 0.05).unwrap();
+    let lane_and_bay = [[[-3_000, 0], [-1_000, 1_000]], [[-200, 1_500], [-500, 500]]];
+    for others in [0, 30, 140, 200] {
+        let other = |k: i16| [[2_000 + 5 * k, 2_100 + 5 * k], [-50, 50]];
+        let boxes: Vec<_> = lane_and_bay
+            .into_iter()
+            .chain((0..others).map(other))
+            .collect();
+        let bytes = layout_of_boxes(&boxes);
+        let cells = one_cell();
+        let facets = Facets::parse(&bytes, &cells).expect("a layout");
+        assert!(covers(&facets, &set, goal), "{others} others");
+        // Neither of them contains it alone.
+        for alone in lane_and_bay {
+            let bytes = layout_of_boxes(&[alone, alone]);
+            let facets = Facets::parse(&bytes, &cells).expect("a layout");
+            assert!(!covers(&facets, &set, goal), "{alone:?}");
+        }
+    }
+}
+
+/// Returns cells whose extent is of no importance to facets.
+const fn one_cell() -> crate::table::Cells {
+    crate::table::Cells {
         x_lo_um: 0,
         y_lo_um: 0,
         step_um: 1,
@@ -415,7 +470,12 @@ fn searched(random: &mut Random, bytes: &[u8], test: impl Fn(&mut Search<'_>, &m
         yaw_lo: crate::num::BinaryAngle(0),
         yaw_span: 1 << 32,
         slabs: 1,
-    };
+    }
+}
+
+/// A layout, a set and its search at some range of headings.
+fn searched(random: &mut Random, bytes: &[u8], test: impl Fn(&mut Search<'_>, &mut Random)) {
+    let cells = one_cell();
     let facets = Facets::parse(bytes, &cells).expect("a layout");
     let (sweep, ..) = case(random);
     let mut search = Search {

@@ -138,7 +138,9 @@ fn facets(table: &Table<'_>, worst: &mut WorstCase) {
         worst.heading_slabs += 33;
     }
     if worst.pieces > 1 {
-        worst.heading_slabs += 3 * (72 + 3 + worst.pieces);
+        let all = 4 * layout.frame_count() + layout.facet_count();
+        let choice = u32::try_from(all / 32).expect("facets are counted by 16 bits") + 1;
+        worst.heading_slabs += 3 * (72 + 3 + worst.pieces + 9 * choice.saturating_sub(8));
     }
     assert_eq!(worst.frames as usize, layout.frame_count());
     assert_eq!(
