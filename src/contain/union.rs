@@ -31,7 +31,7 @@
 //! the part of `along` in world axes. They are carried separately from the sum, the latter rounded up.
 
 use super::heading::{Root, Section, Slab, Sweep, Width, in_arc};
-use crate::num::{product, sqrt_ceil};
+use crate::num::{Divisor, product, sqrt_ceil, towards_zero};
 use crate::parts;
 use crate::pose::Pose;
 use crate::set::PoseSet;
@@ -430,10 +430,7 @@ impl<'a> Search<'a> {
         let centre = self.centre(e);
         let [a, b] = section.along.map(i64::from);
         let length = sqrt_ceil(squares(a, b)).max(1);
-        let share = |v: i64| {
-            let v = v.wrapping_mul(self.root(e)).checked_div(length);
-            v.unwrap_or(0)
-        };
+        let share = |v: i64| towards_zero(v.wrapping_mul(self.root(e)), length);
         let (a, b) = (share(a), share(b));
         let [_, [x2, y2], [x3, y3]] = self.sweep.columns;
         let along = |second: i32, third: i32| {
@@ -497,10 +494,10 @@ impl<'a> Search<'a> {
 
     /// Returns a piece's arc as ranges of u, 2^-15, within the arc: as it is, and a turn below and above.
     fn arcs(&self, piece: &Piece<'_>) -> [[i32; 2]; 3] {
-        let reach = self.reach();
+        let reach = Divisor::new(self.reach());
         self.turned_arcs(piece).map(|[from, to]| {
             // Towards the middle of the arc: up at its start, down at its end.
-            let down = |v: i64| v.wrapping_shl(U).checked_div_euclid(reach).unwrap_or(0);
+            let down = |v: i64| reach.map_or(0, |by| by.floor(v.wrapping_shl(U)));
             let up = |v: i64| down(v.wrapping_neg()).wrapping_neg();
             [up(from), down(to)].map(|v| v.clamp(-(1 << 17), 1 << 17) as i32)
         })

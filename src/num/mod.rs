@@ -33,6 +33,7 @@ use core::num::NonZeroU64;
 pub(crate) use self::inverse::Inverse;
 pub(crate) use self::leading::Leading;
 pub(crate) use self::product::{product, wide};
+pub(crate) use self::quotient::{quotient, towards_zero};
 pub(crate) use self::reciprocal::Reciprocal;
 pub(crate) use self::root::{sqrt_ceil, sqrt_floor};
 pub(crate) use self::trig::COS_SIN_ERROR_Q30;
@@ -40,6 +41,7 @@ pub(crate) use self::trig::COS_SIN_ERROR_Q30;
 mod inverse;
 mod leading;
 mod product;
+mod quotient;
 mod reciprocal;
 mod root;
 mod trig;
@@ -341,21 +343,13 @@ impl Divisor {
     /// Returns `dividend / self`, rounded down.
     #[must_use]
     pub fn floor(self, dividend: i64) -> i64 {
-        if dividend >= 0 {
-            (dividend.unsigned_abs() / self.0) as i64
-        } else {
-            self.away(dividend.unsigned_abs()).wrapping_neg()
-        }
+        self.rounded(dividend, dividend < 0)
     }
 
     /// Returns `dividend / self`, rounded up.
     #[must_use]
     pub fn ceil(self, dividend: i64) -> i64 {
-        if dividend >= 0 {
-            self.away(dividend.unsigned_abs())
-        } else {
-            ((dividend.unsigned_abs() / self.0) as i64).wrapping_neg()
-        }
+        self.rounded(dividend, dividend >= 0)
     }
 
     /// Returns `dividend / self`, rounded to the nearest integer: the error is at most 0.5.
@@ -364,10 +358,18 @@ impl Divisor {
         self.floor(dividend.saturating_add((self.0.get() >> 1) as i64))
     }
 
-    fn away(self, dividend: u64) -> i64 {
-        let quotient = dividend / self.0;
-        let exact = quotient.wrapping_mul(self.0.get()) == dividend;
-        quotient.wrapping_add(u64::from(!exact)) as i64
+    /// Returns `dividend / self`, rounded away from zero or towards zero.
+    #[inline(never)]
+    fn rounded(self, dividend: i64, away: bool) -> i64 {
+        let magnitude = dividend.unsigned_abs();
+        let down = quotient(magnitude, self.0.get()).unwrap_or(0);
+        let more = away && down.wrapping_mul(self.0.get()) != magnitude;
+        let rounded = down.wrapping_add(u64::from(more)) as i64;
+        if dividend < 0 {
+            rounded.wrapping_neg()
+        } else {
+            rounded
+        }
     }
 }
 

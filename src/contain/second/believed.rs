@@ -1,7 +1,8 @@
 //! The pose-set in question in the second evaluation's numbers, from the floats of an estimate.
 
-use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, wide, word32};
+use super::bits::{Short, Weight, fixed, is_above_zero, is_below, root, wide, word32};
 use super::turn;
+use crate::num::quotient;
 use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, Trust};
 
@@ -81,7 +82,7 @@ impl Question<'_> {
         // The root of the inflation, 2^-16, rounded down.
         let inflation = match self.trust.inflation {
             Inflation::NONE => 1 << 16,
-            inflation => (u64::from(inflation.q16()) << 16).isqrt() as i64,
+            inflation => root(u64::from(inflation.q16()) << 16) as i64,
         };
         let extent = |value: f64, factor: u64, power: i32, most: i64| {
             let extent = fixed(value, factor, power).unwrap_or(most).min(most);
@@ -107,7 +108,7 @@ impl Question<'_> {
         // Unit 2^-32; divided by the share and times 256, at most 2^60.
         let squared =
             u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
-        let share = |of: u64| Some(Weight::of(over(squared.wrapping_shl(8), of)?, -32));
+        let share = |of: u64| Some(Weight::of(quotient(squared.wrapping_shl(8), of)?, -32));
         let (plane, yaw, in_plane, with_yaw) = match self.trust.cross_terms {
             CrossTerms::Filled => {
                 let weight = Weight::of(squared, -32);

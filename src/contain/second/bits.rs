@@ -1,6 +1,6 @@
 //! Reads numbers from bytes and floats, only for the second evaluation.
 
-use core::num::NonZeroU64;
+use crate::num;
 
 /// Returns a little-endian number at an offset, or `None` beyond the end.
 pub(super) fn word16(bytes: &[u8], at: usize) -> Option<u16> {
@@ -14,19 +14,47 @@ pub(super) fn word32(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(*four))
 }
 
-/// Returns `value / by`, rounded down, or `None` if `by` is zero.
-pub(super) fn over(value: u64, by: u64) -> Option<u64> {
-    NonZeroU64::new(by).map(|by| value / by)
-}
-
 /// Returns `value / by`, rounded towards zero, or 0 if `by` is 0.
 pub(super) fn quotient(value: i64, by: u64) -> i64 {
-    let magnitude = over(value.unsigned_abs(), by).unwrap_or(0) as i64;
+    let magnitude = num::quotient(value.unsigned_abs(), by).unwrap_or(0) as i64;
     if value < 0 {
         magnitude.wrapping_neg()
     } else {
         magnitude
     }
+}
+
+/// Returns the root of a word, rounded down: bit by bit.
+pub(super) const fn root32(value: u32) -> u32 {
+    let (mut rest, mut root, mut bit) = (value, 0u32, 1u32 << 30);
+    while bit != 0 {
+        let next = root.wrapping_add(bit);
+        root >>= 1;
+        if rest >= next {
+            rest = rest.wrapping_sub(next);
+            root = root.wrapping_add(bit);
+        }
+        bit >>= 2;
+    }
+    root
+}
+
+/// Returns the root, rounded down: its upper half is the root of the upper word, its lower half a quotient, which is at most 1 too large
+/// (Zimmermann 1999).
+#[inline(never)]
+pub(super) fn root(value: u64) -> u64 {
+    let up = value.leading_zeros() & 62;
+    let shifted = value.wrapping_shl(up);
+    let high = (shifted >> 32) as u32;
+    let upper = root32(high);
+    // At most twice the upper half: below 2^17.
+    let rest = high.wrapping_sub(upper.wrapping_mul(upper));
+    let both = rest.wrapping_shl(15) | (shifted >> 17) as u32 & 0x7fff;
+    let lower = both.checked_div(upper).unwrap_or(0);
+    // Only the largest numbers saturate: their root is the largest word.
+    let root = u64::from((upper << 16).saturating_add(lower));
+    let is_above = root.wrapping_mul(root) > shifted;
+    root.wrapping_sub(u64::from(is_above)).wrapping_shr(up >> 1)
 }
 
 /// Returns the product of two numbers. Exact.
@@ -250,8 +278,33 @@ impl Weight {
 
 #[cfg(test)]
 mod tests {
-    use super::{by_halves, by_two_halves, short_by, wide};
+    use super::{by_halves, by_two_halves, root, root32, short_by, wide};
     use proptest::prelude::*;
+
+    fn check_root(value: u64) {
+        assert_eq!(root(value), value.isqrt(), "{value}");
+        let word = value as u32;
+        assert_eq!(root32(word), word.isqrt(), "{word}");
+    }
+
+    #[test]
+    fn roots_are_rounded_down_about_squares_and_at_the_ends() {
+        let step = crate::test_iterations(7, 4099) as usize;
+        for low in (0..=u64::from(u16::MAX)).step_by(step) {
+            for high in [0, 1, 0x7fff, 0x8000, 0xb504, 0xb505, 0xfffe, 0xffff] {
+                for number in [high << 16 | low, low << 16 | high] {
+                    for near in -2i64..=2 {
+                        check_root((number * number).wrapping_add_signed(near));
+                        check_root((number * (number + 2)).wrapping_add_signed(near));
+                    }
+                }
+            }
+        }
+        for value in (0..5000).chain((0..64).map(|k| 1 << k)) {
+            check_root(value);
+            check_root(value.wrapping_neg());
+        }
+    }
 
     fn check(a: i32, b: i32) {
         let exact = i64::from(a) * i64::from(b);
@@ -292,6 +345,11 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn roots_are_rounded_down(value in any::<u64>(), less in 0..64u32) {
+            check_root(value >> less);
+        }
+
         #[test]
         fn products_of_halves_are_exact(a in any::<i32>(), b in any::<i32>(), less in 0..32u32) {
             check(a, b);

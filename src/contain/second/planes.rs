@@ -10,7 +10,7 @@
 //! 2^(2 power), so that the largest variance of C is below 2^28.
 
 use super::believed::{Ellipsoid, Question};
-use super::bits::{Short, quotient, short_by, wide, word16, word32};
+use super::bits::{Short, quotient, root, root32, short_by, wide, word16, word32};
 use super::spots::{FINER, outermost_hold};
 use super::turn::cosine_and_sine;
 use crate::parts;
@@ -239,14 +239,14 @@ impl Body {
         self.swing = question.swing;
         let turn = self.swing.unsigned_abs();
         self.alpha = angle(turn);
-        let whole = self.reach.isqrt().wrapping_add(turn);
+        let whole = root(self.reach).wrapping_add(turn);
         self.whole_reach = whole.saturating_mul(whole);
     }
 
     /// Returns a length of 2^-14 units times the length of a normal, 2^-28 units, down.
     pub(super) fn along_any([x, y]: [i32; 2], length: i64) -> i64 {
         let square = x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y));
-        i64::from(square.unsigned_abs().isqrt()).wrapping_mul(length)
+        i64::from(root32(square.unsigned_abs())).wrapping_mul(length)
     }
 
     /// Computes C of an ellipsoid, lowered by its rounding.
@@ -413,7 +413,7 @@ impl Body {
             .wrapping_mul(along(xx, xy, xt))
             .wrapping_sub(i64::from(ax).wrapping_mul(along(xy, yy, yt)));
         // r, the touching point's yaw times 2^16, and its offset across.
-        let distance = square.max(1).unsigned_abs().isqrt();
+        let distance = root(square.max(1).unsigned_abs());
         let by = |value: i64| quotient(value, distance);
         let bend = by(yaw.wrapping_mul(1 << 16)).wrapping_mul(by(across)) >> 16;
         // The value is scaled by L 2^(2 power + 14).
