@@ -130,21 +130,88 @@ impl BinaryAngle {
     /// this far is an error of the source). The error is at most 0.5 unit and 2^-30 unit.
     #[must_use]
     pub fn from_radians(radians: f64) -> Option<Self> {
-        let float = Float::of(radians)?;
-        if !float.is_below_power_of_two(14) {
+        if !is_below_power_of_two(radians, 14) {
             return None;
         }
-        let units = float.scaled(UNITS_PER_RADIAN_Q44, 44, Rounding::Nearest)?;
+        let units = converted(radians, &ANGLE, Rounding::Nearest).ok()?;
         // The low 32 bits are the angle modulo one turn, for negative angles too.
         Some(Self(units as u32))
     }
 }
 
-/// 2^32 / (2 pi) * 2^44, to the nearest integer (relative error 2^-74).
-const UNITS_PER_RADIAN_Q44: u128 = 12_025_407_501_443_077_023_729;
+/// 2^32 / (2 pi), to the nearest 2^-44 (relative error 2^-74).
+const ANGLE: FloatUnit = FloatUnit::new(12_025_407_501_443_077_023_729, 44);
 
 /// Upper bound of the distance of [`BinaryAngle::cos_sin_q15`] from the true cosine and sine, unit 2^-15.
 pub(crate) const COS_SIN_ERROR_Q15: i32 = 2;
+
+/// The units of an integer in one unit of a float: `factor / 2^shift`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FloatUnit {
+    factor: u128,
+    shift: i32,
+}
+
+impl FloatUnit {
+    /// Micrometres in a metre.
+    pub const MICRO: Self = Self::new(UM_PER_M as u128, 0);
+
+    /// Returns the unit `factor / 2^shift`, for a factor of at most 74 bits.
+    pub const fn new(factor: u128, shift: i32) -> Self {
+        Self { factor, shift }
+    }
+}
+
+/// The reason why a float is not converted to an integer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NotConverted {
+    /// It is NaN or infinite.
+    NotFinite,
+    /// The integer would be 2^62 or more.
+    TooLarge,
+}
+
+/// Returns a float in units of an integer, as [`Float::scaled`] rounds it. One function, so that the decoding of a float is in flash once.
+///
+/// # Errors
+/// [`NotConverted`].
+#[inline(never)]
+pub(crate) fn converted(
+    value: f64,
+    unit: &FloatUnit,
+    rounding: Rounding,
+) -> Result<i64, NotConverted> {
+    let float = Float::of(value).ok_or(NotConverted::NotFinite)?;
+    let scaled = float.scaled(unit.factor, unit.shift, rounding);
+    scaled.ok_or(NotConverted::TooLarge)
+}
+
+/// The biased exponent of infinities and NaN.
+const NOT_FINITE: u32 = 0x7ff;
+
+/// Returns the biased exponent of a float.
+const fn biased(value: f64) -> u32 {
+    (value.to_bits() >> 52) as u32 & NOT_FINITE
+}
+
+/// Returns `true` if a float is a number: not infinite, not NaN.
+#[must_use]
+pub(crate) const fn is_finite(value: f64) -> bool {
+    biased(value) != NOT_FINITE
+}
+
+/// Returns `true` if a float is a number above zero.
+#[must_use]
+pub(crate) const fn is_positive(value: f64) -> bool {
+    let bits = value.to_bits();
+    bits != 0 && bits < (NOT_FINITE as u64) << 52
+}
+
+/// Returns `true` if a float is a number with `|value| < 2^power`, for a power from -1022 to 1023.
+#[must_use]
+pub(crate) const fn is_below_power_of_two(value: f64, power: i32) -> bool {
+    (biased(value) as i32) < power.wrapping_add(1023)
+}
 
 /// The rounding of a number between two integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -203,14 +270,8 @@ impl Float {
         !self.negative && self.mantissa != 0
     }
 
-    /// Returns `true` if `|value| < 2^power`.
-    #[must_use]
-    pub(crate) const fn is_below_power_of_two(self, power: i32) -> bool {
-        self.mantissa == 0 || self.top_bit() < power
-    }
-
     /// Returns the `b` for which `2^b <= |value| < 2^(b+1)`; meaningless for zero.
-    #[must_use]
+    #[cfg(test)]
     pub(crate) const fn top_bit(self) -> i32 {
         // A mantissa has at most 53 bits and an exponent at most 11, so no sum leaves an i32.
         63i32

@@ -22,7 +22,9 @@
 //! assert_eq!(empty, Err(InputError::CovarianceZero));
 //! ```
 
-use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
+use crate::num::{
+    BinaryAngle, FloatUnit, NotConverted, Rounding, converted, is_finite, is_positive,
+};
 use crate::pose::Pose;
 
 use self::given::Given;
@@ -393,22 +395,22 @@ fn cylinder(
     yaw_rad: f64,
     inflation: Inflation,
 ) -> Result<(Extent, Given), InputError> {
-    let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
-        let float = Float::of(value).filter(|float| float.is_positive())?;
-        let extent = float
-            .scaled(factor, shift, Rounding::AwayFromZero)
-            .unwrap_or(i64::MAX)
-            .min(limit);
+    let extent = |value: f64, unit: &FloatUnit, limit: i64| {
+        if !is_positive(value) {
+            return None;
+        }
+        let extent = converted(value, unit, Rounding::AwayFromZero);
         // Up to 2^28 times 2^22.
-        Some(inflation.of_length(extent).min(limit))
+        let extent = inflation.of_length(extent.unwrap_or(i64::MAX).min(limit));
+        Some(extent.min(limit))
     };
     let limit = i64::from(crate::pose::REACH_UM);
     let translation =
-        extent(translation_m, u128::from(UM_PER_M), 0, limit).ok_or(InputError::BoundInvalid)?;
+        extent(translation_m, &FloatUnit::MICRO, limit).ok_or(InputError::BoundInvalid)?;
     if translation >= limit {
         return Err(InputError::BoundInvalid);
     }
-    let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23).ok_or(InputError::BoundInvalid)?;
+    let yaw = extent(yaw_rad, &Q24, 1 << 23).ok_or(InputError::BoundInvalid)?;
     let extent = Extent::Bounded {
         translation_um: translation as i32,
         yaw_q24: yaw as i32,
@@ -418,6 +420,7 @@ fn cylinder(
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
 pub(crate) const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
+const Q24: FloatUnit = FloatUnit::new(Q24_PER_RADIAN_Q52, 52);
 
 /// Returns the factor of `radius_squared P`.
 ///
@@ -446,7 +449,7 @@ pub fn pose_of(estimate: Estimate) -> Result<Pose, InputError> {
 /// binary angle.
 fn mean(estimate: Estimate) -> Result<Pose, InputError> {
     let Estimate { x_m, y_m, yaw_rad } = estimate;
-    if Float::of(y_m).is_none() || Float::of(yaw_rad).is_none() {
+    if !(is_finite(y_m) && is_finite(yaw_rad)) {
         return Err(InputError::EstimateNotFinite);
     }
     place(x_m, y_m, || {
@@ -464,12 +467,11 @@ pub(crate) fn place(
     yaw: impl FnOnce() -> Result<BinaryAngle, InputError>,
 ) -> Result<Pose, InputError> {
     let length = |value: f64| -> Result<i32, InputError> {
-        let float = Float::of(value).ok_or(InputError::EstimateNotFinite)?;
-        float
-            .scaled(u128::from(UM_PER_M), 0, Rounding::Nearest)
-            .filter(|um| um.unsigned_abs() <= 2_000_000_000)
-            .and_then(|um| i32::try_from(um).ok())
-            .ok_or(InputError::EstimateOutOfRange)
+        match converted(value, &FloatUnit::MICRO, Rounding::Nearest) {
+            Ok(um) if um.unsigned_abs() <= 2_000_000_000 => Ok(um as i32),
+            Err(NotConverted::NotFinite) => Err(InputError::EstimateNotFinite),
+            Ok(_) | Err(NotConverted::TooLarge) => Err(InputError::EstimateOutOfRange),
+        }
     };
     Ok(Pose {
         x_um: length(x_m)?,
