@@ -449,31 +449,28 @@ fn fits(extent: Extent, cells: &Cells) -> bool {
         let whole = i64::from(yaw_q24).wrapping_mul(ANGLE_UNITS_PER_Q24.wrapping_mul(2));
         cells.is_whole_circle() || whole.unsigned_abs() <= cells.yaw_span
     };
-    match extent {
-        Extent::Gaussian(factor) => {
-            // (2 |row|)^2 <= width^2: at most 2^62 and 2^56.
-            let within = |row: [i32; 3], width: i64| {
-                support::squared_length(row).wrapping_mul(4)
-                    <= width.unsigned_abs().wrapping_mul(width.unsigned_abs())
-            };
-            within(factor.x, width) && within(factor.y, height) && turn(factor.yaw)
-        }
+    // No set is smaller than its ellipsoid or than its movement.
+    let (factor, disc) = match extent {
+        Extent::Gaussian(factor) => (Some(factor), None),
         Extent::Bounded {
             translation_um,
             yaw_q24,
-        } => {
+        } => (None, Some((translation_um, yaw_q24))),
+        Extent::Grown { factor, by } => (Some(factor), Some((by.translation_um(), by.yaw_q24()))),
+    };
+    let factor_fits = factor.is_none_or(|factor| {
+        // (2 |row|)^2 <= width^2: at most 2^62 and 2^56.
+        let within = |row: [i32; 3], width: i64| {
+            support::squared_length(row).wrapping_mul(4)
+                <= width.unsigned_abs().wrapping_mul(width.unsigned_abs())
+        };
+        within(factor.x, width) && within(factor.y, height) && turn(factor.yaw)
+    });
+    factor_fits
+        && disc.is_none_or(|(translation_um, yaw_q24)| {
             let across = i64::from(translation_um).wrapping_mul(2);
             across <= width && across <= height && turn(yaw_q24)
-        }
-        Extent::Grown { factor, by } => {
-            // No set is smaller than its ellipsoid or than its movement.
-            let across = i64::from(by.translation_um()).wrapping_mul(2);
-            fits(Extent::Gaussian(factor), cells)
-                && across <= width
-                && across <= height
-                && turn(by.yaw_q24())
-        }
-    }
+        })
 }
 
 #[cfg(test)]

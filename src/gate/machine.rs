@@ -860,7 +860,7 @@ fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Re
     if table.task() != settings.task {
         return Err(Reason::WrongTask);
     }
-    if table.site_digest() != settings.site_digest {
+    if !table.is_of_site(&settings.site_digest) {
         return Err(Reason::WrongSite);
     }
     Ok(table.within(settings.most_runs))

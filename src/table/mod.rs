@@ -450,6 +450,13 @@ impl<'a> Table<'a> {
         bytes_at(self.bytes, 96).unwrap_or([0; 32])
     }
 
+    /// Returns `true` if the table was made from the site file with this SHA-256.
+    pub(crate) fn is_of_site(&self, digest: &[u8; 32]) -> bool {
+        self.bytes
+            .get(96..128)
+            .is_some_and(|own| own == digest.as_slice())
+    }
+
     /// Returns the checksum at the end of the bytes.
     #[must_use]
     pub fn crc(&self) -> u32 {

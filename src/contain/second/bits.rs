@@ -136,6 +136,11 @@ pub(super) fn fixed(value: f64, factor: u64, power: i32) -> Option<i64> {
     })
 }
 
+/// Returns `true` if a float is not infinite and not NaN.
+pub(super) const fn is_finite(value: f64) -> bool {
+    biased(value) != NO_NUMBER
+}
+
 /// Returns `true` if a float is a number above zero.
 pub(super) fn is_above_zero(value: f64) -> bool {
     let bits = value.to_bits();
@@ -155,18 +160,9 @@ pub(super) struct Short {
 }
 
 impl Short {
-    pub const ZERO: Self = Self {
-        mantissa: 0,
-        exponent: 0,
-    };
-
-    /// Converts a float, rounded towards zero: smaller by at most 2^-30 of its value. `None` for infinities
-    /// and NaN.
-    pub fn of(value: f64) -> Option<Self> {
+    /// Converts a finite float, rounded towards zero: smaller by at most 2^-30 of its value.
+    pub fn of(value: f64) -> Self {
         let biased = biased(value);
-        if biased == NO_NUMBER {
-            return None;
-        }
         let (mantissa, exponent) = if biased == 0 {
             let whole = value.to_bits() << 12;
             let up = whole.leading_zeros();
@@ -176,14 +172,14 @@ impl Short {
             let mantissa = (value.to_bits() >> 22) as u32 & 0x3fff_ffff | 1 << 30;
             (mantissa as i32, (biased as i32).wrapping_sub(1053))
         };
-        Some(Self {
+        Self {
             mantissa: if value.is_sign_negative() {
                 mantissa.wrapping_neg()
             } else {
                 mantissa
             },
             exponent,
-        })
+        }
     }
 
     /// Returns the least b with `|value| < 2^b`; for zero a number far below every other.

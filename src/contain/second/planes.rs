@@ -10,7 +10,7 @@
 //! 2^(2 power), so that the largest variance of C is below 2^28.
 
 use super::believed::{Ellipsoid, Question};
-use super::bits::{Short, quotient, root, root32, short_by, wide, word16, word32};
+use super::bits::{quotient, root, root32, short_by, wide, word16, word32};
 use super::spots::{FINER, outermost_hold};
 use super::turn::cosine_and_sine;
 use crate::parts;
@@ -253,27 +253,28 @@ impl Body {
     #[inline(always)]
     fn take(&mut self, ellipsoid: &Ellipsoid, unit: i32, lever: i32) -> Option<()> {
         let (plane, yaw) = (ellipsoid.plane, ellipsoid.yaw);
-        let [xx, xy, yy, xt, yt, tt] = ellipsoid.covariance;
+        let [.., tt] = ellipsoid.covariance;
         self.reach = tt.times(yaw.times(SQUARE_TURN)).whole();
-        let tt = tt.times(yaw.scaled(lever.wrapping_mul(2)));
-        let weight = plane.times(SQUARE_MICRO).scaled(unit.wrapping_mul(-2));
-        let (xx, xy, yy) = (xx.times(weight), xy.times(weight), yy.times(weight));
-        let weight = plane.times(WEIGHT_MICRO).scaled(lever.wrapping_sub(unit));
-        let (xt, yt) = (xt.times(weight), yt.times(weight));
+        let lengths = plane.times(SQUARE_MICRO).scaled(unit.wrapping_mul(-2));
+        let between = plane.times(WEIGHT_MICRO).scaled(lever.wrapping_sub(unit));
+        let turn = yaw.scaled(lever.wrapping_mul(2));
+        let weights = [lengths, lengths, lengths, between, between, turn];
+        let mut numbers = ellipsoid.covariance;
+        for (number, weight) in numbers.iter_mut().zip(weights) {
+            *number = number.times(weight);
+        }
+        let [xx, _, yy, .., tt] = numbers;
         let top = xx.top().max(yy.top()).max(tt.top());
         self.power = 28i32.wrapping_sub(top) >> 1;
-        let at = |number: Short| {
+        // The variances are lowered by their rounding.
+        let less = [ROUNDING_OF_C, 0, ROUNDING_OF_C, 0, 0, ROUNDING_OF_C];
+        for ((entry, number), less) in self.world.iter_mut().zip(&numbers).zip(less) {
             let value = number.at(self.power.wrapping_mul(2))?;
-            (value.unsigned_abs() <= 1 << 28).then_some(value)
-        };
-        self.world = [
-            at(xx)?.wrapping_sub(ROUNDING_OF_C),
-            at(xy)?,
-            at(yy)?.wrapping_sub(ROUNDING_OF_C),
-            at(xt)?,
-            at(yt)?,
-            at(tt)?.wrapping_sub(ROUNDING_OF_C),
-        ];
+            if value.unsigned_abs() > 1 << 28 {
+                return None;
+            }
+            *entry = value.wrapping_sub(less);
+        }
         Some(())
     }
 
