@@ -171,11 +171,12 @@ pub(crate) enum NotConverted {
     TooLarge,
 }
 
-/// Returns a float in units of an integer, as [`Float::scaled`] rounds it. One function, so that the decoding of a float is in flash once.
+/// Returns a float in units of an integer, as [`Float::scaled`] rounds it. With `small_code` it is in flash once.
 ///
 /// # Errors
 /// [`NotConverted`].
-#[inline(never)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 pub(crate) fn converted(
     value: f64,
     unit: &FloatUnit,
@@ -420,7 +421,7 @@ impl Divisor {
     }
 
     /// Returns `dividend / self`, rounded away from zero or towards zero.
-    #[inline(never)]
+    #[cfg_attr(small_code, inline(never))]
     fn rounded(self, dividend: i64, away: bool) -> i64 {
         let magnitude = dividend.unsigned_abs();
         let down = quotient(magnitude, self.0.get()).unwrap_or(0);

@@ -56,7 +56,8 @@ impl Common {
 }
 
 /// Returns an upper bound of the length of an ellipsoid's offsets in the plane, micrometres.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 pub(crate) fn broad_um(factor: &SqrtFactor) -> u32 {
     // Six squares below 2^58.
     let rows = [factor.x, factor.y];
@@ -126,7 +127,8 @@ impl Turn {
 
     /// Returns the right shift that converts a product of a lever (length units) and the mantissa to units
     /// that are finer by `finer` bits: between 1 and 31.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     pub fn shift(&self, finer: u32) -> u32 {
         self.down.saturating_sub(finer).clamp(1, 31)
     }

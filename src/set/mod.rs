@@ -286,7 +286,8 @@ impl PoseSet {
         Ok(Self::given(mean, extent, Given::Ellipsoid(target)))
     }
 
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     fn given(mean: Pose, extent: Extent, given: Given) -> Self {
         Self {
             given: Some(given),
@@ -395,27 +396,31 @@ fn cylinder(
     yaw_rad: f64,
     inflation: Inflation,
 ) -> Result<(Extent, Given), InputError> {
-    let extent = |value: f64, unit: &FloatUnit, limit: i64| {
-        if !is_positive(value) {
-            return None;
-        }
-        let extent = converted(value, unit, Rounding::AwayFromZero);
-        // Up to 2^28 times 2^22.
-        let extent = inflation.of_length(extent.unwrap_or(i64::MAX).min(limit));
-        Some(extent.min(limit))
-    };
     let limit = i64::from(crate::pose::REACH_UM);
-    let translation =
-        extent(translation_m, &FloatUnit::MICRO, limit).ok_or(InputError::BoundInvalid)?;
+    let translation = extent_of(translation_m, &FloatUnit::MICRO, limit, inflation)
+        .ok_or(InputError::BoundInvalid)?;
     if translation >= limit {
         return Err(InputError::BoundInvalid);
     }
-    let yaw = extent(yaw_rad, &Q24, 1 << 23).ok_or(InputError::BoundInvalid)?;
+    let yaw = extent_of(yaw_rad, &Q24, 1 << 23, inflation).ok_or(InputError::BoundInvalid)?;
     let extent = Extent::Bounded {
         translation_um: translation as i32,
         yaw_q24: yaw as i32,
     };
     Ok((extent, Given::of_cylinder(translation, yaw, inflation)))
+}
+
+/// Returns an extent with its inflation, rounded up and limited. `None` unless it is a number above zero.
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
+fn extent_of(value: f64, unit: &FloatUnit, limit: i64, inflation: Inflation) -> Option<i64> {
+    let extent = match converted(value, unit, Rounding::AwayFromZero) {
+        Ok(extent) if extent > 0 => extent.min(limit),
+        Err(NotConverted::TooLarge) if is_positive(value) => limit,
+        _ => return None,
+    };
+    // Up to 2^28 times 2^22.
+    Some(inflation.of_length(extent).min(limit))
 }
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
@@ -466,18 +471,22 @@ pub(crate) fn place(
     y_m: f64,
     yaw: impl FnOnce() -> Result<BinaryAngle, InputError>,
 ) -> Result<Pose, InputError> {
-    let length = |value: f64| -> Result<i32, InputError> {
-        match converted(value, &FloatUnit::MICRO, Rounding::Nearest) {
-            Ok(um) if um.unsigned_abs() <= 2_000_000_000 => Ok(um as i32),
-            Err(NotConverted::NotFinite) => Err(InputError::EstimateNotFinite),
-            Ok(_) | Err(NotConverted::TooLarge) => Err(InputError::EstimateOutOfRange),
-        }
-    };
     Ok(Pose {
-        x_um: length(x_m)?,
-        y_um: length(y_m)?,
+        x_um: coordinate(x_m)?,
+        y_um: coordinate(y_m)?,
         yaw: yaw()?,
     })
+}
+
+/// Returns a coordinate of an estimate, micrometres.
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
+fn coordinate(metres: f64) -> Result<i32, InputError> {
+    match converted(metres, &FloatUnit::MICRO, Rounding::Nearest) {
+        Ok(um) if um.unsigned_abs() <= 2_000_000_000 => Ok(um as i32),
+        Err(NotConverted::NotFinite) => Err(InputError::EstimateNotFinite),
+        Ok(_) | Err(NotConverted::TooLarge) => Err(InputError::EstimateOutOfRange),
+    }
 }
 
 #[cfg(test)]

@@ -109,7 +109,8 @@ pub(crate) fn stored_radius_squared(bytes: &[u8]) -> Option<RadiusSquared> {
 /// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
 /// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of
 /// several cancel with a probability of 2^-32. Returns 0 for bytes without a header.
-#[inline]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline)]
 pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let bytes = core::hint::black_box(bytes);
     let Some((header, crc)) = bytes

@@ -15,6 +15,7 @@ pub(super) fn word32(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 /// Returns `value / by`, rounded towards zero, or 0 if `by` is 0.
+#[cfg_attr(small_code, inline(never))]
 pub(super) fn quotient(value: i64, by: u64) -> i64 {
     let magnitude = num::quotient(value.unsigned_abs(), by).unwrap_or(0) as i64;
     if value < 0 {
@@ -183,6 +184,7 @@ impl Short {
     }
 
     /// Returns the least b with `|value| < 2^b`; for zero a number far below every other.
+    #[cfg_attr(small_code, inline(never))]
     pub const fn top(self) -> i32 {
         if self.mantissa == 0 {
             -(1 << 20)
@@ -204,7 +206,8 @@ impl Short {
     }
 
     /// Returns `value * 2^power`, rounded down. `None` if the result is 2^30 or more.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     pub fn at(self, power: i32) -> Option<i32> {
         let by = self.exponent.wrapping_add(power);
         let Self { mantissa, .. } = self;
@@ -240,6 +243,7 @@ pub(super) struct Weight {
 
 impl Weight {
     /// Returns `value * 2^exponent`.
+    #[cfg_attr(small_code, inline(never))]
     pub const fn of(value: u64, exponent: i32) -> Self {
         let up = value.leading_zeros();
         Self {

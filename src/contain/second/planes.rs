@@ -342,7 +342,8 @@ impl Body {
     }
 
     /// Returns `true` if a facet holds.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &FrameProjection) -> bool {
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
         let normal = [number(x0, x1), number(y0, y1)];
@@ -428,6 +429,7 @@ impl Body {
 }
 
 /// Returns a turn of 2^-32 turn in 2^-31 rad, down; at most 1 rad.
+#[cfg_attr(small_code, inline(never))]
 fn angle(turn: u64) -> u32 {
     (turn.wrapping_mul(PI_Q30) >> 30).min(1 << 31) as u32
 }
@@ -463,19 +465,22 @@ fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3]
     ]
 }
 
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn q30(value: i64) -> i32 {
     (value.wrapping_add(1 << 29) >> 30) as i32
 }
 
 /// Returns a number times a share of 2^-30, to the nearest.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn share(number: i32, share: i32) -> i32 {
     q30(wide(number, share))
 }
 
 /// Returns the sum of two products with a cosine or sine, 2^-30, to the nearest.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 pub(super) fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
     q30(wide(c, x).wrapping_add(wide(s, y)))
 }
