@@ -54,7 +54,7 @@ use crate::set::{Extent, PoseSet};
 use crate::table::{Cells, Grid, Table};
 
 use self::grid::Stop;
-use self::section::{Disc, Ellipsoid, Offset, Section};
+use self::section::{Disc, EitherSection, Ellipsoid, Offset, Section};
 
 pub use self::facets::clearance_q14 as facet_clearance_q14;
 
@@ -383,6 +383,9 @@ impl<'s> GoalFramePoseSet<'s> {
     /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, by a walk within the table's limit.
     fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
         let (cells, most_runs) = (table.cells(), table.most_runs());
+        if cfg!(small_code) {
+            return self.walk(grid, cells, &EitherSection::of(extent), most_runs);
+        }
         match extent {
             Extent::Gaussian(factor) => self.walk(grid, cells, &Ellipsoid::new(factor), most_runs),
             Extent::Bounded {

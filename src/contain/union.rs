@@ -553,7 +553,6 @@ impl Section {
             rounded(a.wrapping_mul(own).wrapping_add(b.wrapping_mul(weight)))
         };
         let sum = |a: i32, b: i32| rounded(product(a, own).wrapping_add(product(b, weight))) as i32;
-        let pair = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [sum(a, c), sum(b, d)];
         let turns = self.turns || other.turns;
         // The part that does not turn, among normals that turn.
         let still = |section: &Self| {
@@ -567,19 +566,39 @@ impl Section {
             [0, 0] => 0,
             [own, other] => wide(own, other).wrapping_add(1),
         };
+        let mut numbers = self.numbers();
+        for (number, other) in numbers.iter_mut().zip(other.numbers()) {
+            *number = sum(*number, other);
+        }
+        let [c, s, g, h, g_turning, ax, ay, bx, by, nx, ny] = numbers;
         Self {
             left: wide(self.left, other.left).wrapping_sub(WEIGHED),
-            c: sum(self.c, other.c),
-            s: sum(self.s, other.s),
-            g: sum(self.g, other.g),
-            h: sum(self.h, other.h),
-            g_turning: sum(self.g_turning, other.g_turning),
+            c,
+            s,
+            g,
+            h,
+            g_turning,
             still: still as u32,
-            along: pair(self.along, other.along),
-            ahead: pair(self.ahead, other.ahead),
-            normal: pair(self.normal, other.normal),
+            along: [ax, ay],
+            ahead: [bx, by],
+            normal: [nx, ny],
             turns,
         }
+    }
+
+    /// Returns the numbers that are weighed in the same way.
+    #[inline(always)]
+    const fn numbers(&self) -> [i32; 11] {
+        let ([ax, ay], [bx, by], [nx, ny]) = (self.along, self.ahead, self.normal);
+        let Self {
+            c,
+            s,
+            g,
+            h,
+            g_turning,
+            ..
+        } = *self;
+        [c, s, g, h, g_turning, ax, ay, bx, by, nx, ny]
     }
 
     /// Returns the weight of another section, 2^-12, from 0 to 1, with which the sum says most about the poses beyond the

@@ -130,17 +130,18 @@ impl BinaryAngle {
     /// this far is an error of the source). The error is at most 0.5 unit and 2^-30 unit.
     #[must_use]
     pub fn from_radians(radians: f64) -> Option<Self> {
-        if !is_below_power_of_two(radians, 14) {
+        let float = Float::of(radians)?;
+        if !float.is_below_power_of_two(14) {
             return None;
         }
-        let units = converted(radians, &ANGLE, Rounding::Nearest).ok()?;
+        let units = float.scaled(UNITS_PER_RADIAN_Q44, 44, Rounding::Nearest)?;
         // The low 32 bits are the angle modulo one turn, for negative angles too.
         Some(Self(units as u32))
     }
 }
 
-/// 2^32 / (2 pi), to the nearest 2^-44 (relative error 2^-74).
-const ANGLE: FloatUnit = FloatUnit::new(12_025_407_501_443_077_023_729, 44);
+/// 2^32 / (2 pi) * 2^44, to the nearest integer (relative error 2^-74).
+const UNITS_PER_RADIAN_Q44: u128 = 12_025_407_501_443_077_023_729;
 
 /// Upper bound of the distance of [`BinaryAngle::cos_sin_q15`] from the true cosine and sine, unit 2^-15.
 pub(crate) const COS_SIN_ERROR_Q15: i32 = 2;
@@ -199,13 +200,6 @@ const fn biased(value: f64) -> u32 {
 #[must_use]
 pub(crate) const fn is_finite(value: f64) -> bool {
     biased(value) != NOT_FINITE
-}
-
-/// Returns `true` if a float is a number above zero.
-#[must_use]
-pub(crate) const fn is_positive(value: f64) -> bool {
-    let bits = value.to_bits();
-    bits != 0 && bits < (NOT_FINITE as u64) << 52
 }
 
 /// Returns `true` if a float is a number with `|value| < 2^power`, for a power from -1022 to 1023.
@@ -271,8 +265,14 @@ impl Float {
         !self.negative && self.mantissa != 0
     }
 
+    /// Returns `true` if `|value| < 2^power`.
+    #[must_use]
+    pub(crate) const fn is_below_power_of_two(self, power: i32) -> bool {
+        self.mantissa == 0 || self.top_bit() < power
+    }
+
     /// Returns the `b` for which `2^b <= |value| < 2^(b+1)`; meaningless for zero.
-    #[cfg(test)]
+    #[must_use]
     pub(crate) const fn top_bit(self) -> i32 {
         // A mantissa has at most 53 bits and an exponent at most 11, so no sum leaves an i32.
         63i32

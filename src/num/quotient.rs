@@ -50,7 +50,11 @@ fn by_digits(n: u64, d: u64) -> Option<u64> {
 
 /// Returns `value / by`, rounded towards zero, or 0 if `by` is not above zero.
 #[must_use]
+#[cfg_attr(not(small_code), inline)]
 pub fn towards_zero(value: i64, by: i64) -> i64 {
+    if cfg!(not(small_code)) {
+        return value.checked_div(by.max(0)).unwrap_or(0);
+    }
     let by = u64::try_from(by).unwrap_or(0);
     let magnitude = quotient(value.unsigned_abs(), by).unwrap_or(0) as i64;
     if value < 0 {

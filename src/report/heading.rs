@@ -88,8 +88,8 @@ fn of_quaternion(entries: &[f64; 4]) -> Result<BinaryAngle, InputError> {
     Ok(angle_of(cosine as i64, sine as i64))
 }
 
-/// Returns a product below 2^82. Not inlined: six of them would take 400 bytes of flash.
-#[inline(never)]
+/// Returns a product below 2^82. Six copies would take 400 bytes of flash.
+#[cfg_attr(small_code, inline(never))]
 fn product(a: i64, b: i64) -> i128 {
     i128::from(a).wrapping_mul(i128::from(b))
 }

@@ -32,20 +32,18 @@ impl Common {
 
     pub(super) fn of(mean: Pose, extent: Extent) -> Self {
         let [cos_q15, sin_q15] = mean.yaw.cos_sin_q15();
-        let (mut broad_um, mut yaw_q24) = match extent {
+        let (broad_um, yaw_q24) = match extent {
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
             } => (translation_um.unsigned_abs(), yaw_q24),
-            Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
-                (broad_um(&factor), factor.yaw)
-            }
-        };
-        if let Extent::Grown { by, .. } = extent {
+            Extent::Gaussian(factor) => (broad_um(&factor), factor.yaw),
             // Below 2^30.4 and 2^30.1.
-            broad_um = broad_um.wrapping_add(by.translation_um().unsigned_abs());
-            yaw_q24 = yaw_q24.wrapping_add(by.yaw_q24());
-        }
+            Extent::Grown { factor, by } => (
+                broad_um(&factor).wrapping_add(by.translation_um().unsigned_abs()),
+                factor.yaw.wrapping_add(by.yaw_q24()),
+            ),
+        };
         Self {
             cos_q15,
             sin_q15,

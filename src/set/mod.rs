@@ -23,7 +23,7 @@
 //! ```
 
 use crate::num::{
-    BinaryAngle, FloatUnit, NotConverted, Rounding, converted, is_finite, is_positive,
+    BinaryAngle, Float, FloatUnit, NotConverted, Rounding, UM_PER_M, converted, is_finite,
 };
 use crate::pose::Pose;
 
@@ -397,12 +397,14 @@ fn cylinder(
     inflation: Inflation,
 ) -> Result<(Extent, Given), InputError> {
     let limit = i64::from(crate::pose::REACH_UM);
-    let translation = extent_of(translation_m, &FloatUnit::MICRO, limit, inflation)
-        .ok_or(InputError::BoundInvalid)?;
+    let translation = extent_of(translation_m, u128::from(UM_PER_M), 0, limit, inflation);
+    let yaw = extent_of(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23, inflation);
+    let (Some(translation), Some(yaw)) = (translation, yaw) else {
+        return Err(InputError::BoundInvalid);
+    };
     if translation >= limit {
         return Err(InputError::BoundInvalid);
     }
-    let yaw = extent_of(yaw_rad, &Q24, 1 << 23, inflation).ok_or(InputError::BoundInvalid)?;
     let extent = Extent::Bounded {
         translation_um: translation as i32,
         yaw_q24: yaw as i32,
@@ -411,21 +413,22 @@ fn cylinder(
 }
 
 /// Returns an extent with its inflation, rounded up and limited. `None` unless it is a number above zero.
-#[cfg_attr(small_code, inline(never))]
-#[cfg_attr(not(small_code), inline(always))]
-fn extent_of(value: f64, unit: &FloatUnit, limit: i64, inflation: Inflation) -> Option<i64> {
-    let extent = match converted(value, unit, Rounding::AwayFromZero) {
-        Ok(extent) if extent > 0 => extent.min(limit),
-        Err(NotConverted::TooLarge) if is_positive(value) => limit,
-        _ => return None,
-    };
+fn extent_of(
+    value: f64,
+    factor: u128,
+    shift: i32,
+    limit: i64,
+    inflation: Inflation,
+) -> Option<i64> {
+    let float = Float::of(value).filter(|float| float.is_positive())?;
+    let extent = float.scaled(factor, shift, Rounding::AwayFromZero);
     // Up to 2^28 times 2^22.
-    Some(inflation.of_length(extent).min(limit))
+    let extent = inflation.of_length(extent.unwrap_or(i64::MAX).min(limit));
+    Some(extent.min(limit))
 }
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
 pub(crate) const Q24_PER_RADIAN_Q52: u128 = 12_025_407_501_443_077_023_729;
-const Q24: FloatUnit = FloatUnit::new(Q24_PER_RADIAN_Q52, 52);
 
 /// Returns the factor of `radius_squared P`.
 ///
