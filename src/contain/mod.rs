@@ -446,6 +446,7 @@ fn height(cells: &Cells) -> i64 {
 }
 
 /// Returns `true` if a set of this extent could lie on these cells for some estimate.
+#[cfg_attr(not(small_code), inline(never))]
 fn fits(extent: Extent, cells: &Cells) -> bool {
     let (width, height) = (width(cells), height(cells));
     let turn = |yaw_q24: i32| {

@@ -1,6 +1,6 @@
 //! Quotients of 64 bits.
 //!
-//! A controller divides 32 bits at most. The compiler's routine for 64 bits takes 930 bytes of flash on a Cortex-M4F, [`by_digits`] takes 280.
+//! A controller divides 32 bits at most. The compiler's routine for 64 bits takes 930 bytes of flash on a Cortex-M4F, `by_digits` takes 280.
 //! All quotients of a gate that may need more than 32 bits are from here.
 
 /// Returns `n / d`, rounded down, or `None` if d is zero.
