@@ -1,7 +1,10 @@
-//! Link arguments of the firmware examples, and the configuration `narrow_products`.
+//! Link arguments of the firmware examples, and the configurations `narrow_products` and `small_code`.
 //!
 //! A Cortex-M0+ multiplies 32 by 32 bits to 32: a product of 64 bits is a call of some 45 instructions. With
 //! `narrow_products`, such products are made of halves in place. Rust has no other sign of such a core.
+//!
+//! At the levels of optimization "s" and "z", `small_code` selects one shared function where level 3 has a copy at each call, or a faster
+//! and larger one. Both give the same results.
 //!
 //! The link arguments apply only to this package's examples: with `rustc-link-search`, a firmware without its own
 //! `memory.x` would silently be linked at this package's addresses.
@@ -15,6 +18,10 @@ fn main() {
     let target = variable("TARGET");
     if target.starts_with("thumbv6m") || target.starts_with("thumbv8m.base") {
         println!("cargo::rustc-cfg=narrow_products");
+    }
+    println!("cargo::rustc-check-cfg=cfg(small_code)");
+    if ["s", "z"].contains(&variable("OPT_LEVEL").as_str()) {
+        println!("cargo::rustc-cfg=small_code");
     }
     if variable("CARGO_CFG_TARGET_OS") != "none" {
         return;

@@ -20,7 +20,7 @@
 //! # Ok::<(), posegate::set::InputError>(())
 //! ```
 
-use crate::num::{Float, Rounding, sqrt_ceil};
+use crate::num::{FloatUnit, Rounding, converted, sqrt_ceil};
 use crate::set::Growth;
 
 /// The largest speeds of a robot, in its own frame.
@@ -37,9 +37,9 @@ pub struct MotionBounds {
 }
 
 /// m/s to micrometres per millisecond, 2^-10.
-const SPEED: u128 = 1_024_000;
-/// rad/s to 2^-24 turn per millisecond, 2^-16, times 2^36, rounded up.
-const TURN_Q36: u128 = 12_025_407_501_443_077_024;
+const SPEED: FloatUnit = FloatUnit::new(1_024_000, 0);
+/// rad/s to 2^-24 turn per millisecond, 2^-16; rounded up to 2^-36.
+const TURN: FloatUnit = FloatUnit::new(12_025_407_501_443_077_024, 36);
 /// A speed is below 2^30 of its units, 1,048 m/s; a turn rate below 2^32, 24.5 rad/s.
 const LARGEST: u32 = 1 << 30;
 
@@ -57,11 +57,11 @@ impl MotionBounds {
     /// `None` if a speed is below zero, not finite, or above 1,000 m/s or 24 rad/s.
     #[must_use]
     pub fn new(along_m_s: f64, across_m_s: f64, turn_rad_s: f64) -> Option<Self> {
-        let up = |value: f64, factor: u128, shift: i32| {
-            let scaled = Float::of(value)?.scaled(factor, shift, Rounding::AwayFromZero)?;
+        let up = |value: f64, unit: &FloatUnit| {
+            let scaled = converted(value, unit, Rounding::AwayFromZero).ok()?;
             u32::try_from(scaled).ok()
         };
-        let speed = |value: f64| up(value, SPEED, 0).filter(|speed| *speed < LARGEST);
+        let speed = |value: f64| up(value, &SPEED).filter(|speed| *speed < LARGEST);
         let [along, across] = [speed(along_m_s)?, speed(across_m_s)?].map(u64::from);
         // Below 2^61.
         let squares = along
@@ -74,7 +74,7 @@ impl MotionBounds {
         };
         Some(Self {
             speed_q10: u32::try_from(speed).ok()?,
-            turn_q16: up(turn_rad_s, TURN_Q36, 36)?,
+            turn_q16: up(turn_rad_s, &TURN)?,
         })
     }
 

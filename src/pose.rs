@@ -114,6 +114,7 @@ fn within_reach(length: i64) -> Option<i32> {
 
 /// Returns a sum of two products of a Q30 number and a length, shifted to the nearest micrometre. The
 /// sum is below 2^60, the result below 2^30.
+#[cfg_attr(small_code, inline(never))]
 fn shifted(sum: i64) -> i32 {
     (sum.wrapping_add(1 << 29) >> 30) as i32
 }

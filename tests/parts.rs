@@ -44,6 +44,11 @@ fn permitted(verdict: Verdict) -> Option<u32> {
 }
 
 #[test]
+fn the_self_test_passes_in_every_build() {
+    assert_eq!(posegate::gate::self_test(), Ok(()));
+}
+
+#[test]
 fn fewer_parts_never_permit_more() {
     let gates = TABLES.map(|path| {
         Evaluator::new(read(path).leak(), MAXIMUM_AGE_MS).expect("a valid maximum age")

@@ -261,7 +261,8 @@ fn in_world(facet: Facet, axes: Axes, ready: &Ready<'_>) -> [i32; 2] {
 
 /// Returns `F'a` times 2^14: the columns along a normal in world axes, the lever along the facet's normal in its own
 /// axes.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn parts(normal: [i32; 2], columns: &Columns, lever: i32) -> [i32; 3] {
     let [first, second, third] = columns.map(|column| dot(normal, column));
     [first.wrapping_add(lever), second, third]
@@ -286,7 +287,8 @@ const fn dot([ax, ay]: [i32; 2], [x, y]: [i32; 2]) -> i32 {
 
 /// Returns `|F'a|^2`, each part rounded up. Below 2^32: the extent is below 2^14 and the lever's part below 2^14.5, so
 /// that both together are below 2^15.3.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn reach_square(parts: [i32; 3]) -> u32 {
     parts
         .iter()
@@ -294,7 +296,8 @@ fn reach_square(parts: [i32; 3]) -> u32 {
 }
 
 /// Returns `true` if step 3 accepts: the facet with its bend bounded by weak duality.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn bends(
     [ax, ay]: [i32; 2],
     columns: &Columns,
@@ -361,7 +364,8 @@ fn quotient(value: i32, by: u32) -> i32 {
 }
 
 /// Returns `|value| / 2^14`, rounded up.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn up(value: i32) -> i32 {
     (value.unsigned_abs().wrapping_add((1 << NORMAL_BITS) - 1) >> NORMAL_BITS) as i32
 }

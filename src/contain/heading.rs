@@ -47,7 +47,7 @@
 //! rounding of a scale (margins only).
 
 use super::compact;
-use crate::num::{BinaryAngle, product, sqrt_ceil};
+use crate::num::{BinaryAngle, product, sqrt_ceil, towards_zero};
 use crate::pose::Pose;
 use crate::set::{Extent, Growth, PoseSet, SqrtFactor};
 use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS, Piece};
@@ -705,7 +705,7 @@ impl Touching {
         let length = sqrt_ceil(squares(nx, ny)).max(1);
         let along = |v: i64| {
             let moved = v.wrapping_mul(i64::from(movement.by.translation_um()));
-            moved.checked_div(length).unwrap_or(0)
+            towards_zero(moved, length)
         };
         let slope = i64::from(section.s.saturating_abs());
         let swung = slope.wrapping_mul(i64::from(movement.turn)) >> 28;
@@ -759,7 +759,7 @@ impl Sweep {
         let length = sqrt_ceil(squares(a, b)).max(1);
         let share = |v: i64| {
             let v = v.wrapping_mul(share);
-            v.checked_div(length).unwrap_or(0)
+            towards_zero(v, length)
         };
         let (a2, a3) = (share(a), share(b));
         let [f, ..] = self.columns;

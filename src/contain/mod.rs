@@ -54,7 +54,7 @@ use crate::set::{Extent, PoseSet};
 use crate::table::{Cells, Grid, Table};
 
 use self::grid::Stop;
-use self::section::{Disc, Ellipsoid, Offset, Section};
+use self::section::{Disc, EitherSection, Ellipsoid, Offset, Section};
 
 pub use self::facets::clearance_q14 as facet_clearance_q14;
 
@@ -383,6 +383,9 @@ impl<'s> GoalFramePoseSet<'s> {
     /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, by a walk within the table's limit.
     fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
         let (cells, most_runs) = (table.cells(), table.most_runs());
+        if cfg!(small_code) {
+            return self.walk(grid, cells, &EitherSection::of(extent), most_runs);
+        }
         match extent {
             Extent::Gaussian(factor) => self.walk(grid, cells, &Ellipsoid::new(factor), most_runs),
             Extent::Bounded {
@@ -443,37 +446,35 @@ fn height(cells: &Cells) -> i64 {
 }
 
 /// Returns `true` if a set of this extent could lie on these cells for some estimate.
+#[cfg_attr(not(small_code), inline(never))]
 fn fits(extent: Extent, cells: &Cells) -> bool {
     let (width, height) = (width(cells), height(cells));
     let turn = |yaw_q24: i32| {
         let whole = i64::from(yaw_q24).wrapping_mul(ANGLE_UNITS_PER_Q24.wrapping_mul(2));
         cells.is_whole_circle() || whole.unsigned_abs() <= cells.yaw_span
     };
-    match extent {
-        Extent::Gaussian(factor) => {
-            // (2 |row|)^2 <= width^2: at most 2^62 and 2^56.
-            let within = |row: [i32; 3], width: i64| {
-                support::squared_length(row).wrapping_mul(4)
-                    <= width.unsigned_abs().wrapping_mul(width.unsigned_abs())
-            };
-            within(factor.x, width) && within(factor.y, height) && turn(factor.yaw)
-        }
+    // No set is smaller than its ellipsoid or than its movement.
+    let (factor, disc) = match extent {
+        Extent::Gaussian(factor) => (Some(factor), None),
         Extent::Bounded {
             translation_um,
             yaw_q24,
-        } => {
+        } => (None, Some((translation_um, yaw_q24))),
+        Extent::Grown { factor, by } => (Some(factor), Some((by.translation_um(), by.yaw_q24()))),
+    };
+    let factor_fits = factor.is_none_or(|factor| {
+        // (2 |row|)^2 <= width^2: at most 2^62 and 2^56.
+        let within = |row: [i32; 3], width: i64| {
+            support::squared_length(row).wrapping_mul(4)
+                <= width.unsigned_abs().wrapping_mul(width.unsigned_abs())
+        };
+        within(factor.x, width) && within(factor.y, height) && turn(factor.yaw)
+    });
+    factor_fits
+        && disc.is_none_or(|(translation_um, yaw_q24)| {
             let across = i64::from(translation_um).wrapping_mul(2);
             across <= width && across <= height && turn(yaw_q24)
-        }
-        Extent::Grown { factor, by } => {
-            // No set is smaller than its ellipsoid or than its movement.
-            let across = i64::from(by.translation_um()).wrapping_mul(2);
-            fits(Extent::Gaussian(factor), cells)
-                && across <= width
-                && across <= height
-                && turn(by.yaw_q24())
-        }
-    }
+        })
 }
 
 #[cfg(test)]

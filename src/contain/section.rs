@@ -203,6 +203,71 @@ pub struct Ellipsoid {
     factor: SqrtFactor,
 }
 
+/// Either set: with `small_code` the walk is in flash once, for this type.
+pub enum EitherSection {
+    Disc(Disc),
+    Ellipsoid(Ellipsoid),
+}
+
+impl EitherSection {
+    pub fn of(extent: Extent) -> Self {
+        match extent {
+            Extent::Gaussian(factor) => Self::Ellipsoid(Ellipsoid::new(factor)),
+            Extent::Bounded {
+                translation_um,
+                yaw_q24,
+            } => Self::Disc(Disc::new(translation_um, yaw_q24)),
+            Extent::Grown { factor, by } => Self::Disc(Disc::around(&factor, by)),
+        }
+    }
+}
+
+impl Section for EitherSection {
+    type Shared = Shared;
+
+    fn yaw_q24(&self) -> i64 {
+        match self {
+            Self::Disc(disc) => disc.yaw_q24(),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.yaw_q24(),
+        }
+    }
+
+    fn cut(&self, yaw: [i64; 2]) -> Cut {
+        match self {
+            Self::Disc(disc) => disc.cut(yaw),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.cut(yaw),
+        }
+    }
+
+    fn fits_row(&self, side: Side, window: &Window, room: i64, shared: &mut Shared) -> bool {
+        match self {
+            Self::Disc(disc) => disc.fits_row(side, window, room, &mut ()),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.fits_row(side, window, room, shared),
+        }
+    }
+
+    fn yaw_end(&self, high: bool) -> Offset {
+        match self {
+            Self::Disc(disc) => disc.yaw_end(high),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.yaw_end(high),
+        }
+    }
+
+    fn y_end(&self, high: bool, yaw: [i64; 2]) -> Offset {
+        match self {
+            Self::Disc(disc) => disc.y_end(high, yaw),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.y_end(high, yaw),
+        }
+    }
+
+    fn row_end(&self, side: Side, window: &Window) -> Offset {
+        match self {
+            Self::Disc(disc) => disc.row_end(side, window),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.row_end(side, window),
+        }
+    }
+}
+
 /// Fraction bits of coordinates on the unit sphere.
 const UNIT_BITS: u32 = 20;
 const UNIT: i64 = 1 << UNIT_BITS;

@@ -1,4 +1,4 @@
-use super::section::{Cut, Disc, Ellipsoid, Offset, Section, Shared, Side, Window};
+use super::section::{Cut, Disc, EitherSection, Ellipsoid, Offset, Section, Shared, Side, Window};
 use super::support::{SupportPoint, dot, held, reach, squared_length, wide_square};
 use super::*;
 use crate::num::BinaryAngle;
@@ -546,7 +546,10 @@ fn walk<S: Section>(bytes: &[u8], mean: [i64; 3], section: &S) -> Result<(), Off
 }
 
 fn walk_disc(bytes: &[u8], mean: [i64; 3]) -> Result<(), Offset> {
-    walk(bytes, mean, &Disc::new(1_000, 10))
+    let found = walk(bytes, mean, &Disc::new(1_000, 10));
+    let either = EitherSection::Disc(Disc::new(1_000, 10));
+    assert_eq!(walk(bytes, mean, &either), found);
+    found
 }
 
 #[test]
@@ -689,7 +692,13 @@ fn a_leaning_set_needs_the_cells_of_its_parts() {
         assert_ne!(slabs[0], slabs[1]);
         let section = Ellipsoid::new(factor);
         let mean = [middle, 5_000, yaw_span as i64 / 2];
-        let ask = |slabs| walk(&bytes_of(&cells, slabs), mean, &section);
+        let either = EitherSection::Ellipsoid(Ellipsoid::new(factor));
+        let ask = |slabs| {
+            let bytes = bytes_of(&cells, slabs);
+            let found = walk(&bytes, mean, &section);
+            assert_eq!(walk(&bytes, mean, &either), found);
+            found
+        };
         assert_eq!(ask(slabs.clone()), Ok(()));
         for k in 0..4 {
             let (first, last) = slabs[k][5][0];

@@ -31,7 +31,7 @@
 //! the part of `along` in world axes. They are carried separately from the sum, the latter rounded up.
 
 use super::heading::{Root, Section, Slab, Sweep, Width, in_arc};
-use crate::num::{product, sqrt_ceil};
+use crate::num::{Divisor, product, sqrt_ceil, towards_zero};
 use crate::parts;
 use crate::pose::Pose;
 use crate::set::PoseSet;
@@ -430,10 +430,7 @@ impl<'a> Search<'a> {
         let centre = self.centre(e);
         let [a, b] = section.along.map(i64::from);
         let length = sqrt_ceil(squares(a, b)).max(1);
-        let share = |v: i64| {
-            let v = v.wrapping_mul(self.root(e)).checked_div(length);
-            v.unwrap_or(0)
-        };
+        let share = |v: i64| towards_zero(v.wrapping_mul(self.root(e)), length);
         let (a, b) = (share(a), share(b));
         let [_, [x2, y2], [x3, y3]] = self.sweep.columns;
         let along = |second: i32, third: i32| {
@@ -497,10 +494,10 @@ impl<'a> Search<'a> {
 
     /// Returns a piece's arc as ranges of u, 2^-15, within the arc: as it is, and a turn below and above.
     fn arcs(&self, piece: &Piece<'_>) -> [[i32; 2]; 3] {
-        let reach = self.reach();
+        let reach = Divisor::new(self.reach());
         self.turned_arcs(piece).map(|[from, to]| {
             // Towards the middle of the arc: up at its start, down at its end.
-            let down = |v: i64| v.wrapping_shl(U).checked_div_euclid(reach).unwrap_or(0);
+            let down = |v: i64| reach.map_or(0, |by| by.floor(v.wrapping_shl(U)));
             let up = |v: i64| down(v.wrapping_neg()).wrapping_neg();
             [up(from), down(to)].map(|v| v.clamp(-(1 << 17), 1 << 17) as i32)
         })
@@ -556,7 +553,6 @@ impl Section {
             rounded(a.wrapping_mul(own).wrapping_add(b.wrapping_mul(weight)))
         };
         let sum = |a: i32, b: i32| rounded(product(a, own).wrapping_add(product(b, weight))) as i32;
-        let pair = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [sum(a, c), sum(b, d)];
         let turns = self.turns || other.turns;
         // The part that does not turn, among normals that turn.
         let still = |section: &Self| {
@@ -570,19 +566,39 @@ impl Section {
             [0, 0] => 0,
             [own, other] => wide(own, other).wrapping_add(1),
         };
+        let mut numbers = self.numbers();
+        for (number, other) in numbers.iter_mut().zip(other.numbers()) {
+            *number = sum(*number, other);
+        }
+        let [c, s, g, h, g_turning, ax, ay, bx, by, nx, ny] = numbers;
         Self {
             left: wide(self.left, other.left).wrapping_sub(WEIGHED),
-            c: sum(self.c, other.c),
-            s: sum(self.s, other.s),
-            g: sum(self.g, other.g),
-            h: sum(self.h, other.h),
-            g_turning: sum(self.g_turning, other.g_turning),
+            c,
+            s,
+            g,
+            h,
+            g_turning,
             still: still as u32,
-            along: pair(self.along, other.along),
-            ahead: pair(self.ahead, other.ahead),
-            normal: pair(self.normal, other.normal),
+            along: [ax, ay],
+            ahead: [bx, by],
+            normal: [nx, ny],
             turns,
         }
+    }
+
+    /// Returns the numbers that are weighed in the same way.
+    #[inline(always)]
+    const fn numbers(&self) -> [i32; 11] {
+        let ([ax, ay], [bx, by], [nx, ny]) = (self.along, self.ahead, self.normal);
+        let Self {
+            c,
+            s,
+            g,
+            h,
+            g_turning,
+            ..
+        } = *self;
+        [c, s, g, h, g_turning, ax, ay, bx, by, nx, ny]
     }
 
     /// Returns the weight of another section, 2^-12, from 0 to 1, with which the sum says most about the poses beyond the

@@ -8,6 +8,7 @@
 //! - Its hazard rate rises with x, and is at least x / (2 (x + 1)). So Q(x') is at most Q(x) exp(-(x' - x) x / (2 (x + 1))).
 //! - x' is chosen so that this is at most Q(x) - w: then 1 - w - Q(x') is at least 1 - Q(x).
 
+use crate::num::quotient;
 use crate::set::{Inflation, RadiusSquared, Trust};
 use crate::task::Risk;
 
@@ -104,7 +105,7 @@ fn inflation(w: u32, x_q16: u32) -> Option<Inflation> {
     let beyond = u64::from(*BEYOND.get(index as usize)?);
     let left = beyond.checked_sub(u64::from(w)).filter(|left| *left > 0)?;
     // (Q - w) / Q, unit 2^-32, rounded down: below 2^32, since w is not zero.
-    let share = u32::try_from((left << 32).checked_div(beyond)?).ok()?;
+    let share = u32::try_from(quotient(left << 32, beyond)?).ok()?;
     // -ln of 2^-n m is at most (n + 1 - m) ln 2 for m from 1 to 2.
     let n = share.leading_zeros().wrapping_add(1);
     let mantissa_q16 = share.checked_shl(n.wrapping_sub(1))? >> 15;
@@ -116,7 +117,7 @@ fn inflation(w: u32, x_q16: u32) -> Option<Inflation> {
         .wrapping_mul(x.wrapping_add(1 << 16))
         .wrapping_mul(2)
         << 16;
-    let more = numerator.checked_div(x.wrapping_mul(x))?.wrapping_add(1);
+    let more = quotient(numerator, x.wrapping_mul(x))?.wrapping_add(1);
     Inflation::from_q16(u32::try_from(more.checked_add(1 << 16)?).ok()?)
 }
 

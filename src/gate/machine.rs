@@ -209,6 +209,7 @@ impl<'a> Gate<'a> {
 
     /// Latches a fault that was found elsewhere, by the interlock or by a check of the code. The first fault remains
     /// the reported one.
+    #[cfg_attr(small_code, inline(never))]
     pub fn fault(&mut self, reason: Reason) {
         if !matches!(DecodedState::of(self.state), Ok(DecodedState::Latched(_))) {
             self.state = DecodedState::Latched(reason).word();
@@ -780,6 +781,7 @@ impl<'a> Gate<'a> {
 
     /// Closes the gate for at least the hold time. With [`Restart::OnReset`] an open gate stays closed until the
     /// reset.
+    #[cfg_attr(small_code, inline(never))]
     fn close(&mut self, before: &StateSnapshot, reason: Reason) {
         match before.standing {
             DecodedState::Latched(_) => {}
@@ -797,6 +799,7 @@ impl<'a> Gate<'a> {
 
     /// Returns `true` if a permit is still valid: a second check of the times, from the complements, independent of
     /// the first.
+    #[cfg_attr(small_code, inline(never))]
     fn stands(&self) -> bool {
         let seen = black_box(self);
         let settings = seen.settings;
@@ -860,7 +863,7 @@ fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Re
     if table.task() != settings.task {
         return Err(Reason::WrongTask);
     }
-    if table.site_digest() != settings.site_digest {
+    if !table.is_of_site(&settings.site_digest) {
         return Err(Reason::WrongSite);
     }
     Ok(table.within(settings.most_runs))

@@ -19,7 +19,8 @@ pub struct Leading {
 impl Leading {
     /// Decodes a float. For infinities and NaN the result has no meaning.
     #[must_use]
-    #[inline]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline)]
     pub const fn of(value: f64) -> Self {
         let bits = value.to_bits();
         let high = (bits >> 32) as u32;

@@ -33,6 +33,7 @@ use core::num::NonZeroU64;
 pub(crate) use self::inverse::Inverse;
 pub(crate) use self::leading::Leading;
 pub(crate) use self::product::{product, wide};
+pub(crate) use self::quotient::{quotient, towards_zero};
 pub(crate) use self::reciprocal::Reciprocal;
 pub(crate) use self::root::{sqrt_ceil, sqrt_floor};
 pub(crate) use self::trig::COS_SIN_ERROR_Q30;
@@ -40,6 +41,7 @@ pub(crate) use self::trig::COS_SIN_ERROR_Q30;
 mod inverse;
 mod leading;
 mod product;
+mod quotient;
 mod reciprocal;
 mod root;
 mod trig;
@@ -143,6 +145,68 @@ const UNITS_PER_RADIAN_Q44: u128 = 12_025_407_501_443_077_023_729;
 
 /// Upper bound of the distance of [`BinaryAngle::cos_sin_q15`] from the true cosine and sine, unit 2^-15.
 pub(crate) const COS_SIN_ERROR_Q15: i32 = 2;
+
+/// The units of an integer in one unit of a float: `factor / 2^shift`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FloatUnit {
+    factor: u128,
+    shift: i32,
+}
+
+impl FloatUnit {
+    /// Micrometres in a metre.
+    pub const MICRO: Self = Self::new(UM_PER_M as u128, 0);
+
+    /// Returns the unit `factor / 2^shift`, for a factor of at most 74 bits.
+    pub const fn new(factor: u128, shift: i32) -> Self {
+        Self { factor, shift }
+    }
+}
+
+/// The reason why a float is not converted to an integer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NotConverted {
+    /// It is NaN or infinite.
+    NotFinite,
+    /// The integer would be 2^62 or more.
+    TooLarge,
+}
+
+/// Returns a float in units of an integer, as [`Float::scaled`] rounds it. With `small_code` it is in flash once.
+///
+/// # Errors
+/// [`NotConverted`].
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
+pub(crate) fn converted(
+    value: f64,
+    unit: &FloatUnit,
+    rounding: Rounding,
+) -> Result<i64, NotConverted> {
+    let float = Float::of(value).ok_or(NotConverted::NotFinite)?;
+    let scaled = float.scaled(unit.factor, unit.shift, rounding);
+    scaled.ok_or(NotConverted::TooLarge)
+}
+
+/// The biased exponent of infinities and NaN.
+const NOT_FINITE: u32 = 0x7ff;
+
+/// Returns the biased exponent of a float.
+const fn biased(value: f64) -> u32 {
+    (value.to_bits() >> 52) as u32 & NOT_FINITE
+}
+
+/// Returns `true` if a float is a number: not infinite, not NaN.
+#[must_use]
+pub(crate) const fn is_finite(value: f64) -> bool {
+    biased(value) != NOT_FINITE
+}
+
+/// Returns `true` if a float is a number with `|value| < 2^power`, for a power from -1022 to 1023.
+#[must_use]
+pub(crate) const fn is_below_power_of_two(value: f64, power: i32) -> bool {
+    (biased(value) as i32) < power.wrapping_add(1023)
+}
 
 /// The rounding of a number between two integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -341,21 +405,13 @@ impl Divisor {
     /// Returns `dividend / self`, rounded down.
     #[must_use]
     pub fn floor(self, dividend: i64) -> i64 {
-        if dividend >= 0 {
-            (dividend.unsigned_abs() / self.0) as i64
-        } else {
-            self.away(dividend.unsigned_abs()).wrapping_neg()
-        }
+        self.rounded(dividend, dividend < 0)
     }
 
     /// Returns `dividend / self`, rounded up.
     #[must_use]
     pub fn ceil(self, dividend: i64) -> i64 {
-        if dividend >= 0 {
-            self.away(dividend.unsigned_abs())
-        } else {
-            ((dividend.unsigned_abs() / self.0) as i64).wrapping_neg()
-        }
+        self.rounded(dividend, dividend >= 0)
     }
 
     /// Returns `dividend / self`, rounded to the nearest integer: the error is at most 0.5.
@@ -364,10 +420,18 @@ impl Divisor {
         self.floor(dividend.saturating_add((self.0.get() >> 1) as i64))
     }
 
-    fn away(self, dividend: u64) -> i64 {
-        let quotient = dividend / self.0;
-        let exact = quotient.wrapping_mul(self.0.get()) == dividend;
-        quotient.wrapping_add(u64::from(!exact)) as i64
+    /// Returns `dividend / self`, rounded away from zero or towards zero.
+    #[cfg_attr(small_code, inline(never))]
+    fn rounded(self, dividend: i64, away: bool) -> i64 {
+        let magnitude = dividend.unsigned_abs();
+        let down = quotient(magnitude, self.0.get()).unwrap_or(0);
+        let more = away && down.wrapping_mul(self.0.get()) != magnitude;
+        let rounded = down.wrapping_add(u64::from(more)) as i64;
+        if dividend < 0 {
+            rounded.wrapping_neg()
+        } else {
+            rounded
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Headings from orientations, in integers.
 
-use crate::num::{BinaryAngle, Float, Rounding};
+use crate::num::{BinaryAngle, FloatUnit, Rounding, converted, is_below_power_of_two, is_finite};
 use crate::set::InputError;
 
 /// The robot's heading, in the form that a source reports.
@@ -23,8 +23,8 @@ const TILT_DOWN: u32 = 9;
 /// `|q|^2` is within 2^-15 of 1: |q| within 1.5e-5.
 const NORM_DOWN: u32 = 15;
 
-/// Bits below the point of a quaternion's entries.
-const ENTRY_BITS: i32 = 40;
+/// The unit of a quaternion's entries: 2^-40.
+const ENTRY: FloatUnit = FloatUnit::new(1, -40);
 
 impl Heading {
     /// Returns the heading as a binary angle: within 0.5 unit and 2^-8 unit of the true one.
@@ -33,16 +33,18 @@ impl Heading {
     /// [`InputError::EstimateNotFinite`], [`InputError::EstimateOutOfRange`],
     /// [`InputError::OrientationInvalid`], [`InputError::Tilted`].
     pub fn angle(&self) -> Result<BinaryAngle, InputError> {
-        match *self {
-            Self::Radians(yaw) => of_radians(yaw),
+        match self {
+            Self::Radians(yaw) => of_radians(*yaw),
             Self::RollPitchYaw([roll, pitch, yaw]) => {
                 for tilt in [roll, pitch] {
-                    let tilt = Float::of(tilt).ok_or(InputError::EstimateNotFinite)?;
-                    if !tilt.is_below_power_of_two(TILT_POWER) {
+                    if !is_finite(*tilt) {
+                        return Err(InputError::EstimateNotFinite);
+                    }
+                    if !is_below_power_of_two(*tilt, TILT_POWER) {
                         return Err(InputError::Tilted);
                     }
                 }
-                of_radians(yaw)
+                of_radians(*yaw)
             }
             Self::Quaternion(entries) => of_quaternion(entries),
         }
@@ -50,7 +52,7 @@ impl Heading {
 }
 
 fn of_radians(yaw: f64) -> Result<BinaryAngle, InputError> {
-    if Float::of(yaw).is_none() {
+    if !is_finite(yaw) {
         return Err(InputError::EstimateNotFinite);
     }
     BinaryAngle::from_radians(yaw).ok_or(InputError::EstimateOutOfRange)
@@ -60,21 +62,18 @@ fn of_radians(yaw: f64) -> Result<BinaryAngle, InputError> {
 /// length.
 ///
 /// Entries are rounded to within 2^-41, which changes the heading by at most 2^-39 rad (0.0013 unit).
-fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, InputError> {
-    let mut fixed = [0i128; 4];
+fn of_quaternion(entries: &[f64; 4]) -> Result<BinaryAngle, InputError> {
+    let mut fixed = [0i64; 4];
     for (fixed, entry) in fixed.iter_mut().zip(entries) {
-        let float = Float::of(entry).ok_or(InputError::OrientationInvalid)?;
         // Below 2: no square sum leaves its range.
-        if !float.is_below_power_of_two(1) {
+        if !is_below_power_of_two(*entry, 1) {
             return Err(InputError::OrientationInvalid);
         }
-        let entry = float.scaled(1, ENTRY_BITS.wrapping_neg(), Rounding::Nearest);
-        *fixed = i128::from(entry.ok_or(InputError::OrientationInvalid)?);
+        let entry = converted(*entry, &ENTRY, Rounding::Nearest);
+        *fixed = entry.map_err(|_| InputError::OrientationInvalid)?;
     }
+    let [xx, yy, zz, ww] = fixed.map(|entry| product(entry, entry));
     let [x, y, z, w] = fixed;
-    // Each below 2^82.
-    let product = |a: i128, b: i128| a.wrapping_mul(b);
-    let (xx, yy, zz, ww) = (product(x, x), product(y, y), product(z, z), product(w, w));
     let one = 1i128 << 80;
     let norm = xx.wrapping_add(yy).wrapping_add(zz).wrapping_add(ww);
     if !(norm.abs_diff(one) < one.unsigned_abs() >> NORM_DOWN) {
@@ -87,6 +86,12 @@ fn of_quaternion(entries: [f64; 4]) -> Result<BinaryAngle, InputError> {
     let cosine = ww.wrapping_add(xx).wrapping_sub(yy).wrapping_sub(zz) >> 24;
     let sine = product(w, z).wrapping_add(product(x, y)) >> 23;
     Ok(angle_of(cosine as i64, sine as i64))
+}
+
+/// Returns a product below 2^82. Six copies would take 400 bytes of flash.
+#[cfg_attr(small_code, inline(never))]
+fn product(a: i64, b: i64) -> i128 {
+    i128::from(a).wrapping_mul(i128::from(b))
 }
 
 /// Arctangents of 2^-k, unit 2^-56 turn, to the nearest.
@@ -150,16 +155,16 @@ fn angle_of(x: i64, y: i64) -> BinaryAngle {
         (x, y)
     };
     let mut angle = if behind { 1i64 << 55 } else { 0 };
-    for (k, arctangent) in (0u32..).zip(ARCTANGENTS) {
+    for (k, arctangent) in (0u32..).zip(&ARCTANGENTS) {
         let (dx, dy) = (y.wrapping_shr(k), x.wrapping_shr(k));
         if y > 0 {
             x = x.wrapping_add(dx);
             y = y.wrapping_sub(dy);
-            angle = angle.wrapping_add(arctangent);
+            angle = angle.wrapping_add(*arctangent);
         } else {
             x = x.wrapping_sub(dx);
             y = y.wrapping_add(dy);
-            angle = angle.wrapping_sub(arctangent);
+            angle = angle.wrapping_sub(*arctangent);
         }
     }
     // The low 32 bits of the angle, to the nearest.

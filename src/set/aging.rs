@@ -77,6 +77,7 @@ impl Aging {
     }
 
     /// Returns `true` if the words match the digest. Every single flipped bit makes it `false`.
+    #[cfg_attr(small_code, inline(never))]
     const fn is_whole(self) -> bool {
         self.digest == digest(self.words)
     }

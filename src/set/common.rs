@@ -54,10 +54,12 @@ impl Common {
 }
 
 /// Returns an upper bound of the length of an ellipsoid's offsets in the plane, micrometres.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 pub(crate) fn broad_um(factor: &SqrtFactor) -> u32 {
     // Six squares below 2^58.
-    let squares = factor.x.iter().chain(&factor.y).fold(0u64, |sum, entry| {
+    let rows = [factor.x, factor.y];
+    let squares = rows.as_flattened().iter().fold(0u64, |sum, entry| {
         let entry = entry.unsigned_abs();
         sum.wrapping_add(wide(entry, entry))
     });
@@ -123,7 +125,8 @@ impl Turn {
 
     /// Returns the right shift that converts a product of a lever (length units) and the mantissa to units
     /// that are finer by `finer` bits: between 1 and 31.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     pub fn shift(&self, finer: u32) -> u32 {
         self.down.saturating_sub(finer).clamp(1, 31)
     }

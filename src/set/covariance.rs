@@ -46,7 +46,9 @@ use core::num::NonZeroU32;
 
 use super::trust::{Reach, Scaled};
 use super::{InputError, SqrtFactor};
-use crate::num::{Divisor, Float, Inverse, Leading, Rounding, product, sqrt_ceil, wide};
+use crate::num::{
+    Divisor, FloatUnit, Inverse, Leading, Rounding, converted, product, sqrt_ceil, wide,
+};
 
 /// A unit of the target as `factor 2^exponent`, rounded up.
 #[derive(Clone, Copy)]
@@ -180,8 +182,8 @@ type Pair = (f64, f64, i32);
 #[cold]
 fn refusal(pairs: [Pair; 3]) -> InputError {
     let is_symmetric = |(upper, lower, power): Pair| {
-        let scaled =
-            |value: f64| Float::of(value)?.scaled(1, power.wrapping_neg(), Rounding::Nearest);
+        let unit = FloatUnit::new(1, power.wrapping_neg());
+        let scaled = |value: f64| converted(value, &unit, Rounding::Nearest).ok();
         match (scaled(upper), scaled(lower)) {
             (Some(upper), Some(lower)) => upper.abs_diff(lower) <= u64::from(LARGEST_DIFFERENCE),
             (None, None) => true,

@@ -44,11 +44,9 @@ impl Target {
     /// Returns the target from `r2 P`, whose diagonal is rounded up by less than 2 and 2^-23 of it. The error of
     /// each other entry is subtracted from both of its diagonal entries.
     pub(super) fn of(square: &ScaledCovariance) -> Self {
+        // A diagonal entry is below 2^60, and a slack below 2^43.
         let less = |diagonal: i64, a: i64, b: i64| {
-            diagonal
-                .saturating_sub(2)
-                .saturating_sub(a)
-                .saturating_sub(b)
+            diagonal.wrapping_sub(2).wrapping_sub(a).wrapping_sub(b)
         };
         Self {
             xx: less(square.xx, square.xy_slack, square.xt_slack),

@@ -78,7 +78,8 @@ impl Growth {
 
     /// Returns the sum of both movements.
     #[must_use]
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     pub const fn plus(self, other: Self) -> Self {
         if other.translation_um | other.yaw_q24 == 0 {
             return self;

@@ -22,7 +22,9 @@
 //! assert_eq!(empty, Err(InputError::CovarianceZero));
 //! ```
 
-use crate::num::{BinaryAngle, Float, Rounding, UM_PER_M};
+use crate::num::{
+    BinaryAngle, Float, FloatUnit, NotConverted, Rounding, UM_PER_M, converted, is_finite,
+};
 use crate::pose::Pose;
 
 use self::given::Given;
@@ -284,7 +286,8 @@ impl PoseSet {
         Ok(Self::given(mean, extent, Given::Ellipsoid(target)))
     }
 
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     fn given(mean: Pose, extent: Extent, given: Given) -> Self {
         Self {
             given: Some(given),
@@ -393,27 +396,35 @@ fn cylinder(
     yaw_rad: f64,
     inflation: Inflation,
 ) -> Result<(Extent, Given), InputError> {
-    let extent = |value: f64, factor: u128, shift: i32, limit: i64| {
-        let float = Float::of(value).filter(|float| float.is_positive())?;
-        let extent = float
-            .scaled(factor, shift, Rounding::AwayFromZero)
-            .unwrap_or(i64::MAX)
-            .min(limit);
-        // Up to 2^28 times 2^22.
-        Some(inflation.of_length(extent).min(limit))
-    };
     let limit = i64::from(crate::pose::REACH_UM);
-    let translation =
-        extent(translation_m, u128::from(UM_PER_M), 0, limit).ok_or(InputError::BoundInvalid)?;
+    let translation = extent_of(translation_m, u128::from(UM_PER_M), 0, limit, inflation);
+    let yaw = extent_of(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23, inflation);
+    let (Some(translation), Some(yaw)) = (translation, yaw) else {
+        return Err(InputError::BoundInvalid);
+    };
     if translation >= limit {
         return Err(InputError::BoundInvalid);
     }
-    let yaw = extent(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23).ok_or(InputError::BoundInvalid)?;
     let extent = Extent::Bounded {
         translation_um: translation as i32,
         yaw_q24: yaw as i32,
     };
     Ok((extent, Given::of_cylinder(translation, yaw, inflation)))
+}
+
+/// Returns an extent with its inflation, rounded up and limited. `None` unless it is a number above zero.
+fn extent_of(
+    value: f64,
+    factor: u128,
+    shift: i32,
+    limit: i64,
+    inflation: Inflation,
+) -> Option<i64> {
+    let float = Float::of(value).filter(|float| float.is_positive())?;
+    let extent = float.scaled(factor, shift, Rounding::AwayFromZero);
+    // Up to 2^28 times 2^22.
+    let extent = inflation.of_length(extent.unwrap_or(i64::MAX).min(limit));
+    Some(extent.min(limit))
 }
 
 /// 2^24 / (2 pi) * 2^52, rounded up.
@@ -446,7 +457,7 @@ pub fn pose_of(estimate: Estimate) -> Result<Pose, InputError> {
 /// binary angle.
 fn mean(estimate: Estimate) -> Result<Pose, InputError> {
     let Estimate { x_m, y_m, yaw_rad } = estimate;
-    if Float::of(y_m).is_none() || Float::of(yaw_rad).is_none() {
+    if !(is_finite(y_m) && is_finite(yaw_rad)) {
         return Err(InputError::EstimateNotFinite);
     }
     place(x_m, y_m, || {
@@ -463,19 +474,22 @@ pub(crate) fn place(
     y_m: f64,
     yaw: impl FnOnce() -> Result<BinaryAngle, InputError>,
 ) -> Result<Pose, InputError> {
-    let length = |value: f64| -> Result<i32, InputError> {
-        let float = Float::of(value).ok_or(InputError::EstimateNotFinite)?;
-        float
-            .scaled(u128::from(UM_PER_M), 0, Rounding::Nearest)
-            .filter(|um| um.unsigned_abs() <= 2_000_000_000)
-            .and_then(|um| i32::try_from(um).ok())
-            .ok_or(InputError::EstimateOutOfRange)
-    };
     Ok(Pose {
-        x_um: length(x_m)?,
-        y_um: length(y_m)?,
+        x_um: coordinate(x_m)?,
+        y_um: coordinate(y_m)?,
         yaw: yaw()?,
     })
+}
+
+/// Returns a coordinate of an estimate, micrometres.
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
+fn coordinate(metres: f64) -> Result<i32, InputError> {
+    match converted(metres, &FloatUnit::MICRO, Rounding::Nearest) {
+        Ok(um) if um.unsigned_abs() <= 2_000_000_000 => Ok(um as i32),
+        Err(NotConverted::NotFinite) => Err(InputError::EstimateNotFinite),
+        Ok(_) | Err(NotConverted::TooLarge) => Err(InputError::EstimateOutOfRange),
+    }
 }
 
 #[cfg(test)]

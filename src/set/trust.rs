@@ -1,7 +1,7 @@
 //! The trust in a source of estimates: the inflation of its covariance, and which of its terms it fills.
 
 use super::RadiusSquared;
-use crate::num::{Divisor, Float, Rounding, sqrt_ceil};
+use crate::num::{Divisor, FloatUnit, Rounding, converted, sqrt_ceil};
 
 /// The factor by which a source's covariance is multiplied before use, unit 2^-16.
 ///
@@ -23,7 +23,7 @@ impl Inflation {
         if factor.to_bits() < 1f64.to_bits() {
             return None;
         }
-        let raw = Float::of(factor)?.scaled(1 << 16, 0, Rounding::AwayFromZero)?;
+        let raw = converted(factor, &FloatUnit::new(1 << 16, 0), Rounding::AwayFromZero).ok()?;
         Self::from_q16(u32::try_from(raw).ok()?)
     }
 
@@ -173,7 +173,7 @@ impl Scaled {
             Some(by) if share < WHOLE => by.ceil((product << 8) as i64).unsigned_abs(),
             _ => product,
         };
-        // Unit 2^-16 if 24 bits are enough.
+        // FloatUnit 2^-16 if 24 bits are enough.
         let by = 40u32.saturating_sub(quotient.leading_zeros()).max(16);
         let up = 1u64.wrapping_shl(by).wrapping_sub(1);
         let mut mantissa = quotient.saturating_add(up).wrapping_shr(by);

@@ -178,24 +178,29 @@ impl<'a> Facets<'a> {
     }
 
     fn check(&self, cells: &Cells) -> bool {
-        let (mut frames, mut facets) = (0usize, 0usize);
-        let of_pieces = self.pieces().all(|piece| {
-            frames = frames.saturating_add(piece.frames.len());
-            facets = facets.saturating_add(piece.facets.len());
-            let own = piece
-                .frames()
-                .fold(0usize, |sum, frame| sum.saturating_add(frame.facets.len()));
-            !piece.frames.is_empty()
-                && own == piece.facets.len()
-                && piece.frames().count() == piece.frames.len()
-                && within(piece.from, piece.width, cells)
-                && piece.frames().all(|frame| self.admits(&frame))
-        });
-        of_pieces
-            && self.pieces.iter().all(|[.., zero, _, _]| *zero == 0)
+        let (mut pieces, mut frames, mut facets) = (0usize, 0usize, 0usize);
+        for piece in self.pieces() {
+            let (mut count, mut own) = (0usize, 0usize);
+            for frame in piece.frames() {
+                if !self.admits(&frame) {
+                    return false;
+                }
+                count = count.saturating_add(1);
+                own = own.saturating_add(frame.facets.len());
+            }
+            if piece.frames.is_empty()
+                || (count, own) != (piece.frames.len(), piece.facets.len())
+                || !within(piece.from, piece.width, cells)
+            {
+                return false;
+            }
+            pieces = pieces.saturating_add(1);
+            frames = frames.saturating_add(count);
+            facets = facets.saturating_add(own);
+        }
+        self.pieces.iter().all(|[.., zero, _, _]| *zero == 0)
             && self.frames.iter().all(|[axes, ..]| *axes <= 1)
-            && self.pieces().count() == self.pieces.len()
-            && (frames, facets) == (self.frames.len(), self.facets.len())
+            && (pieces, frames, facets) == (self.pieces.len(), self.frames.len(), self.facets.len())
     }
 
     /// Returns `true` if a frame's point and facets are within the layout's limits.

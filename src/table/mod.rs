@@ -109,7 +109,8 @@ pub(crate) fn stored_radius_squared(bytes: &[u8]) -> Option<RadiusSquared> {
 /// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
 /// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of
 /// several cancel with a probability of 2^-32. Returns 0 for bytes without a header.
-#[inline]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline)]
 pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let bytes = core::hint::black_box(bytes);
     let Some((header, crc)) = bytes
@@ -448,6 +449,13 @@ impl<'a> Table<'a> {
     #[must_use]
     pub fn site_digest(&self) -> [u8; 32] {
         bytes_at(self.bytes, 96).unwrap_or([0; 32])
+    }
+
+    /// Returns `true` if the table was made from the site file with this SHA-256.
+    pub(crate) fn is_of_site(&self, digest: &[u8; 32]) -> bool {
+        self.bytes
+            .get(96..128)
+            .is_some_and(|own| own == digest.as_slice())
     }
 
     /// Returns the checksum at the end of the bytes.

@@ -185,20 +185,21 @@ impl SightRecord {
 
 /// Returns `true` if `a x b` points to the side of c.
 fn is_right_handed(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> bool {
-    let [ax, ay, az] = a.map(i128::from);
-    let [bx, by, bz] = b.map(i128::from);
-    let [cx, cy, cz] = c.map(i128::from);
-    // The numbers are below 2^32: nothing wraps.
-    let part = |c: i128, a: i128, b: i128, other_a: i128, other_b: i128| {
-        c.wrapping_mul(
-            a.wrapping_mul(b)
-                .wrapping_sub(other_a.wrapping_mul(other_b)),
-        )
+    let [ax, ay, az] = a.map(i64::from);
+    let [bx, by, bz] = b.map(i64::from);
+    // Each product of two numbers is from -2^62 + 2^31 to 2^62: nothing wraps.
+    let minor = |a: i64, b: i64, other_a: i64, other_b: i64| {
+        a.wrapping_mul(b)
+            .wrapping_sub(other_a.wrapping_mul(other_b))
     };
-    part(cx, ay, bz, az, by)
-        .wrapping_add(part(cy, az, bx, ax, bz))
-        .wrapping_add(part(cz, ax, by, ay, bx))
-        > 0
+    let minors = [
+        minor(ay, bz, az, by),
+        minor(az, bx, ax, bz),
+        minor(ax, by, ay, bx),
+    ];
+    c.into_iter().zip(minors).fold(0, |sum: i128, (c, minor)| {
+        sum.wrapping_add(i128::from(c).wrapping_mul(i128::from(minor)))
+    }) > 0
 }
 
 /// Returns the dot product of two vectors, below 2^64.

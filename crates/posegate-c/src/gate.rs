@@ -4,7 +4,7 @@ use super::evidence::Read;
 use super::memory::{
     Plain, Storage, bytes, close, disjoint, open, place, read, separate, take, write,
 };
-use super::report::NO_REPORT;
+use super::report::no_report;
 use super::settings::{POSEGATE_MOST_SOURCES, POSEGATE_NAME_LENGTH, name};
 use super::{
     POSEGATE_NO_TAG, posegate_evidence, posegate_examined, posegate_permission, posegate_report,
@@ -426,14 +426,18 @@ pub unsafe extern "C" fn posegate_gate_step(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(gate, report).and(separate(gate, step));
+        let mut valid = Ok(());
         let report = read(report).and_then(|report| report.report());
+        let report = report.unwrap_or_else(|error| {
+            valid = Err(error);
+            no_report()
+        });
         let written = write(step, posegate_step::DENIED);
         apart?;
-        let result =
-            held(gate).map(|gate| gate.step(now_ms, report.as_ref().unwrap_or(&NO_REPORT)));
+        let result = held(gate).map(|gate| gate.step(now_ms, &report));
         written?;
         write(step, posegate_step::of(result?))?;
-        report.map(|_| ())
+        valid
     })
 }
 
@@ -459,7 +463,7 @@ pub unsafe extern "C" fn posegate_gate_step_on(
         apart?;
         let result = held(gate).map(|gate| match &read {
             Ok(read) => gate.step_on(now_ms, &read.evidence()),
-            Err(_) => gate.step(now_ms, &NO_REPORT),
+            Err(_) => gate.step(now_ms, &no_report()),
         });
         written?;
         write(step, posegate_step::of(result?))?;

@@ -46,30 +46,37 @@ fn seal<S: Storage>(storage: *const S) -> u32 {
     S::MARK ^ storage.addr() as u32
 }
 
+/// Refuses a null or misaligned pointer.
 fn check<T>(pointer: *const T) -> Done {
-    if pointer.is_null() {
+    check_address(pointer.addr(), align_of::<T>())
+}
+
+/// As [`check`], for an address. One function for all types, to save flash.
+#[inline(never)]
+fn check_address(address: usize, alignment: usize) -> Done {
+    if address == 0 {
         Err(posegate_status::Null)
-    } else if !pointer.is_aligned() {
+    } else if address & alignment.wrapping_sub(1) != 0 {
         Err(posegate_status::Misaligned)
     } else {
         Ok(())
     }
 }
 
-/// Returns `true` if two regions share a byte. A null pointer has no region.
-fn share_a_byte<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> bool {
+/// Refuses two regions that share a byte. A null pointer has no region.
+pub(super) fn disjoint<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> Done {
+    disjoint_addresses(a.addr(), a_bytes, b.addr(), b_bytes)
+}
+
+/// As [`disjoint`], for addresses. One function for all types, to save flash.
+#[inline(never)]
+fn disjoint_addresses(a: usize, a_bytes: usize, b: usize, b_bytes: usize) -> Done {
     // The difference that decides is never negative, so an end past the address space does not matter.
-    let (a, b) = (a.addr(), b.addr());
     let apart = match b.checked_sub(a) {
         Some(after) => after >= a_bytes || b_bytes == 0,
         None => a.saturating_sub(b) >= b_bytes || a_bytes == 0,
     };
-    a != 0 && b != 0 && !apart
-}
-
-/// Refuses two regions that share a byte.
-pub(super) fn disjoint<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: usize) -> Done {
-    if share_a_byte(a, a_bytes, b, b_bytes) {
+    if a != 0 && b != 0 && !apart {
         Err(posegate_status::Overlap)
     } else {
         Ok(())
@@ -83,12 +90,25 @@ pub(super) fn disjoint<A, B>(a: *const A, a_bytes: usize, b: *const B, b_bytes: 
 /// As for [`write`].
 pub(super) unsafe fn separate<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
     let apart = disjoint(storage, size_of::<S>(), other, size_of::<T>());
+    if apart.is_err() {
+        // SAFETY: the caller's promise.
+        unsafe { unseal(storage) };
+    }
+    apart
+}
+
+/// Marks storage as not initialised, if it is initialised.
+///
+/// # Safety
+/// As for [`write`].
+#[cold]
+#[inline(never)]
+unsafe fn unseal<S: Storage>(storage: *mut S) {
     // SAFETY: the caller's promise. Storage with a correct seal was written to before.
-    if apart.is_err() && unsafe { open(storage) }.is_ok() {
+    if unsafe { open(storage) }.is_ok() {
         // SAFETY: as above.
         let _ = unsafe { take(storage) };
     }
-    apart
 }
 
 /// Refuses an argument that shares a byte with an array of storages. Storages that overlap are then no longer

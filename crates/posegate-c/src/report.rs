@@ -40,18 +40,20 @@ impl posegate_report {
 }
 
 /// The report that a gate receives instead of an invalid one: from a source that no gate has.
-pub(super) const NO_REPORT: Report = Report {
-    source: u8::MAX,
-    frame: FrameId::UNNAMED,
-    sequence: 0,
-    stamp_ms: 0,
-    belief: PoseEstimate {
-        x_m: 0.0,
-        y_m: 0.0,
-        heading: Heading::Radians(0.0),
-        spread: None,
-    },
-};
+pub(super) const fn no_report() -> Report {
+    Report {
+        source: u8::MAX,
+        frame: FrameId::UNNAMED,
+        sequence: 0,
+        stamp_ms: 0,
+        belief: PoseEstimate {
+            x_m: 0.0,
+            y_m: 0.0,
+            heading: Heading::Radians(0.0),
+            spread: None,
+        },
+    }
+}
 
 /// Writes the number of a frame's name for reports, such as of "map" with its length 3: 64-bit FNV-1a, a
 /// leading `/` dropped. 0 for an empty name, which no source can be declared with.

@@ -276,7 +276,7 @@ impl posegate_settings {
 
     pub(super) const fn most_runs(&self) -> u32 {
         match self.most_runs {
-            0 => Settings::for_source(0, 0).most_runs,
+            0 => const { Settings::for_source(0, 0).most_runs },
             runs => runs,
         }
     }

@@ -4,7 +4,7 @@
 
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec, table};
 use posegate::shape::PoseDeg;
-use posegate::table::Table;
+use posegate::table::{Table, checksum};
 use posegate::verify::{ExpectedTable, verify};
 use posegate_host::site::Site;
 use std::path::Path;
@@ -127,4 +127,29 @@ fn self_test_table_equals_the_one_that_is_made() {
     assert!(made.len() <= 1_000, "{}", made.len());
     let table = Table::parse(&made).unwrap();
     assert!(table.grid().is_some() && table.facets().is_some());
+    let facets = facets_alone(&made);
+    let path = path.with_file_name("self_test_facets.posegate");
+    if std::env::var_os("POSEGATE_BLESS").is_some() {
+        std::fs::write(&path, &facets).unwrap();
+    }
+    assert!(
+        std::fs::read(&path).unwrap() == facets,
+        "POSEGATE_BLESS=1 cargo test -p posegate-host --test golden_tables"
+    );
+    let table = Table::parse(&facets).unwrap();
+    assert!(table.grid().is_none() && table.facets().is_some() && table.sight_record().is_none());
+}
+
+/// Returns a table without its cells and its sight record.
+fn facets_alone(bytes: &[u8]) -> Vec<u8> {
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let (start, length) = (word(76), word(80));
+    let mut alone = bytes[..176].to_vec();
+    alone.extend(&bytes[start..start + length]);
+    let total = alone.len() as u32 + 4;
+    for (at, value) in [(12, total), (68, 0), (72, 0), (76, 176), (92, 0)] {
+        alone[at..at + 4].copy_from_slice(&value.to_le_bytes());
+    }
+    alone.extend(checksum(&alone).to_le_bytes());
+    alone
 }

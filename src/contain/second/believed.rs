@@ -1,7 +1,8 @@
 //! The pose-set in question in the second evaluation's numbers, from the floats of an estimate.
 
-use super::bits::{Short, Weight, fixed, is_above_zero, is_below, over, wide, word32};
+use super::bits::{Short, Weight, fixed, is_above_zero, is_below, is_finite, root, wide, word32};
 use super::turn;
+use crate::num::quotient;
 use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, Trust};
 
@@ -47,7 +48,9 @@ impl Question<'_> {
     /// Returns the position relative to a table's goal, 2^-finer um, or `None` if a coordinate is not a
     /// number.
     pub fn above(&self, table: &[u8], finer: i32) -> Option<[i64; 2]> {
-        let above = |at: f64, goal: usize| {
+        let mut above = [0i64; 2];
+        let coordinates = [(self.belief.x_m, 16), (self.belief.y_m, 20)];
+        for (above, (at, goal)) in above.iter_mut().zip(coordinates) {
             let goal = i64::from(word32(table, goal)? as i32);
             let goal = if finer >= 0 {
                 goal.wrapping_shl(finer.unsigned_abs())
@@ -55,9 +58,9 @@ impl Question<'_> {
                 goal.wrapping_shr(finer.unsigned_abs())
             };
             let at = fixed(at, MICRO, MICRO_DOWN.wrapping_add(finer))?;
-            Some(at.wrapping_sub(goal))
-        };
-        Some([above(self.belief.x_m, 16)?, above(self.belief.y_m, 20)?])
+            *above = at.wrapping_sub(goal);
+        }
+        Some(above)
     }
 
     /// Returns the heading, 2^-32 turn: off by at most one unit, or by at most 32 from a quaternion. `None`
@@ -81,7 +84,7 @@ impl Question<'_> {
         // The root of the inflation, 2^-16, rounded down.
         let inflation = match self.trust.inflation {
             Inflation::NONE => 1 << 16,
-            inflation => (u64::from(inflation.q16()) << 16).isqrt() as i64,
+            inflation => root(u64::from(inflation.q16()) << 16) as i64,
         };
         let extent = |value: f64, factor: u64, power: i32, most: i64| {
             let extent = fixed(value, factor, power).unwrap_or(most).min(most);
@@ -107,7 +110,7 @@ impl Question<'_> {
         // Unit 2^-32; divided by the share and times 256, at most 2^60.
         let squared =
             u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
-        let share = |of: u64| Some(Weight::of(over(squared.wrapping_shl(8), of)?, -32));
+        let share = |of: u64| Some(Weight::of(quotient(squared.wrapping_shl(8), of)?, -32));
         let (plane, yaw, in_plane, with_yaw) = match self.trust.cross_terms {
             CrossTerms::Filled => {
                 let weight = Weight::of(squared, -32);
@@ -124,24 +127,20 @@ impl Question<'_> {
                 (share(half)?, share(rest)?, false, false)
             }
         };
-        if !(is_above_zero(*xx) && is_above_zero(*yy) && is_above_zero(*tt)) {
+        if ![*xx, *yy, *tt].into_iter().all(is_above_zero) {
             return None;
         }
-        let between = |value: &f64, is_filled: bool| {
-            if is_filled {
-                Short::of(*value)
-            } else {
-                Some(Short::ZERO)
-            }
-        };
-        let covariance = [
-            Short::of(*xx)?,
-            between(xy, in_plane)?,
-            Short::of(*yy)?,
-            between(xt, with_yaw)?,
-            between(yt, with_yaw)?,
-            Short::of(*tt)?,
-        ];
+        let between = |value: f64, is_filled: bool| if is_filled { value } else { 0.0 };
+        let (xy, xt, yt) = (
+            between(*xy, in_plane),
+            between(*xt, with_yaw),
+            between(*yt, with_yaw),
+        );
+        let entries = [*xx, xy, *yy, xt, yt, *tt];
+        if !entries.into_iter().all(is_finite) {
+            return None;
+        }
+        let covariance = entries.map(Short::of);
         is_possible(&covariance).then_some(Ellipsoid {
             covariance,
             plane,
@@ -159,14 +158,16 @@ fn is_possible(covariance: &[Short; 6]) -> bool {
     let [xx, xy, yy, xt, yt, tt] = covariance;
     let half = |variance: &Short| variance.top().wrapping_add(1) >> 1;
     let (x, y, t) = (half(xx), half(yy), half(tt));
-    let at = |entry: &Short, a: i32, b: i32| {
-        let power = 20i32.wrapping_sub(a).wrapping_sub(b);
-        entry.at(power)
-    };
-    let (Some(xx), Some(yy), Some(tt)) = (at(xx, x, x), at(yy, y, y), at(tt, t, t)) else {
-        return false;
-    };
-    let (Some(xy), Some(xt), Some(yt)) = (at(xy, x, y), at(xt, x, t), at(yt, y, t)) else {
+    let entries = [
+        (xx, x, x),
+        (xy, x, y),
+        (yy, y, y),
+        (xt, x, t),
+        (yt, y, t),
+        (tt, t, t),
+    ];
+    let scaled = entries.map(|(entry, a, b)| entry.at(20i32.wrapping_sub(a).wrapping_sub(b)));
+    let [Some(xx), Some(xy), Some(yy), Some(xt), Some(yt), Some(tt)] = scaled else {
         return false;
     };
     // Entries are below 2^30.

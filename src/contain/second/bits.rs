@@ -1,6 +1,6 @@
 //! Reads numbers from bytes and floats, only for the second evaluation.
 
-use core::num::NonZeroU64;
+use crate::num;
 
 /// Returns a little-endian number at an offset, or `None` beyond the end.
 pub(super) fn word16(bytes: &[u8], at: usize) -> Option<u16> {
@@ -14,19 +14,48 @@ pub(super) fn word32(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(*four))
 }
 
-/// Returns `value / by`, rounded down, or `None` if `by` is zero.
-pub(super) fn over(value: u64, by: u64) -> Option<u64> {
-    NonZeroU64::new(by).map(|by| value / by)
-}
-
 /// Returns `value / by`, rounded towards zero, or 0 if `by` is 0.
+#[cfg_attr(small_code, inline(never))]
 pub(super) fn quotient(value: i64, by: u64) -> i64 {
-    let magnitude = over(value.unsigned_abs(), by).unwrap_or(0) as i64;
+    let magnitude = num::quotient(value.unsigned_abs(), by).unwrap_or(0) as i64;
     if value < 0 {
         magnitude.wrapping_neg()
     } else {
         magnitude
     }
+}
+
+/// Returns the root of a word, rounded down: bit by bit.
+pub(super) const fn root32(value: u32) -> u32 {
+    let (mut rest, mut root, mut bit) = (value, 0u32, 1u32 << 30);
+    while bit != 0 {
+        let next = root.wrapping_add(bit);
+        root >>= 1;
+        if rest >= next {
+            rest = rest.wrapping_sub(next);
+            root = root.wrapping_add(bit);
+        }
+        bit >>= 2;
+    }
+    root
+}
+
+/// Returns the root, rounded down: its upper half is the root of the upper word, its lower half a quotient, which is at most 1 too large
+/// (Zimmermann 1999).
+#[inline(never)]
+pub(super) fn root(value: u64) -> u64 {
+    let up = value.leading_zeros() & 62;
+    let shifted = value.wrapping_shl(up);
+    let high = (shifted >> 32) as u32;
+    let upper = root32(high);
+    // At most twice the upper half: below 2^17.
+    let rest = high.wrapping_sub(upper.wrapping_mul(upper));
+    let both = rest.wrapping_shl(15) | (shifted >> 17) as u32 & 0x7fff;
+    let lower = both.checked_div(upper).unwrap_or(0);
+    // Only the largest numbers saturate: their root is the largest word.
+    let root = u64::from((upper << 16).saturating_add(lower));
+    let is_above = root.wrapping_mul(root) > shifted;
+    root.wrapping_sub(u64::from(is_above)).wrapping_shr(up >> 1)
 }
 
 /// Returns the product of two numbers. Exact.
@@ -108,6 +137,11 @@ pub(super) fn fixed(value: f64, factor: u64, power: i32) -> Option<i64> {
     })
 }
 
+/// Returns `true` if a float is not infinite and not NaN.
+pub(super) const fn is_finite(value: f64) -> bool {
+    biased(value) != NO_NUMBER
+}
+
 /// Returns `true` if a float is a number above zero.
 pub(super) fn is_above_zero(value: f64) -> bool {
     let bits = value.to_bits();
@@ -127,18 +161,9 @@ pub(super) struct Short {
 }
 
 impl Short {
-    pub const ZERO: Self = Self {
-        mantissa: 0,
-        exponent: 0,
-    };
-
-    /// Converts a float, rounded towards zero: smaller by at most 2^-30 of its value. `None` for infinities
-    /// and NaN.
-    pub fn of(value: f64) -> Option<Self> {
+    /// Converts a finite float, rounded towards zero: smaller by at most 2^-30 of its value.
+    pub fn of(value: f64) -> Self {
         let biased = biased(value);
-        if biased == NO_NUMBER {
-            return None;
-        }
         let (mantissa, exponent) = if biased == 0 {
             let whole = value.to_bits() << 12;
             let up = whole.leading_zeros();
@@ -148,17 +173,18 @@ impl Short {
             let mantissa = (value.to_bits() >> 22) as u32 & 0x3fff_ffff | 1 << 30;
             (mantissa as i32, (biased as i32).wrapping_sub(1053))
         };
-        Some(Self {
+        Self {
             mantissa: if value.is_sign_negative() {
                 mantissa.wrapping_neg()
             } else {
                 mantissa
             },
             exponent,
-        })
+        }
     }
 
     /// Returns the least b with `|value| < 2^b`; for zero a number far below every other.
+    #[cfg_attr(small_code, inline(never))]
     pub const fn top(self) -> i32 {
         if self.mantissa == 0 {
             -(1 << 20)
@@ -180,7 +206,8 @@ impl Short {
     }
 
     /// Returns `value * 2^power`, rounded down. `None` if the result is 2^30 or more.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     pub fn at(self, power: i32) -> Option<i32> {
         let by = self.exponent.wrapping_add(power);
         let Self { mantissa, .. } = self;
@@ -216,6 +243,7 @@ pub(super) struct Weight {
 
 impl Weight {
     /// Returns `value * 2^exponent`.
+    #[cfg_attr(small_code, inline(never))]
     pub const fn of(value: u64, exponent: i32) -> Self {
         let up = value.leading_zeros();
         Self {
@@ -250,8 +278,33 @@ impl Weight {
 
 #[cfg(test)]
 mod tests {
-    use super::{by_halves, by_two_halves, short_by, wide};
+    use super::{by_halves, by_two_halves, root, root32, short_by, wide};
     use proptest::prelude::*;
+
+    fn check_root(value: u64) {
+        assert_eq!(root(value), value.isqrt(), "{value}");
+        let word = value as u32;
+        assert_eq!(root32(word), word.isqrt(), "{word}");
+    }
+
+    #[test]
+    fn roots_are_rounded_down_about_squares_and_at_the_ends() {
+        let step = crate::test_iterations(7, 4099) as usize;
+        for low in (0..=u64::from(u16::MAX)).step_by(step) {
+            for high in [0, 1, 0x7fff, 0x8000, 0xb504, 0xb505, 0xfffe, 0xffff] {
+                for number in [high << 16 | low, low << 16 | high] {
+                    for near in -2i64..=2 {
+                        check_root((number * number).wrapping_add_signed(near));
+                        check_root((number * (number + 2)).wrapping_add_signed(near));
+                    }
+                }
+            }
+        }
+        for value in (0..5000).chain((0..64).map(|k| 1 << k)) {
+            check_root(value);
+            check_root(value.wrapping_neg());
+        }
+    }
 
     fn check(a: i32, b: i32) {
         let exact = i64::from(a) * i64::from(b);
@@ -292,6 +345,11 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn roots_are_rounded_down(value in any::<u64>(), less in 0..64u32) {
+            check_root(value >> less);
+        }
+
         #[test]
         fn products_of_halves_are_exact(a in any::<i32>(), b in any::<i32>(), less in 0..32u32) {
             check(a, b);

@@ -9,9 +9,10 @@
 //! turned and rounded; 18 of the units in which the longest extent, or L times the turn, has at least 2^13; and,
 //! of the effect of the yaw, the share of the roundings in `C_tt`.
 
-use super::bits::{quotient, wide};
+use super::bits::{quotient, root, wide};
 use super::planes::{Body, Facet, ROUNDED_AND_TURNED, both, dot};
 use super::turn::cosine_and_sine;
+use crate::num;
 
 /// Headings on either side of the estimate's.
 const SIDE: i32 = 8;
@@ -26,7 +27,7 @@ impl Body {
     #[inline(never)]
     pub(super) fn sections_hold(&self, facet: &Facet, axes: u8, point: [i32; 2]) -> bool {
         // Below 2^32: in a set that turns farther, headings repeat.
-        let turn = self.reach.isqrt() as i64;
+        let turn = root(self.reach) as i64;
         // Twice to where the section before reaches farthest: to first order the touching point.
         let mut e = 0;
         for _ in 0..3 {
@@ -107,7 +108,7 @@ impl Body {
             .wrapping_add(wide(nx.wrapping_mul(ny).wrapping_mul(2), xy))
             .wrapping_add(wide(ny.wrapping_mul(ny), yy))
             .max(0);
-        let reach = square.unsigned_abs().isqrt();
+        let reach = root(square.unsigned_abs());
         let mut allowed = reach >> 11;
         let (shift, across, next) = if self.is_cylinder {
             (0, square, e)
@@ -125,23 +126,22 @@ impl Body {
             (0, square, e)
         } else {
             // n . C_pt / sqrt(C_tt), with 15 more bits of the root.
-            let root = (u64::from(tt.unsigned_abs()) << 30).isqrt();
+            let deviation = root(u64::from(tt.unsigned_abs()) << 30);
             let sum = wide(nx, xt).wrapping_add(wide(ny, yt));
-            let along = quotient(sum.wrapping_mul(1 << 15), root);
+            let along = quotient(sum.wrapping_mul(1 << 15), deviation);
             let relative = along.unsigned_abs().wrapping_mul(LOST);
             let tt = u64::from(tt.unsigned_abs());
-            allowed = allowed.wrapping_add(relative.checked_div(tt).unwrap_or(0));
+            allowed = allowed.wrapping_add(num::quotient(relative, tt).unwrap_or(0));
             let shift = along.wrapping_mul(i64::from(e)) >> 15;
             let rest = square.wrapping_sub(along.wrapping_mul(along)).max(0);
             let open = (1i64 << 30).wrapping_sub(i64::from(e).wrapping_mul(i64::from(e)));
             // The lever counts as well: the movement of the point over the yaw's extent.
             let moved = self.moved(normal, lever, axes);
             let both = along.wrapping_add(moved);
-            let length = rest
+            let squares = rest
                 .unsigned_abs()
-                .saturating_add(both.unsigned_abs().saturating_mul(both.unsigned_abs()))
-                .isqrt()
-                .max(1);
+                .saturating_add(both.unsigned_abs().saturating_mul(both.unsigned_abs()));
+            let length = root(squares).max(1);
             let next = quotient(both.wrapping_mul(1 << 15), length) as i32;
             (
                 shift,
@@ -165,7 +165,7 @@ impl Body {
         };
         let along = dot(normal, ahead);
         // The extent in 2^-31 rad.
-        let turn = self.reach.isqrt().min(1 << 31).wrapping_mul(1_686_629_713) >> 30;
+        let turn = root(self.reach).min(1 << 31).wrapping_mul(1_686_629_713) >> 30;
         let length = (along >> 14).wrapping_mul((turn >> 17) as i64);
         let size = self
             .scaled(length.saturating_abs())

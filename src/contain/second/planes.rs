@@ -10,7 +10,7 @@
 //! 2^(2 power), so that the largest variance of C is below 2^28.
 
 use super::believed::{Ellipsoid, Question};
-use super::bits::{Short, quotient, short_by, wide, word16, word32};
+use super::bits::{quotient, root, root32, short_by, wide, word16, word32};
 use super::spots::{FINER, outermost_hold};
 use super::turn::cosine_and_sine;
 use crate::parts;
@@ -239,41 +239,42 @@ impl Body {
         self.swing = question.swing;
         let turn = self.swing.unsigned_abs();
         self.alpha = angle(turn);
-        let whole = self.reach.isqrt().wrapping_add(turn);
+        let whole = root(self.reach).wrapping_add(turn);
         self.whole_reach = whole.saturating_mul(whole);
     }
 
     /// Returns a length of 2^-14 units times the length of a normal, 2^-28 units, down.
     pub(super) fn along_any([x, y]: [i32; 2], length: i64) -> i64 {
         let square = x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y));
-        i64::from(square.unsigned_abs().isqrt()).wrapping_mul(length)
+        i64::from(root32(square.unsigned_abs())).wrapping_mul(length)
     }
 
     /// Computes C of an ellipsoid, lowered by its rounding.
     #[inline(always)]
     fn take(&mut self, ellipsoid: &Ellipsoid, unit: i32, lever: i32) -> Option<()> {
         let (plane, yaw) = (ellipsoid.plane, ellipsoid.yaw);
-        let [xx, xy, yy, xt, yt, tt] = ellipsoid.covariance;
+        let [.., tt] = ellipsoid.covariance;
         self.reach = tt.times(yaw.times(SQUARE_TURN)).whole();
-        let tt = tt.times(yaw.scaled(lever.wrapping_mul(2)));
-        let weight = plane.times(SQUARE_MICRO).scaled(unit.wrapping_mul(-2));
-        let (xx, xy, yy) = (xx.times(weight), xy.times(weight), yy.times(weight));
-        let weight = plane.times(WEIGHT_MICRO).scaled(lever.wrapping_sub(unit));
-        let (xt, yt) = (xt.times(weight), yt.times(weight));
+        let lengths = plane.times(SQUARE_MICRO).scaled(unit.wrapping_mul(-2));
+        let between = plane.times(WEIGHT_MICRO).scaled(lever.wrapping_sub(unit));
+        let turn = yaw.scaled(lever.wrapping_mul(2));
+        let weights = [lengths, lengths, lengths, between, between, turn];
+        let mut numbers = ellipsoid.covariance;
+        for (number, weight) in numbers.iter_mut().zip(weights) {
+            *number = number.times(weight);
+        }
+        let [xx, _, yy, .., tt] = numbers;
         let top = xx.top().max(yy.top()).max(tt.top());
         self.power = 28i32.wrapping_sub(top) >> 1;
-        let at = |number: Short| {
+        // The variances are lowered by their rounding.
+        let less = [ROUNDING_OF_C, 0, ROUNDING_OF_C, 0, 0, ROUNDING_OF_C];
+        for ((entry, number), less) in self.world.iter_mut().zip(&numbers).zip(less) {
             let value = number.at(self.power.wrapping_mul(2))?;
-            (value.unsigned_abs() <= 1 << 28).then_some(value)
-        };
-        self.world = [
-            at(xx)?.wrapping_sub(ROUNDING_OF_C),
-            at(xy)?,
-            at(yy)?.wrapping_sub(ROUNDING_OF_C),
-            at(xt)?,
-            at(yt)?,
-            at(tt)?.wrapping_sub(ROUNDING_OF_C),
-        ];
+            if value.unsigned_abs() > 1 << 28 {
+                return None;
+            }
+            *entry = value.wrapping_sub(less);
+        }
         Some(())
     }
 
@@ -341,7 +342,8 @@ impl Body {
     }
 
     /// Returns `true` if a facet holds.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &FrameProjection) -> bool {
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
         let normal = [number(x0, x1), number(y0, y1)];
@@ -413,7 +415,7 @@ impl Body {
             .wrapping_mul(along(xx, xy, xt))
             .wrapping_sub(i64::from(ax).wrapping_mul(along(xy, yy, yt)));
         // r, the touching point's yaw times 2^16, and its offset across.
-        let distance = square.max(1).unsigned_abs().isqrt();
+        let distance = root(square.max(1).unsigned_abs());
         let by = |value: i64| quotient(value, distance);
         let bend = by(yaw.wrapping_mul(1 << 16)).wrapping_mul(by(across)) >> 16;
         // The value is scaled by L 2^(2 power + 14).
@@ -427,6 +429,7 @@ impl Body {
 }
 
 /// Returns a turn of 2^-32 turn in 2^-31 rad, down; at most 1 rad.
+#[cfg_attr(small_code, inline(never))]
 fn angle(turn: u64) -> u32 {
     (turn.wrapping_mul(PI_Q30) >> 30).min(1 << 31) as u32
 }
@@ -462,19 +465,22 @@ fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3]
     ]
 }
 
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn q30(value: i64) -> i32 {
     (value.wrapping_add(1 << 29) >> 30) as i32
 }
 
 /// Returns a number times a share of 2^-30, to the nearest.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 fn share(number: i32, share: i32) -> i32 {
     q30(wide(number, share))
 }
 
 /// Returns the sum of two products with a cosine or sine, 2^-30, to the nearest.
-#[inline(always)]
+#[cfg_attr(small_code, inline(never))]
+#[cfg_attr(not(small_code), inline(always))]
 pub(super) fn both(c: i32, x: i32, s: i32, y: i32) -> i32 {
     q30(wide(c, x).wrapping_add(wide(s, y)))
 }

@@ -9,7 +9,8 @@
 //! `[2^28, 2^30)`. The directions are those of the scaled variables and do not depend on units.
 
 use super::believed::{Cylinder, Ellipsoid, Question};
-use super::bits::{Short, over, quotient, word16, word32};
+use super::bits::{Short, quotient, root, word16, word32};
+use crate::num;
 use crate::set::Uncertainty;
 
 /// Lengths are in 2^-3 um, at most 2^31 of them.
@@ -116,7 +117,7 @@ fn moved(question: &Question<'_>, [x, y, turn]: [i64; 3]) -> [i64; 3] {
     let square = small_x
         .wrapping_mul(small_x)
         .wrapping_add(small_y.wrapping_mul(small_y));
-    let length = square.unsigned_abs().isqrt().wrapping_add(2);
+    let length = root(square.unsigned_abs()).wrapping_add(2);
     let by = drawn_in(i64::from(question.moved_um) << FINER);
     let along = |v: i64| quotient(v.wrapping_mul(by), length);
     let swing = drawn_in(question.swing).wrapping_mul(turn.signum());
@@ -165,7 +166,7 @@ impl Cells<'_> {
         let step = u64::from(word32(self.table, 44)?) << FINER;
         let cell = |at: i64, low: usize, count: usize| {
             let low = i64::from(word32(self.table, low)? as i32) << FINER;
-            let number = over(u64::try_from(at.wrapping_sub(low)).ok()?, step)?;
+            let number = num::quotient(u64::try_from(at.wrapping_sub(low)).ok()?, step)?;
             let number = u16::try_from(number).ok()?;
             (number < word16(self.table, count)?).then_some(number)
         };
@@ -180,7 +181,7 @@ impl Cells<'_> {
         }
         // Slab k begins at floor(k span / slabs).
         let scaled = yaw.wrapping_add(1).wrapping_mul(slabs).wrapping_sub(1);
-        let slab = over(scaled, span)?.min(slabs.wrapping_sub(1));
+        let slab = num::quotient(scaled, span)?.min(slabs.wrapping_sub(1));
         self.is_covered(usize::try_from(slab).ok()?, row, column)
     }
 
@@ -265,11 +266,11 @@ impl Scaled {
         let along = self.covariance.map(|row| dot(row, direction));
         // Below 2^33.2, its root times 2^14 below 2^31.
         let square = dot(along, direction).max(0).wrapping_add(ROUNDING);
-        let root = square.unsigned_abs().wrapping_shl(28).isqrt();
+        let length = root(square.unsigned_abs().wrapping_shl(28));
         let mut offset = [0i64; 3];
         for ((offset, along), power) in offset.iter_mut().zip(along).zip(self.powers) {
             // Below 2^32 * 2^28; the quotient is times 2^14.
-            let scaled = drawn_in(quotient(along.wrapping_mul(1 << 28), root));
+            let scaled = drawn_in(quotient(along.wrapping_mul(1 << 28), length));
             *offset = unscaled(scaled, power.wrapping_add(14));
         }
         let [.., turn] = offset;

@@ -9,7 +9,7 @@
 //! | a cosine or sine: 11 shifts and arctangents, the last rotation (measured on 2^20 headings) | 2^-26 |
 //! | the heading of a vector: the same (measured on the same headings) | 24 of 2^-32 turn |
 
-use super::bits::over;
+use crate::num::quotient;
 
 /// Arctangents of 2^-k, 2^-32 turn, to the nearest.
 const ARCTANGENTS: [i32; 11] = [
@@ -95,7 +95,7 @@ pub(super) fn heading([x, y]: [i32; 2]) -> u32 {
     }
     // Below 2^22 * 2^30.
     let rest = u64::from(y.unsigned_abs()).wrapping_mul(UNITS_PER_RADIAN);
-    let rest = over(rest, u64::from(x.unsigned_abs())).unwrap_or(0) as u32;
+    let rest = quotient(rest, u64::from(x.unsigned_abs())).unwrap_or(0) as u32;
     if y >= 0 {
         angle.wrapping_add(rest)
     } else {

@@ -81,7 +81,7 @@ proptest! {
 
 /// The digits of a float, and the power of two.
 fn digits(value: f64) -> (u128, i32) {
-    let float = Float::of(value).unwrap();
+    let float = crate::num::Float::of(value).unwrap();
     (u128::from(float.mantissa), float.exponent)
 }
 
