@@ -102,13 +102,13 @@ pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64
         }
     };
     let mut normals: Vec<[f64; 3]> = Vec::new();
+    let places: Vec<[f64; 3]> = corners.iter().flat_map(|corner| about(*corner)).collect();
     for [from, to] in &edges {
         let (from, to) = (points[*from], points[*to]);
         normals.extend(
-            corners
+            places
                 .iter()
-                .flat_map(|corner| about(*corner))
-                .map(|place| cross(minus(to, from), minus(place, from))),
+                .map(|place| cross(minus(to, from), minus(*place, from))),
         );
         // The wall's own faces: this edge with every other edge.
         normals.extend(
@@ -130,16 +130,11 @@ pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64
         if length < 1e-9 {
             continue;
         }
-        for way in [1.0, -1.0] {
-            let n = normal.map(|v| way * v / length);
-            let least = points
-                .iter()
-                .map(|p| dot(n, *p))
-                .fold(f64::INFINITY, f64::min);
-            let most = corners
-                .iter()
-                .map(|k| dot(n, *k))
-                .fold(f64::NEG_INFINITY, f64::max);
+        let normal = normal.map(|v| v / length);
+        let [[wall_least, wall_most], [tag_least, tag_most]] =
+            [&points[..], &corners[..]].map(|points| range(normal, points));
+        for (way, least, most) in [(1.0, wall_least, tag_most), (-1.0, -wall_most, -tag_least)] {
+            let n = normal.map(|v| way * v);
             let most = most + tag.less.hung;
             if least - most < -0.5 * WALL_BORDER {
                 continue;
@@ -154,6 +149,15 @@ pub(crate) fn planes(view: &Visibility, wall: &Wall, goal: PoseDeg) -> Vec<([f64
         }
     }
     planes
+}
+
+/// Returns the least and the largest product of a normal with the points.
+fn range(normal: [f64; 3], points: &[[f64; 3]]) -> [f64; 2] {
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    points.iter().fold(start, |[least, most], point| {
+        let height = dot(normal, *point);
+        [least.min(height), most.max(height)]
+    })
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -331,7 +331,7 @@ const ALL: &[&str] = &[
     "gate_mutants --texts",
     "peers",
     "docs",
-    "faults 21",
+    "faults 9",
     "vectors",
     "c",
     "parts",

@@ -324,7 +324,7 @@ fn random_bytes_never_open_interlock() {
 #[test]
 fn mutated_frames_never_get_a_false_permit() {
     let mut controller = start();
-    let mutants = count("POSEGATE_MUTANTS", 500);
+    let mutants = count("POSEGATE_MUTANTS", 150);
     let mut chance = Chance(0x003a_7a47);
     let (mut sent, mut rounds) = (0, 0);
     while sent < mutants {
@@ -417,7 +417,7 @@ fn flooded_line_never_stops_control_cycle() {
     const A_CYCLE: usize = 600;
     const BURST: usize = 2_000;
     let mut controller = start();
-    let seconds = count("POSEGATE_FLOOD_SECONDS", 2) as u32;
+    let seconds = count("POSEGATE_FLOOD_SECONDS", 1) as u32;
     let mut chance = Chance(0x000f_100d);
     controller.open();
     controller.compare_no_more();

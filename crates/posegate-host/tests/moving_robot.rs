@@ -173,7 +173,7 @@ fn bounds(drive: &Drive) -> MotionBounds {
 
 #[test]
 fn no_open_moment_has_a_pose_outside() {
-    let openings = if is_deep() { 1_000_000 } else { 4_000 };
+    let openings = if is_deep() { 1_000_000 } else { 1_500 };
     let found = driven(openings, first_seed(), bounds);
     assert_eq!(found.outside, 0, "{found:?}");
     assert!(found.moments > 5 * found.openings, "{found:?}");

@@ -17,7 +17,11 @@ pub fn faults(given: &Arguments) -> Result {
     suite("--test table_faults -- --nocapture").json()?;
     let mut count = 0;
     for tests in ["--lib gate::", "--lib wire::", "--test uart_replay refused"] {
-        count += ran(suite(tests), 1)?;
+        let mut tests = suite(tests);
+        if of_a_kind >= 700 {
+            tests = tests.env("POSEGATE_DEEP", "1");
+        }
+        count += ran(tests, 1)?;
     }
     // The controller that runs by interrupts: a million random bytes, ten thousand mutants, a flood, and internal faults.
     let mut controller = suite("--test interrupt_gate --test interrupt_faults -- --nocapture");

@@ -10,6 +10,7 @@ use posegate::gate::judge;
 use posegate::set::{RadiusSquared, Uncertainty};
 use posegate::table::Table;
 use posegate::verify::build;
+use posegate_testkit::counts;
 
 const BAY: &str = include_str!("../../../../examples/sites/loading-bay.toml");
 
@@ -145,12 +146,13 @@ fn drawn_sections_agree_with_membership() {
     );
     let rounds = crate::rounds(1500, 4);
     let mut random = Random(11);
-    for (text, name, layout) in [
+    let drawn = [
         (BAY, "see-bay", Layout::Facets),
         (BAY, "see-bay", Layout::Grid),
         (turned.as_str(), "enter-bay", Layout::Facets),
         (turned.as_str(), "enter-bay", Layout::Grid),
-    ] {
+    ];
+    for (text, name, layout) in counts::one_a_day(&drawn) {
         let site = site(text);
         let bytes = table(&site, name, layout);
         let subject = Subject::new(&site, name).unwrap();

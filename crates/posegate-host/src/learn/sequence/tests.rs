@@ -1,6 +1,7 @@
 use super::*;
 use crate::learn::clopper_pearson;
 use crate::learn::random::mixed;
+use posegate_testkit::counts;
 
 const ALPHA: f64 = 0.05;
 
@@ -21,7 +22,7 @@ fn excluded(fleets: u64, truth: f64, limits: impl Fn(u64, u64) -> [f64; 2]) -> u
 /// The limits of the test are evaluated after every docking.
 #[test]
 fn truth_is_inside_at_all_evaluations_with_probability_1_minus_alpha() {
-    for truth in [0.99, 0.9, 0.5] {
+    for truth in counts::one_a_day(&[0.99, 0.9, 0.5]) {
         let count = excluded(400, truth, |s, n| confidence_sequence(s, n, ALPHA));
         // 5 % of 400, and three standard deviations more.
         assert!(count <= 33, "{truth}: {count} of 400");

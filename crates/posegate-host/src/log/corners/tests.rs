@@ -116,7 +116,7 @@ fn exact_corners_give_the_true_pose() {
     }
 }
 
-/// 4,000 noisy observations per pose: the reported covariance is that of the fixes, and the mean of e' P^-1 e is 3.
+/// 4,000 noisy observations per pose (1,000 in the fast suite): the reported covariance is that of the fixes, and the mean of e' P^-1 e is 3.
 #[test]
 fn covariance_equals_that_of_simulated_noise() {
     let eye = eye();
@@ -124,7 +124,12 @@ fn covariance_equals_that_of_simulated_noise() {
     let (one, two) = (tag(2.2, 0.5, 240.0), tag(2.4, -0.1, 150.0));
     let cases = [(&[one][..], 0.3, 1), (&[one, two][..], 0.5, 2)];
     for (tags, sigma, seed) in counts::one_a_day(&cases) {
-        let rounds = 4000;
+        // The variance of 4,000 draws has a standard deviation of 2.2 %, that of 1,000 draws 4.5 %.
+        let (rounds, most) = if counts::is_deep() {
+            (4000, 0.09)
+        } else {
+            (1000, 0.18)
+        };
         let mut noise = normal(0x9e37_79b9_7f4a_7c15 + seed);
         let mut scaled = || sigma * noise();
         let mut sum = Matrix3::<f64>::zeros();
@@ -148,21 +153,20 @@ fn covariance_equals_that_of_simulated_noise() {
             nees += (covariance.try_inverse().unwrap() * error).dot(&error);
         }
         let (sum, reported) = (sum / f64::from(rounds), reported / f64::from(rounds));
-        // The variance of 4,000 draws has a standard deviation of 2.2 %.
         for axis in 0..3 {
             let ratio = sum[(axis, axis)] / reported[(axis, axis)];
-            assert!((ratio - 1.0).abs() < 0.09, "axis {axis}: {ratio}");
+            assert!((ratio - 1.0).abs() < most, "axis {axis}: {ratio}");
         }
         for (r, c) in [(0, 1), (0, 2), (1, 2)] {
             let size = libm::sqrt(reported[(r, r)] * reported[(c, c)]);
             assert!(
-                (sum[(r, c)] - reported[(r, c)]).abs() < 0.09 * size,
+                (sum[(r, c)] - reported[(r, c)]).abs() < most * size,
                 "{r} {c}"
             );
         }
-        // Its standard deviation is sqrt(6 / 4,000).
+        // Its standard deviation is sqrt(6 / rounds).
         let mean = nees / f64::from(rounds);
-        assert!((mean - 3.0).abs() < 0.16, "{mean}");
+        assert!((mean - 3.0).abs() < 16.0 / 9.0 * most, "{mean}");
     }
 }
 
