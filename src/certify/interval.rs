@@ -19,8 +19,8 @@ pub struct Interval {
 /// Bound of the absolute error of `libm::sin` and `libm::cos`: 4 ulp of a number below 1.
 const TRIG_ERROR: f64 = 4.0 * (f64::EPSILON / 2.0);
 
-/// The least size of an end beside zero. The next numbers beside zero are subnormal, and processors multiply those about a hundred
-/// times slower. A product of two ends of this size is not subnormal either.
+/// The least size of an end that is not zero. The numbers next to zero are subnormal, and a processor takes about a hundred times as long to
+/// multiply them. A product of two ends of this size is not subnormal either.
 const TINY: f64 = 1e-150;
 
 /// Returns a number below every number that rounds to `value`.
@@ -56,8 +56,8 @@ impl Interval {
         }
     }
 
-    /// Rounds both ends one number outwards; an end that is NaN makes the interval everything. An end nearer to zero than [`TINY`]
-    /// becomes zero, or `TINY` on the other side.
+    /// Rounds both ends one number outwards; an end that is NaN makes the interval everything. An end that is closer to zero than
+    /// [`TINY`] becomes zero, or `TINY` on the other side of it.
     fn outwards(lo: f64, hi: f64) -> Self {
         if lo.is_nan() || hi.is_nan() {
             return Self::ENTIRE;
@@ -278,9 +278,9 @@ mod tests {
         }
     }
 
-    /// Products of ends beside zero would be subnormal, and slow: proofs took four times as long.
+    /// Products of the numbers next to zero are subnormal, and slow: with them, proofs took four times as long.
     #[test]
-    fn ends_beside_zero_enclose_zero_and_are_not_subnormal() {
+    fn ends_close_to_zero_enclose_it_and_are_not_subnormal() {
         let zero = Interval::point(1.0) - Interval::point(1.0);
         let below = zero - Interval { lo: 0.0, hi: 3.0 };
         let ends = [1e-300, 1e-160, TINY, 1e-140, 0.3, 7.0].map(Interval::point);

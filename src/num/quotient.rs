@@ -1,7 +1,7 @@
 //! Quotients of 64 bits.
 //!
 //! A controller divides 32 bits at most. The compiler's routine for 64 bits takes 930 bytes of flash on a Cortex-M4F, `by_digits` takes 280.
-//! All quotients of a gate that may need more than 32 bits are from here.
+//! All quotients of a gate's step that may need more than 32 bits are from here.
 
 /// Returns `n / d`, rounded down, or `None` if d is zero.
 #[must_use]
@@ -14,9 +14,9 @@ pub fn quotient(n: u64, d: u64) -> Option<u64> {
     }
 }
 
-/// Returns [`quotient`] by long division with digits of some 15 bits: each round subtracts a multiple of d that the leading bits of both
-/// numbers allow. The leading bits of d are rounded up, so the rest never falls below zero, and each round leaves less than 2^-14 of it or less
-/// than six times d: at most ten rounds.
+/// Returns [`quotient`] by long division with digits of some 15 bits. Each round divides the leading bits of the rest by those of d, and
+/// subtracts that multiple of d. The leading bits of d are rounded up, so the rest never falls below zero. Each round leaves less than
+/// 2^-14 of the rest, or less than six times d. So there are ten rounds at most.
 #[cfg_attr(not(any(small_code, test)), allow(dead_code))]
 #[inline(never)]
 fn by_digits(n: u64, d: u64) -> Option<u64> {
@@ -52,11 +52,18 @@ fn by_digits(n: u64, d: u64) -> Option<u64> {
 #[must_use]
 #[cfg_attr(not(small_code), inline)]
 pub fn towards_zero(value: i64, by: i64) -> i64 {
-    if cfg!(not(small_code)) {
-        return value.checked_div(by.max(0)).unwrap_or(0);
+    if cfg!(small_code) {
+        signed_by_digits(value, by)
+    } else {
+        value.checked_div(by.max(0)).unwrap_or(0)
     }
+}
+
+/// Returns [`towards_zero`] by [`by_digits`].
+#[cfg_attr(not(any(small_code, test)), allow(dead_code))]
+fn signed_by_digits(value: i64, by: i64) -> i64 {
     let by = u64::try_from(by).unwrap_or(0);
-    let magnitude = quotient(value.unsigned_abs(), by).unwrap_or(0) as i64;
+    let magnitude = by_digits(value.unsigned_abs(), by).unwrap_or(0) as i64;
     if value < 0 {
         magnitude.wrapping_neg()
     } else {
@@ -66,21 +73,17 @@ pub fn towards_zero(value: i64, by: i64) -> i64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{by_digits, quotient, towards_zero};
+    use super::{by_digits, quotient, signed_by_digits, towards_zero};
     use proptest::prelude::*;
 
     fn check(n: u64, d: u64) {
         let exact = n.checked_div(d);
         assert_eq!(by_digits(n, d), exact, "{n} / {d}");
         assert_eq!(quotient(n, d), exact, "{n} / {d}");
-        if let (Ok(by), true) = (i64::try_from(d), d > 0) {
-            let n = n as i64;
-            assert_eq!(
-                towards_zero(n, by),
-                n.checked_div(by).unwrap_or(0),
-                "{n} / {by}"
-            );
-        }
+        let (n, by) = (n as i64, d as i64);
+        let exact = n.checked_div(by.max(0)).unwrap_or(0);
+        assert_eq!(towards_zero(n, by), exact, "{n} / {by}");
+        assert_eq!(signed_by_digits(n, by), exact, "{n} / {by}");
     }
 
     #[test]

@@ -47,7 +47,7 @@ use core::num::NonZeroU32;
 use super::trust::{Reach, Scaled};
 use super::{InputError, SqrtFactor};
 use crate::num::{
-    Divisor, FloatUnit, Inverse, Leading, Rounding, converted, product, sqrt_ceil, wide,
+    Divisor, FloatUnit, Inverse, Leading, Rounding, converted, is_finite, product, sqrt_ceil, wide,
 };
 
 /// A unit of the target as `factor 2^exponent`, rounded up.
@@ -80,8 +80,7 @@ const LARGEST_YAW: i64 = 1 << 29;
 /// Checks a covariance and returns `r2 P`.
 #[inline(always)]
 pub(super) fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance, InputError> {
-    let is_finite = |value: &f64| (value.to_bits() >> 52) as u32 & 0x7ff != 0x7ff;
-    if !p.iter().flatten().all(is_finite) {
+    if !p.iter().flatten().all(|value| is_finite(*value)) {
         return Err(InputError::CovarianceNotFinite);
     }
     let [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]] = *p;

@@ -173,7 +173,7 @@ impl Scaled {
             Some(by) if share < WHOLE => by.ceil((product << 8) as i64).unsigned_abs(),
             _ => product,
         };
-        // FloatUnit 2^-16 if 24 bits are enough.
+        // Unit 2^-16 if 24 bits are enough.
         let by = 40u32.saturating_sub(quotient.leading_zeros()).max(16);
         let up = 1u64.wrapping_shl(by).wrapping_sub(1);
         let mut mantissa = quotient.saturating_add(up).wrapping_shr(by);

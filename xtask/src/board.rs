@@ -19,6 +19,16 @@ pub fn build(target: &str, example: &str) -> Result<PathBuf> {
         .join(example))
 }
 
+/// Builds a firmware example for size, at the level "s", in a separate folder.
+pub fn build_small(target: &str, example: &str) -> Result<PathBuf> {
+    let folder = target_folder().join("small");
+    cmd(&format!("cargo build -p posegate --profile firmware --target {target} --features firmware --example {example}"))
+        .words("--config profile.firmware.opt-level=\"s\" --target-dir")
+        .arg(&folder)
+        .run()?;
+    Ok(folder.join(target).join("firmware/examples").join(example))
+}
+
 /// Returns the command that runs a firmware in QEMU, for this many seconds at most.
 pub fn emulate(machine: &str, elf: &Path, seconds: u64) -> Cmd {
     let line = format!(

@@ -39,7 +39,7 @@ impl posegate_report {
     }
 }
 
-/// The report that a gate receives instead of an invalid one: from a source that no gate has.
+/// Returns the report that a gate receives instead of an invalid one. It is from a source that no gate has.
 pub(super) const fn no_report() -> Report {
     Report {
         source: u8::MAX,

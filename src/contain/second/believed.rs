@@ -110,7 +110,14 @@ impl Question<'_> {
         // Unit 2^-32; divided by the share and times 256, at most 2^60.
         let squared =
             u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
-        let share = |of: u64| Some(Weight::of(quotient(squared.wrapping_shl(8), of)?, -32));
+        // The first evaluation divides the same numbers. A fault in the division that both call must not make both sets smaller, so the
+        // quotient is checked.
+        let share = |of: u64| {
+            let scaled = squared.wrapping_shl(8);
+            let found = quotient(scaled, of)?;
+            let rest = scaled.wrapping_sub(found.wrapping_mul(of));
+            (rest < of).then_some(Weight::of(found, -32))
+        };
         let (plane, yaw, in_plane, with_yaw) = match self.trust.cross_terms {
             CrossTerms::Filled => {
                 let weight = Weight::of(squared, -32);

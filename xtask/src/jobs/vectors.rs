@@ -1,4 +1,5 @@
-//! `vectors`: repeats the decisions of tests/data/vectors.bin on this machine and in five emulations, which report their core themselves.
+//! `vectors`: repeats the decisions of tests/data/vectors.bin on this machine and in five emulations, which report their core themselves. Two of
+//! them run also at the level "s".
 
 use crate::arguments::Arguments;
 use crate::board;
@@ -49,6 +50,16 @@ pub fn vectors(_: &Arguments) -> Result {
         println!("{line}");
         if outcome.code != 0 || line != right(core, count) {
             failed.push(core.into());
+        }
+    }
+    // Code for size shares functions that level 3 copies.
+    for (target, machine, core) in [CORES[0], CORES[2]] {
+        let elf = board::build_small(target, "vectors")?;
+        let outcome = board::emulate(machine, &elf, 60).outcome()?;
+        let line = outcome.text.trim_end();
+        println!("{}", line.replace(core, &format!("{core}, at the level s")));
+        if outcome.code != 0 || line != right(core, count) {
+            failed.push(format!("{core}, at the level s"));
         }
     }
     if failed.is_empty() {

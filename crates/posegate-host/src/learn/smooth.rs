@@ -382,7 +382,8 @@ impl BandedMatrix {
 
     /// Adds at row `i`, column `j <= i` within the band.
     fn add(&mut self, i: usize, j: usize, value: f64) {
-        self.rows[i * (self.width + 1) + self.width + j - i] += value;
+        let place = self.place(i, j);
+        self.rows[place] += value;
     }
 
     /// Adds `price` times the square of a sum.
@@ -396,27 +397,40 @@ impl BandedMatrix {
         }
     }
 
-    /// Solves in place: `L L' x = right`.
-    fn solve(&mut self, right: &mut [f64]) {
-        let (n, w) = (self.n, self.width);
-        for i in 0..n {
-            let first = i.saturating_sub(w);
-            for j in first..=i {
-                let shared = first.max(j.saturating_sub(w));
-                let (row_i, row_j) = (i * (w + 1) + w - i, j * (w + 1) + w - j);
-                let mut sum = self.rows[row_i + j];
-                let a = &self.rows[row_i + shared..row_i + j];
-                let b = &self.rows[row_j + shared..row_j + j];
-                for (x, y) in a.iter().zip(b) {
-                    sum -= x * y;
+    /// Returns the place of row `i`, column `j <= i` within the band.
+    const fn place(&self, i: usize, j: usize) -> usize {
+        i * (self.width + 1) + self.width + j - i
+    }
+
+    /// Replaces the matrix by the factor `L` of `L L'`. Each finished column is subtracted from all that are right of it, so the numbers of
+    /// a row do not wait for each other.
+    fn factorize(&mut self) {
+        let mut column = Vec::with_capacity(self.width);
+        for k in 0..self.n {
+            let below = k + 1..self.n.min(k + self.width + 1);
+            let diagonal = self.place(k, k);
+            let root = libm::sqrt(self.rows[diagonal].max(1e-12));
+            self.rows[diagonal] = root;
+            column.clear();
+            for i in below.clone() {
+                let place = self.place(i, k);
+                self.rows[place] /= root;
+                column.push(self.rows[place]);
+            }
+            for i in below {
+                let row = self.place(i, k + 1)..=self.place(i, i);
+                let factor = column[i - k - 1];
+                for (value, other) in self.rows[row].iter_mut().zip(&column) {
+                    *value -= factor * other;
                 }
-                self.rows[row_i + j] = if i == j {
-                    libm::sqrt(sum.max(1e-12))
-                } else {
-                    sum / self.rows[row_j + j]
-                };
             }
         }
+    }
+
+    /// Solves in place: `L L' x = right`.
+    fn solve(&mut self, right: &mut [f64]) {
+        self.factorize();
+        let (n, w) = (self.n, self.width);
         for i in 0..n {
             let row = i * (w + 1) + w - i;
             let mut sum = right[i];
