@@ -68,6 +68,14 @@ pub(crate) const fn test_iterations(all: u32, interpreted: u32) -> u32 {
     if cfg!(miri) { interpreted } else { all }
 }
 
+/// Returns the number of rounds of a test that takes seconds: `all` in the deep job (`./ci.sh deep` sets `POSEGATE_DEEP`), a fifth of
+/// them in the fast suite, and `interpreted` under Miri.
+#[cfg(test)]
+pub(crate) fn test_share(all: u32, interpreted: u32) -> u32 {
+    let is_deep = std::env::var_os("POSEGATE_DEEP").is_some();
+    test_iterations(if is_deep { all } else { all / 5 }, interpreted)
+}
+
 mod messages;
 
 mod parts;

@@ -38,6 +38,7 @@ fn shares(model: &ErrorModel, later: &Detections) -> Vec<Share> {
 
 /// Bounds are for later views like those of the data: not for a camera with 1.5 times the noise.
 #[test]
+#[ignore = "takes seconds: ./ci.sh deep"]
 fn bounds_are_too_low_if_later_errors_are_larger() {
     let noisier = Distribution {
         sigma: |at| 1.5 * (SQUARES.sigma)(at),
@@ -55,6 +56,7 @@ fn bounds_are_too_low_if_later_errors_are_larger() {
 
 /// A bound holds for the mixture of places in its region, but not for one place with larger errors alone.
 #[test]
+#[ignore = "takes seconds: ./ci.sh deep"]
 fn bounds_are_too_low_at_one_place_with_larger_errors() {
     const SPOT: fn([f64; 3]) -> bool =
         |[d, _, psi]| (3.0..3.3).contains(&d) && (30.0..33.0).contains(&psi);
@@ -210,6 +212,7 @@ fn covering(rows: u32, seed: u64) -> Share {
 
 /// Blocks of rows must be independent of each other: an error that lasts for the whole log cannot be seen in it.
 #[test]
+#[ignore = "takes seconds: ./ci.sh deep"]
 fn inflation_is_too_small_if_an_error_lasts_for_the_whole_log() {
     let short = covering(10, 351);
     assert!(short.trials == 40 && short.value() >= 0.7, "{short:?}");
@@ -219,6 +222,7 @@ fn inflation_is_too_small_if_an_error_lasts_for_the_whole_log() {
 
 /// Limits of the share of detected views are for later views like those of the data: not if every sixth view is dark.
 #[test]
+#[ignore = "takes seconds: ./ci.sh deep"]
 fn detected_share_is_too_high_if_later_views_are_dark() {
     let mut random = Random(501);
     let places: Vec<[f64; 3]> = (0..20_000)

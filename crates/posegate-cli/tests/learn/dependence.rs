@@ -214,6 +214,7 @@ fn regions_hold_if_rows_are_independent_in_many_data_sets() {
 
 /// The test above finds rows that are wrongly taken as independent.
 #[test]
+#[ignore = "takes seconds: ./ci.sh deep"]
 fn regions_are_too_low_if_dependent_frames_are_taken_as_independent() {
     let models = (0..12).filter_map(|seed| {
         let detections = SQUARES.approaches(60, 0.9, 0.0, 7919 * seed + 13);
