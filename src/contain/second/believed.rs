@@ -110,14 +110,7 @@ impl Question<'_> {
         // Unit 2^-32; divided by the share and times 256, at most 2^60.
         let squared =
             u64::from(self.radius_q16).wrapping_mul(u64::from(self.trust.inflation.q16()));
-        // The first evaluation divides the same numbers. A fault in the division that both call must not make both sets smaller, so the
-        // quotient is checked.
-        let share = |of: u64| {
-            let scaled = squared.wrapping_shl(8);
-            let found = quotient(scaled, of)?;
-            let rest = scaled.wrapping_sub(found.wrapping_mul(of));
-            (rest < of).then_some(Weight::of(found, -32))
-        };
+        let share = |of: u64| shared(squared, of);
         let (plane, yaw, in_plane, with_yaw) = match self.trust.cross_terms {
             CrossTerms::Filled => {
                 let weight = Weight::of(squared, -32);
@@ -224,4 +217,14 @@ fn of_quaternion(entries: &[f64; 4]) -> Option<u32> {
     let cosine = ww.wrapping_add(xx).wrapping_sub(yy).wrapping_sub(zz) >> 29;
     let sine = times(w, z).wrapping_add(times(x, y)) >> 28;
     Some(turn::heading([cosine as i32, sine as i32]))
+}
+
+/// Returns `squared * 256 / of` as a weight, unit 2^-32. The first evaluation divides the same numbers. A fault in the division that both
+/// call must not make both sets smaller, so the quotient is checked: `None` if it is wrong.
+#[inline(never)]
+fn shared(squared: u64, of: u64) -> Option<Weight> {
+    let scaled = squared.wrapping_shl(8);
+    let found = quotient(scaled, of)?;
+    let rest = scaled.wrapping_sub(found.wrapping_mul(of));
+    (rest < of).then_some(Weight::of(found, -32))
 }
