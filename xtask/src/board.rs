@@ -12,19 +12,20 @@ pub const CORES: [(&str, &str); 2] = [
 
 /// Builds a firmware example and returns its ELF file.
 pub fn build(target: &str, example: &str) -> Result<PathBuf> {
-    cmd(&format!("cargo build -p posegate --profile firmware --target {target} --features firmware --example {example}")).run()?;
-    Ok(target_folder()
-        .join(target)
-        .join("firmware/examples")
-        .join(example))
+    build_into(&target_folder(), "", target, example)
 }
 
-/// Builds a firmware example for size, at the level "s", in a separate folder.
+/// As [`build`], for size: at the level "s", in a separate folder.
 pub fn build_small(target: &str, example: &str) -> Result<PathBuf> {
-    let folder = target_folder().join("small");
+    let level = "--config profile.firmware.opt-level=\"s\"";
+    build_into(&target_folder().join("small"), level, target, example)
+}
+
+fn build_into(folder: &Path, more: &str, target: &str, example: &str) -> Result<PathBuf> {
     cmd(&format!("cargo build -p posegate --profile firmware --target {target} --features firmware --example {example}"))
-        .words("--config profile.firmware.opt-level=\"s\" --target-dir")
-        .arg(&folder)
+        .words(more)
+        .arg("--target-dir")
+        .arg(folder)
         .run()?;
     Ok(folder.join(target).join("firmware/examples").join(example))
 }

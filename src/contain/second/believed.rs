@@ -225,6 +225,33 @@ fn of_quaternion(entries: &[f64; 4]) -> Option<u32> {
 fn shared(squared: u64, of: u64) -> Option<Weight> {
     let scaled = squared.wrapping_shl(8);
     let found = quotient(scaled, of)?;
-    let rest = scaled.wrapping_sub(found.wrapping_mul(of));
-    (rest < of).then_some(Weight::of(found, -32))
+    is_quotient(found, scaled, of).then_some(Weight::of(found, -32))
+}
+
+/// Returns `true` if `found` is `n / of`, rounded down, by another way than the division.
+const fn is_quotient(found: u64, n: u64, of: u64) -> bool {
+    n.wrapping_sub(found.wrapping_mul(of)) < of
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_quotient;
+
+    #[test]
+    fn only_the_exact_quotient_is_accepted() {
+        for of in 1..=256u64 {
+            for n in [0, 1, of - 1, of, 1 << 40, (1 << 60) - 1] {
+                let exact = n / of;
+                assert!(is_quotient(exact, n, of), "{n} / {of}");
+                // Each single flipped bit that makes it smaller, and so the pose-set, is found.
+                for bit in (0..64).filter(|bit| exact >> bit & 1 == 1) {
+                    assert!(!is_quotient(exact ^ 1 << bit, n, of), "{n} / {of}: {bit}");
+                }
+                assert!(
+                    !is_quotient(exact + 1, n, of)
+                        && (exact == 0 || !is_quotient(exact - 1, n, of))
+                );
+            }
+        }
+    }
 }

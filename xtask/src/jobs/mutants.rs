@@ -38,6 +38,7 @@ pub fn mutants(given: &Arguments) -> Result {
                 .args(globs.iter().flat_map(|glob| ["-f", glob]))
                 .words(arguments)
                 .env("PROPTEST_RNG_SEED", "1")
+                .env("POSEGATE_DEEP", "1")
                 .env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "1")
                 .code()?;
         // Exit code 2: mutants were missed; 3: some reached the time limit. Both are counted below.
