@@ -174,7 +174,8 @@ impl<const N: usize> Evaluation<N> {
     /// Returns the index of the first step that fails, and the reason; `None` if no step fails.
     #[must_use]
     pub fn first_failure(&self) -> Option<(usize, Failure)> {
-        let mut steps = self.steps.iter().enumerate();
+        // A range, since `enumerate` counts with a check for overflow, which is a panic in code for size.
+        let mut steps = (0..N).zip(&self.steps);
         steps.find_map(|(index, found)| Some((index, found.failure?)))
     }
 }

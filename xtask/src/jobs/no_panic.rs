@@ -7,7 +7,7 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd};
 
-/// Makes a link that fails if a panic can be reached, and checks that it fails with an added panic.
+/// Makes links that fail if a panic can be reached, at level 3 and for size, and checks that one fails with an added panic.
 pub fn no_panic(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     let mut report = Report::default();
@@ -32,6 +32,13 @@ pub fn no_panic(_: &Arguments) -> Result {
             .into());
         }
         report.at_most(&format!("panics reachable, {target}"), 0, "panics", 0);
+        board::build_small(target, "no_panic")?;
+        report.at_most(
+            &format!("panics reachable for size, {target}"),
+            0,
+            "panics",
+            0,
+        );
     }
     report.finish()
 }
