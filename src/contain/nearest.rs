@@ -1,12 +1,15 @@
 //! A lower bound on the factor by which a set could be larger, a by-product of the decision: it comes from
 //! the nearest facet.
 //!
-//! At scale l a facet needs at most `l A + l^2 E + l^3 R` of the slack s of its estimate: A is the extent
-//! along the normal, E the bend, R the rest. For any upper bound L of l, the facet holds at the scale
-//! `s / (A + L E + L^2 R)`; `L = s / A` is such a bound. (One part of R, `3/8 f^3 |D|`, grows as l^4. It is
+//! At scale l a facet needs at most `l (A + l (E + l R))` of the slack s of its estimate: A is the extent
+//! along the normal, E the bend, R the rest. (One part of R, `3/8 f^3 |D|`, grows as l^4. It is
 //! less than an eighth of E at l = 1, and E, which is the whole of f |D|, exceeds the bend by a half.) A, E
 //! and R are the frame's own bounds for all normals, so only the nearest facet of each frame counts, and the
 //! result is a lower bound.
+//!
+//! A division takes a controller without a divider some 200 instructions, a product one. So a product tests
+//! first whether a limit lowers the scale found so far. Where it does, the facet holds at the scale
+//! `s / (A + L (E + L R))` for any upper bound L of l; `L = s / A` is such a bound.
 
 use super::compact::QuantizedPoseSet;
 use super::frame::FramePoints;
@@ -42,6 +45,29 @@ pub(super) struct Nearest {
     /// The smallest slack in the frame.
     least: i32,
     scale_q10: u32,
+    /// Limits of the piece: its arc, and the largest turn that a frame's bounds allow.
+    arc: Limit,
+    turn: Limit,
+}
+
+/// A scale is at most `room / share`, unit 2^-10.
+struct Limit {
+    room: u32,
+    share: u32,
+}
+
+impl Limit {
+    const NONE: Self = Self { room: 1, share: 0 };
+
+    /// Returns the smaller one of a scale and this limit.
+    fn lower(&self, scale_q10: u32) -> u32 {
+        let needed = u64::from(self.share).wrapping_mul(u64::from(scale_q10));
+        if needed <= u64::from(self.room) {
+            return scale_q10;
+        }
+        // A share of zero needs nothing.
+        self.room.checked_div(self.share).unwrap_or(0)
+    }
 }
 
 impl Nearest {
@@ -49,12 +75,15 @@ impl Nearest {
         Self {
             least: i32::MAX,
             scale_q10: MOST_Q10,
+            arc: Limit::NONE,
+            turn: Limit::NONE,
         }
     }
 
     /// Returns the lower bound: at least 1, which the decision itself proves.
     pub fn margin_q10(&self) -> u32 {
-        self.scale_q10.max(ONE_Q10)
+        let scale = self.arc.lower(self.turn.lower(self.scale_q10));
+        scale.max(ONE_Q10)
     }
 }
 
@@ -62,23 +91,22 @@ impl DecisionObserver for Nearest {
     fn piece(&mut self, piece: &Piece<'_>, set: &QuantizedPoseSet<'_>, turns: bool) {
         let turn = &set.common.turn;
         // A previous piece may have failed half-way.
-        self.least = i32::MAX;
+        *self = Self::new();
         // The bounds of a frame are valid up to half a radian. Without levers there are none.
-        self.scale_q10 = if turns {
-            (Turn::LARGEST.unsigned_abs() << 10)
-                .checked_div(turn.radians_q15.unsigned_abs())
-                .unwrap_or(0)
-                .min(MOST_Q10)
-        } else {
-            MOST_Q10
-        };
+        if turns {
+            self.turn = Limit {
+                room: Turn::LARGEST.unsigned_abs() << 10,
+                share: turn.radians_q15.unsigned_abs(),
+            };
+        }
         if !piece.is_whole_circle() {
             let above = set.above_goal.wrapping_sub(piece.from);
             let room = above.min(piece.width.saturating_sub(above));
-            // The scale is the slack divided by 2^-10 of the reach, rounded up.
-            let share = (turn.reach >> 10).wrapping_add(1);
-            let scale = room.saturating_sub(8).checked_div(share).unwrap_or(0);
-            self.scale_q10 = self.scale_q10.min(scale);
+            self.arc = Limit {
+                room: room.saturating_sub(8),
+                // 2^-10 of the reach, rounded up.
+                share: (turn.reach >> 10).wrapping_add(1),
+            };
         }
     }
 
@@ -89,37 +117,69 @@ impl DecisionObserver for Nearest {
 
     #[inline(always)]
     fn frame(&mut self, seen: &FramePoints, extent: i32) {
-        let scale = scale_q10(self.least, extent.unsigned_abs(), seen);
-        self.scale_q10 = self.scale_q10.min(scale);
+        let needs = Needs {
+            extent: extent.unsigned_abs(),
+            bend: seen.bend.unsigned_abs(),
+            rest: seen.rest.unsigned_abs(),
+        };
+        // 2^21 * 2^10 fits.
+        let spare = self.least.clamp(0, 1 << 21).unsigned_abs() << 10;
+        if !needs.are_surely_met_at(self.scale_q10, spare) {
+            self.scale_q10 = needs.lower(self.scale_q10, spare);
+        }
         self.least = i32::MAX;
     }
 }
 
-/// Returns a scale at which a facet holds, unit 2^-10, rounded down; at most [`MOST_Q10`].
-#[inline(never)]
-fn scale_q10(spare: i32, extent: u32, seen: &FramePoints) -> u32 {
-    // 2^21 * 2^10 fits.
-    let spare = spare.clamp(0, 1 << 21).unsigned_abs() << 10;
-    let limit = spare.checked_div(extent).unwrap_or(0);
-    if seen.bend == 0 && seen.rest == 0 {
-        return limit.min(MOST_Q10);
-    }
-    // L E and L^2 R; a scale of at most 64 is reported.
-    let limit = limit.min(1 << 16);
-    let (bend, rest) = (seen.bend.unsigned_abs(), seen.rest.unsigned_abs());
-    let up = |value: u32| (limit.wrapping_mul(value) >> 10).wrapping_add(1);
-    if rest > 0xffff {
-        return 0;
-    }
-    let more = bend.wrapping_add(up(rest));
-    if more > 0xffff {
-        return 0;
-    }
-    spare
-        .checked_div(extent.wrapping_add(up(more)))
-        .unwrap_or(0)
-        .min(limit)
+/// What a frame's facets need at scale 1: extent, bend and rest, units of the extent.
+struct Needs {
+    extent: u32,
+    bend: u32,
+    rest: u32,
 }
+
+impl Needs {
+    /// Returns `A + l (E + l R)`, rounded up, for a scale l of unit 2^-BITS. `None` if `E + l R` exceeds 16 bits.
+    /// The product `l R` must fit in 32 bits.
+    #[inline(always)]
+    fn at<const BITS: u32>(&self, scale: u32) -> Option<u32> {
+        let up = |value: u32| (scale.wrapping_mul(value) >> BITS).wrapping_add(1);
+        let more = self.bend.wrapping_add(up(self.rest));
+        (more <= 0xffff).then(|| self.extent.wrapping_add(up(more)))
+    }
+
+    /// A quick test in 32 bits: up to a scale of 16, with the scale rounded up to 2^-8.
+    #[inline(always)]
+    fn are_surely_met_at(&self, scale_q10: u32, spare_q10: u32) -> bool {
+        let scale_q8 = (scale_q10 >> 2).wrapping_add(1);
+        scale_q8 <= 1 << 12
+            && self.rest >> 18 == 0
+            && self.at::<8>(scale_q8).is_some_and(|needs| {
+                needs >> 20 == 0 && needs.wrapping_mul(scale_q8) <= spare_q10 >> 2
+            })
+    }
+
+    /// Returns the smaller one of a scale and one at which the facets hold, unit 2^-10, rounded down.
+    #[inline(never)]
+    fn lower(&self, scale_q10: u32, spare_q10: u32) -> u32 {
+        let limit = spare_q10.checked_div(self.extent).unwrap_or(0);
+        let limit = limit.min(scale_q10);
+        if self.bend == 0 && self.rest == 0 {
+            return limit;
+        }
+        if self.rest > 0xffff {
+            return 0;
+        }
+        let limit = limit.min(MOST_BENT_Q10);
+        self.at::<10>(limit)
+            .and_then(|needs| spare_q10.checked_div(needs))
+            .unwrap_or(0)
+            .min(limit)
+    }
+}
+
+/// Bends and rests are taken into account up to a scale of 64.
+const MOST_BENT_Q10: u32 = 1 << 16;
 
 #[cfg(test)]
 mod tests;

@@ -5,16 +5,22 @@ use crate::num::BinaryAngle;
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::{Axes, Facet, Table};
+use proptest::prelude::*;
 
-fn seen(bend: i32, rest: i32) -> FramePoints {
-    FramePoints {
+fn scale_after(before: u32, spare: i32, extent: i32, bend: i32, rest: i32) -> u32 {
+    let seen = FramePoints {
         axes: Axes::World,
         x: 0,
         y: 0,
         lever: [0; 2],
         rest,
         bend,
-    }
+    };
+    let mut nearest = Nearest::new();
+    nearest.scale_q10 = before;
+    nearest.facet(spare);
+    nearest.frame(&seen, extent);
+    nearest.scale_q10
 }
 
 #[test]
@@ -48,8 +54,46 @@ fn scales_are_what_is_spared_for_a_facets_needs() {
         ),
         (1 << 19, 1 << 20, 0xffff, 0, 0),
     ] {
-        let found = scale_q10(spare, extent, &seen(bend, rest));
+        let found = scale_after(MOST_Q10, spare, extent, bend, rest);
         assert_eq!(found, scale, "{spare} {extent} {bend} {rest}");
+    }
+}
+
+#[test]
+fn a_scale_between_two_of_the_quick_test_is_rounded_up() {
+    // 1027 / 1024 needs 1003 of 1001.
+    assert_eq!(scale_after(1027, 1001, 1000, 0, 0), 1025);
+    assert_eq!(scale_after(1027, 1010, 1000, 0, 0), 1027);
+}
+
+/// Returns `true` if `l (A + l (E + l R)) <= s`, exactly.
+fn is_met(scale_q10: u32, [spare, extent, bend, rest]: [i32; 4]) -> bool {
+    let [scale, spare, extent, bend, rest] =
+        [scale_q10 as i32, spare, extent, bend, rest].map(i128::from);
+    // All terms in units of 2^-30.
+    scale * ((extent << 20) + scale * ((bend << 10) + scale * rest)) <= spare << 30
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(crate::test_iterations(100_000, 40)))]
+
+    /// Against exact integers: the facet holds at the scale, and the scale is no smaller than a bound with its own limit
+    /// gives, whatever scale was found before.
+    #[test]
+    fn a_scale_is_one_at_which_the_facet_holds(
+        before in prop_oneof![0..=MOST_Q10, 1_000..20_000u32],
+        spare in prop_oneof![0..=1 << 21, 0..100_000i32],
+        extent in prop_oneof![1..1 << 19, 1..30_000i32],
+        bend in prop_oneof![Just(0), 0..1 << 18, 0..3_000i32],
+        rest in prop_oneof![Just(0), 0..1 << 22, 0..3_000i32],
+    ) {
+        let facet = [spare, extent, bend, rest];
+        let found = scale_after(before, spare, extent, bend, rest);
+        prop_assert!(found <= before);
+        prop_assert!(is_met(found, facet), "{found}");
+        let alone = scale_after(MOST_Q10, spare, extent, bend, rest);
+        prop_assert!(is_met(alone, facet), "{alone}");
+        prop_assert!(found >= alone.min(before), "{found} {alone}");
     }
 }
 
@@ -116,7 +160,7 @@ fn the_nearer_end_of_an_arc_counts() {
         nearest.least = 1;
         nearest.piece(&piece, &set, turns);
         assert_eq!(nearest.least, i32::MAX);
-        nearest.scale_q10
+        nearest.arc.lower(nearest.turn.lower(nearest.scale_q10))
     };
     let scale = |from, width, yaw| scale_in_q10(from, width, yaw, true);
     // The reach is 2^22; 2^-10 of it is 2^12, and one more for rounding up.
