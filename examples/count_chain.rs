@@ -15,12 +15,16 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "board/measurement.rs"]
+mod measurement;
+
+#[cfg(target_os = "none")]
 mod firmware {
     use crate::board::counter::{Counter, Failure, goal};
     use crate::board::stack::used_by;
+    use crate::measurement::run;
     use core::hint::black_box;
-    use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use cortex_m_rt::entry;
     use cortex_m_semihosting::hprintln;
     use posegate::chain::{BeliefState, Evaluation, StartAssumption, Step, evaluate};
     use posegate::contain::decide_with_margin;
@@ -183,28 +187,6 @@ mod firmware {
 
     #[entry]
     fn main() -> ! {
-        match measure() {
-            Ok(()) => stop(EXIT_SUCCESS),
-            Err(failure) => {
-                hprintln!("{{\"error\":\"{}\"}}", failure);
-                stop(EXIT_FAILURE)
-            }
-        }
-    }
-
-    fn stop(status: debug::ExitStatus) -> ! {
-        loop {
-            debug::exit(status);
-        }
-    }
-
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-        stop(EXIT_FAILURE)
-    }
-
-    #[exception]
-    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-        stop(EXIT_FAILURE)
+        run(measure)
     }
 }

@@ -16,6 +16,10 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "board/measurement.rs"]
+mod measurement;
+
+#[cfg(target_os = "none")]
 #[path = "faults/schedule.rs"]
 #[allow(dead_code)] // The targets of fault injection use the rest.
 mod schedule;
@@ -24,11 +28,10 @@ mod schedule;
 mod firmware {
     use crate::board::counter::{Counter, Failure, M4F};
     use crate::board::stack::used_by;
+    use crate::measurement::run;
     use crate::schedule::{SCHEDULE, SETTINGS, START_MS, TABLE};
     use core::hint::black_box;
-    use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
-    use cortex_m_semihosting::hprintln;
+    use cortex_m_rt::entry;
     use posegate::contain::{self, Decision, second};
     use posegate::gate::{Gate, Innovation, Monitor, ScrubProgress, Step, self_test};
     use posegate::motion::MotionBounds;
@@ -159,28 +162,6 @@ mod firmware {
 
     #[entry]
     fn main() -> ! {
-        match measure() {
-            Ok(()) => stop(EXIT_SUCCESS),
-            Err(failure) => {
-                hprintln!("{{\"error\":\"{}\"}}", failure);
-                stop(EXIT_FAILURE)
-            }
-        }
-    }
-
-    fn stop(status: debug::ExitStatus) -> ! {
-        loop {
-            debug::exit(status);
-        }
-    }
-
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-        stop(EXIT_FAILURE)
-    }
-
-    #[exception]
-    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-        stop(EXIT_FAILURE)
+        run(measure)
     }
 }

@@ -25,6 +25,10 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
+#[path = "board/measurement.rs"]
+mod measurement;
+
+#[cfg(target_os = "none")]
 #[path = "../crates/posegate-testkit/src/looks.rs"]
 mod looks;
 
@@ -38,12 +42,11 @@ mod firmware {
     use crate::board::stack::used_by;
     use crate::board::worst::{Bounds, Genes, MIDDLE, Search};
     use crate::looks::{self, LOOKS, Looks, added};
+    use crate::measurement::run;
     use crate::naive_grid::BitGrid;
     use core::f64::consts::PI;
     use core::hint::black_box;
-    use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
-    use cortex_m_semihosting::hprintln;
+    use cortex_m_rt::entry;
     use posegate::contain::{self, Cause, Decision, Examination, Margin, second};
     use posegate::pose::Pose;
     use posegate::report::PoseEstimate;
@@ -669,28 +672,6 @@ mod firmware {
 
     #[entry]
     fn main() -> ! {
-        match measure() {
-            Ok(()) => stop(EXIT_SUCCESS),
-            Err(failure) => {
-                hprintln!("{{\"error\":\"{}\"}}", failure);
-                stop(EXIT_FAILURE)
-            }
-        }
-    }
-
-    fn stop(status: debug::ExitStatus) -> ! {
-        loop {
-            debug::exit(status);
-        }
-    }
-
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-        stop(EXIT_FAILURE)
-    }
-
-    #[exception]
-    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-        stop(EXIT_FAILURE)
+        run(measure)
     }
 }
