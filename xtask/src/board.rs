@@ -10,24 +10,49 @@ pub const CORES: [(&str, &str); 2] = [
     ("thumbv6m-none-eabi", "mps2-an385"),
 ];
 
+/// The folder and the level of optimization of a build.
+#[derive(Clone, Copy)]
+pub enum Level {
+    /// 3, in the usual folder.
+    Fast,
+    /// "s", in a separate folder.
+    Small,
+}
+
+impl Level {
+    fn folder(self) -> PathBuf {
+        match self {
+            Self::Fast => target_folder(),
+            Self::Small => target_folder().join("small"),
+        }
+    }
+}
+
+/// Builds firmware examples in one command: the link of a firmware occupies one processor core, and cargo makes several at once.
+pub fn build_all(level: Level, targets: &[&str], examples: &[&str]) -> Result {
+    let mut build = cmd("cargo build -p posegate --profile firmware --features firmware");
+    for target in targets {
+        build = build.args(["--target", target]);
+    }
+    for example in examples {
+        build = build.args(["--example", example]);
+    }
+    if let Level::Small = level {
+        build = build.words("--config profile.firmware.opt-level=\"s\"");
+    }
+    build.arg("--target-dir").arg(level.folder()).run()
+}
+
 /// Builds a firmware example and returns its ELF file.
-pub fn build(target: &str, example: &str) -> Result<PathBuf> {
-    build_into(&target_folder(), "", target, example)
+pub fn build(level: Level, target: &str, example: &str) -> Result<PathBuf> {
+    build_all(level, &[target], &[example])?;
+    Ok(built(level, target, example))
 }
 
-/// As [`build`], for size: at the level "s", in a separate folder.
-pub fn build_small(target: &str, example: &str) -> Result<PathBuf> {
-    let level = "--config profile.firmware.opt-level=\"s\"";
-    build_into(&target_folder().join("small"), level, target, example)
-}
-
-fn build_into(folder: &Path, more: &str, target: &str, example: &str) -> Result<PathBuf> {
-    cmd(&format!("cargo build -p posegate --profile firmware --target {target} --features firmware --example {example}"))
-        .words(more)
-        .arg("--target-dir")
-        .arg(folder)
-        .run()?;
-    Ok(folder.join(target).join("firmware/examples").join(example))
+/// Returns the ELF file of an example that is built.
+pub fn built(level: Level, target: &str, example: &str) -> PathBuf {
+    let folder = level.folder().join(target);
+    folder.join("firmware/examples").join(example)
 }
 
 /// Returns the command that runs a firmware in QEMU, for this many seconds at most.
@@ -38,10 +63,9 @@ pub fn emulate(machine: &str, elf: &Path, seconds: u64) -> Cmd {
     cmd(&line).arg(elf).limit(seconds)
 }
 
-/// Builds an example that counts instructions, runs it so that counts repeat, and prints its lines. Returns `true` if it succeeds.
+/// Runs an example that is built so that its counts repeat, and prints its lines. Returns `true` if it succeeds.
 pub fn count(target: &str, machine: &str, example: &str) -> Result<bool> {
-    let elf = build(target, example)?;
-    let code = emulate(machine, &elf, 600)
+    let code = emulate(machine, &built(Level::Fast, target, example), 600)
         .words("-icount shift=6")
         .print_code()?;
     Ok(code == 0)

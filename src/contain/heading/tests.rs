@@ -1,3 +1,4 @@
+use super::slab::slope;
 use super::*;
 use std::f64::consts::TAU as WHOLE;
 use std::vec::Vec;

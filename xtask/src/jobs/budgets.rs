@@ -1,15 +1,18 @@
 //! `budgets` and `replay_speed`: the figures of the budgets.
 
 use crate::arguments::Arguments;
-use crate::board::{self, CORES};
+use crate::board::{self, CORES, Level};
 use crate::files::{Scratch, release};
 use crate::jobs::docs::release_program;
-use crate::jobs::flash::brief;
+use crate::jobs::flash::smallest_and_largest;
 use crate::jobs::test::accuracy;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd, program_at};
 use std::time::Instant;
+
+/// Firmware examples that count instructions.
+const COUNTS: [&str; 3] = ["count_instructions", "count_gate", "count_tracker"];
 
 /// Prints bytes, seconds, voxels per second, instructions, stack, flash, and the accepted scale over the true one.
 pub fn budgets(_: &Arguments) -> Result {
@@ -27,14 +30,18 @@ pub fn budgets(_: &Arguments) -> Result {
         .arg(folder.join("demo"))
         .run()?;
     report.less_than("demo", begun.elapsed().as_millis(), "ms", 5_000, 20_000);
+    board::build_all(Level::Fast, &CORES.map(|(target, _)| target), &COUNTS)?;
     for (target, machine) in CORES {
-        for example in ["count_instructions", "count_gate", "count_tracker"] {
+        for example in COUNTS {
             report.require(board::count(target, machine, example)?, target);
         }
     }
     // The goals are those of 60 sets a row, which 600 gives.
     let sets = Arguments::new(vec!["600".into()], ".".into(), "accuracy", "[SETS]")?;
-    for (name, ended) in [("flash", brief(&none)), ("accuracy", accuracy(&sets))] {
+    for (name, ended) in [
+        ("flash", smallest_and_largest(&none)),
+        ("accuracy", accuracy(&sets)),
+    ] {
         if let Err(error) = ended {
             report.require(false, format_args!("{name} ({error})"));
         }

@@ -1,7 +1,7 @@
 //! `c`: the C boundary.
 
 use crate::arguments::Arguments;
-use crate::board::{self, CORES};
+use crate::board::{self, CORES, Level};
 use crate::files::{self, Scratch, target_folder};
 use crate::jobs::test::{ran, suite};
 use crate::need::{self, THUMBS};
@@ -69,7 +69,7 @@ pub fn c(_: &Arguments) -> Result {
         with_target_folder(cmd("cmake --build"))
             .arg(&configured)
             .run()?;
-        let rust = emulated(machine, &board::build(target, "vectors")?)?;
+        let rust = emulated(machine, &board::build(Level::Fast, target, "vectors")?)?;
         for (name, built) in [("make", &made), ("cmake", &configured)] {
             for example in ["docking_gate", "controller"] {
                 board::emulate(machine, &built.join(format!("{example}.elf")), 60).run()?;

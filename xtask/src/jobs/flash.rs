@@ -1,7 +1,7 @@
 //! `flash` and `parts`: a gate with all of its parts, and without some.
 
 use crate::arguments::Arguments;
-use crate::board;
+use crate::board::{self, Level};
 use crate::files::{Scratch, target_folder};
 use crate::jobs::test::ran;
 use crate::need;
@@ -39,14 +39,19 @@ const LAYOUT: &str = "SECTIONS {
     /DISCARD/ : { *(.ARM.exidx .ARM.exidx.* .ARM.extab .ARM.extab.* .ARM.attributes .eh_frame .llvmbc .llvmcmd) }
 }
 ";
+const TARGETS: [&str; 3] = [
+    "thumbv7em-none-eabihf",
+    "thumbv6m-none-eabi",
+    "riscv32imc-unknown-none-elf",
+];
 /// A core, a level of optimization, and how many bytes facets alone and all parts may take.
-const CEILINGS: [(&str, &str, u64, u64); 6] = [
-    ("thumbv7em-none-eabihf", "s", 37_000, 73_500),
-    ("thumbv7em-none-eabihf", "3", 54_500, 100_000),
-    ("thumbv6m-none-eabi", "s", 40_000, 79_500),
-    ("thumbv6m-none-eabi", "3", 56_500, 107_500),
-    ("riscv32imc-unknown-none-elf", "s", 48_500, 98_000),
-    ("riscv32imc-unknown-none-elf", "3", 71_500, 138_500),
+const CEILINGS: [(&str, &str, [u64; 2]); 6] = [
+    ("thumbv7em-none-eabihf", "s", [37_000, 73_500]),
+    ("thumbv7em-none-eabihf", "3", [54_500, 100_000]),
+    ("thumbv6m-none-eabi", "s", [40_000, 79_500]),
+    ("thumbv6m-none-eabi", "3", [56_500, 107_500]),
+    ("riscv32imc-unknown-none-elf", "s", [48_500, 98_000]),
+    ("riscv32imc-unknown-none-elf", "3", [71_500, 138_500]),
 ];
 
 /// Builds a gate without some of its parts and checks it against the decisions of one that has all.
@@ -62,69 +67,92 @@ pub fn parts(_: &Arguments) -> Result {
 /// also prints the bytes of code of a decision: on facets, including the reason of a denial, and of the walk of a grid.
 pub fn flash(_: &Arguments) -> Result {
     let mut report = Report::default();
-    of_gates(&mut report, &CEILINGS)?;
+    of_gates(&mut report, &PARTS)?;
     of_decisions(&mut report)?;
     report.finish()
 }
 
-/// Prints what all of [`flash`] prints of a Cortex-M4F.
-pub fn brief(_: &Arguments) -> Result {
+/// Prints what [`flash`] prints without the parts between the smallest and the largest gate.
+pub fn smallest_and_largest(_: &Arguments) -> Result {
     let mut report = Report::default();
-    let [m4f_small, m4f_fast, ..] = CEILINGS;
-    of_gates(&mut report, &[m4f_small, m4f_fast])?;
+    let [smallest, .., largest] = PARTS;
+    of_gates(&mut report, &[smallest, largest])?;
     of_decisions(&mut report)?;
     report.finish()
 }
 
-fn of_gates(report: &mut Report, ceilings: &[(&str, &str, u64, u64)]) -> Result {
+fn of_gates(report: &mut Report, parts: &[(&str, &str)]) -> Result {
+    need::targets(&TARGETS)?;
     let folder = Scratch::new()?;
     let image = folder.join("gate.bin");
     let layout = folder.join("layout.ld");
     std::fs::write(&layout, LAYOUT)?;
-    for &(target, level, alone, all) in ceilings {
-        need::targets(&[target])?;
-        // One core shows what each part takes; for the others the smallest and the largest gate are enough.
-        let shows_each = target.starts_with("thumbv7em") && level == "s";
-        for (name, features) in PARTS {
-            let is_end = features.is_empty() || features == ALL_PARTS;
-            if !is_end && !shows_each {
-                continue;
-            }
-            let archive = archive(target, level, features)?;
-            let bytes = linked(&archive, &GATE, &layout, &image)?;
-            let name = format!("flash of a gate in C, {name}, {target}, opt-level {level}");
-            match features {
-                "" => report.at_most(&name, bytes, "B", alone),
-                ALL_PARTS => report.at_most(&name, bytes, "B", all),
-                _ => report.note(&name, bytes, "B"),
-            }
-            if features.is_empty() {
-                let functions: Vec<&str> = GATE.into_iter().chain(TRACKER).collect();
-                let more = linked(&archive, &functions, &layout, &image)? - bytes;
-                report.note(&format!("{name}: its tracker"), more, "B");
+    for level in ["s", "3"] {
+        for &(name, features) in parts {
+            // One core shows what each part takes; for the others the smallest and the largest gate are enough.
+            let targets = match (features, level) {
+                ("" | ALL_PARTS, _) => &TARGETS[..],
+                (_, "s") => &TARGETS[..1],
+                _ => continue,
+            };
+            build_archives(targets, level, features)?;
+            for target in targets {
+                let archive = archive(target);
+                let bytes = linked(&archive, &GATE, &layout, &image)?;
+                let name = format!("flash of a gate in C, {name}, {target}, opt-level {level}");
+                match (features, ceilings(target, level)) {
+                    ("", [alone, _]) => report.at_most(&name, bytes, "B", alone),
+                    (ALL_PARTS, [_, all]) => report.at_most(&name, bytes, "B", all),
+                    _ => report.note(&name, bytes, "B"),
+                }
+                if features.is_empty() {
+                    let functions: Vec<&str> = GATE.into_iter().chain(TRACKER).collect();
+                    let more = linked(&archive, &functions, &layout, &image)? - bytes;
+                    report.note(&format!("{name}: its tracker"), more, "B");
+                }
             }
         }
     }
     Ok(())
 }
 
-/// Builds the archive with some parts and returns its path.
-fn archive(target: &str, level: &str, features: &str) -> Result<PathBuf> {
-    // Other jobs use the archive with all parts at level 3, and must not find another one in its place.
-    let folder = target_folder().join("flash");
+/// Returns how many bytes facets alone and all parts may take.
+fn ceilings(target: &str, level: &str) -> [u64; 2] {
+    CEILINGS
+        .into_iter()
+        .find(|(core, built, _)| (*core, *built) == (target, level))
+        .map_or([0, 0], |(_, _, most)| most)
+}
+
+/// Other jobs use the archive with all parts at level 3, and must not find another one in its place.
+fn archive_folder() -> PathBuf {
+    target_folder().join("flash")
+}
+
+/// Builds the archives with some parts in one command, so that all processor cores work.
+fn build_archives(targets: &[&str], level: &str, features: &str) -> Result {
     let level = match level {
         "3" => "3".to_owned(),
         named => format!("\"{named}\""),
     };
-    cmd("cargo build -p posegate-c --profile firmware --no-default-features --target")
-        .arg(target)
+    let mut build = cmd("cargo build -p posegate-c --profile firmware --no-default-features");
+    for target in targets {
+        build = build.args(["--target", target]);
+    }
+    build
         .arg("--target-dir")
-        .arg(&folder)
+        .arg(archive_folder())
         .arg(format!("--features={features}"))
         .arg("--config")
         .arg(format!("profile.firmware.opt-level={level}"))
-        .run()?;
-    Ok(folder.join(target).join("firmware/libposegate_c.a"))
+        .run()
+}
+
+/// Returns the archive that was built last.
+fn archive(target: &str) -> PathBuf {
+    archive_folder()
+        .join(target)
+        .join("firmware/libposegate_c.a")
 }
 
 /// Returns the bytes of code, constants and initial values of a program that contains these functions and what they call.
@@ -154,7 +182,7 @@ fn linked(archive: &Path, functions: &[&str], layout: &Path, image: &Path) -> Re
 
 fn of_decisions(report: &mut Report) -> Result {
     need::command("arm-none-eabi-nm", "binutils-arm-none-eabi")?;
-    let elf = board::build("thumbv7em-none-eabihf", "flash")?;
+    let elf = board::build(Level::Fast, "thumbv7em-none-eabihf", "flash")?;
     let symbols = cmd("arm-none-eabi-nm -C -S").arg(elf).read()?;
     let (facets, grid) = sizes(&symbols);
     report.at_most("m4f flash of the decision on facets", facets, "B", 4_000);

@@ -1,7 +1,7 @@
 //! `planning`, `cover` and `scale`: plans, choices of tags, and large sites.
 
 use crate::arguments::Arguments;
-use crate::board::{self, CORES};
+use crate::board::{self, CORES, Level};
 use crate::files::release;
 use crate::jobs::test::ran;
 use crate::need::{self, THUMBS};
@@ -20,6 +20,11 @@ pub fn planning(given: &Arguments) -> Result {
         .print_code()?;
     report.require(host == 0, "host");
     ran(cmd("cargo test -p posegate-host --test contingent_plan"), 1)?;
+    board::build_all(
+        Level::Fast,
+        &CORES.map(|(target, _)| target),
+        &["count_chain"],
+    )?;
     for (target, machine) in CORES {
         report.require(board::count(target, machine, "count_chain")?, target);
     }

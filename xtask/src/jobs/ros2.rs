@@ -2,7 +2,7 @@
 //! `integrations/behaviortree` with BehaviorTree.CPP.
 
 use crate::arguments::Arguments;
-use crate::board;
+use crate::board::{self, Level};
 use crate::files::{self, Scratch, target_folder};
 use crate::jobs::docs::release_program;
 use crate::need;
@@ -83,7 +83,7 @@ pub fn ros2(given: &Arguments) -> Result {
     live(&jazzy, "cyclone").json()?;
     live(&jazzy, "detections").json()?;
     say("a controller on a serial line");
-    let firmware = board::build(CORE, "interrupt_gate")?;
+    let firmware = board::build(Level::Fast, CORE, "interrupt_gate")?;
     live(&jazzy, "serial")
         .arg(firmware)
         .arg(runs.to_string())

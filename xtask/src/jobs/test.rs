@@ -12,11 +12,34 @@ pub fn suite(arguments: &str) -> Cmd {
     cmd("cargo test --workspace --exclude posegate-peers").words(arguments)
 }
 
+/// Firmware that tests of the fast suite run in the emulator.
+const FIRMWARE: [&str; 6] = [
+    "contingent_plan",
+    "docking_gate",
+    "estimate_bench",
+    "fault_target",
+    "fault_target_unprotected",
+    "interrupt_gate",
+];
+
 /// Runs the fast suite. (Examples are built by clippy, and run by the jobs that need them.)
 pub fn test(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
+    build_firmware()?;
     suite("--lib --bins --tests").run()
+}
+
+/// Builds the firmware of the tests at once, where they look for it (`posegate_testkit::firmware`). Each test would build its own
+/// otherwise, on one processor core.
+fn build_firmware() -> Result {
+    let mut build = cmd(
+        "cargo build --locked -p posegate --profile firmware --target thumbv7em-none-eabihf --features firmware",
+    );
+    for example in FIRMWARE {
+        build = build.args(["--example", example]);
+    }
+    build.words("--target-dir target/firmware").run()
 }
 
 /// Runs the tests that are not in the fast suite: the core's tests without the feature `std`, and the examples in the API documents.

@@ -2,7 +2,7 @@
 //! them run also at the level "s".
 
 use crate::arguments::Arguments;
-use crate::board;
+use crate::board::{self, Level};
 use crate::need;
 use crate::shell::{Result, cmd};
 use serde_json::Value;
@@ -15,17 +15,18 @@ const CORES: [(&str, &str, &str); 5] = [
     ("thumbv7em-none-eabihf", "mps2-an500", "Cortex-M7"),
     ("thumbv8m.main-none-eabihf", "mps2-an505", "Cortex-M33"),
 ];
+const TARGETS: [&str; 4] = [
+    "thumbv6m-none-eabi",
+    "thumbv7m-none-eabi",
+    "thumbv7em-none-eabihf",
+    "thumbv8m.main-none-eabihf",
+];
 /// Least number of decisions in the file.
 const LEAST: u64 = 10_000;
 
 /// Prints a JSON line for each core. Fails unless each line counts every decision.
 pub fn vectors(_: &Arguments) -> Result {
-    need::targets(&[
-        "thumbv6m-none-eabi",
-        "thumbv7m-none-eabi",
-        "thumbv7em-none-eabihf",
-        "thumbv8m.main-none-eabihf",
-    ])?;
+    need::targets(&TARGETS)?;
     need::qemu()?;
     let mut failed = Vec::new();
     let tuple = cmd("rustc --print host-tuple").read()?;
@@ -43,8 +44,9 @@ pub fn vectors(_: &Arguments) -> Result {
     if outcome.code != 0 || count < LEAST || line != right(&host, count) {
         failed.push(host);
     }
+    board::build_all(Level::Fast, &TARGETS, &["vectors"])?;
     for (target, machine, core) in CORES {
-        let elf = board::build(target, "vectors")?;
+        let elf = board::built(Level::Fast, target, "vectors");
         let outcome = board::emulate(machine, &elf, 60).outcome()?;
         let line = outcome.text.trim_end();
         println!("{line}");
@@ -53,8 +55,11 @@ pub fn vectors(_: &Arguments) -> Result {
         }
     }
     // Code for size shares functions that level 3 copies.
-    for (target, machine, core) in [CORES[0], CORES[2]] {
-        let elf = board::build_small(target, "vectors")?;
+    let for_size = [CORES[0], CORES[2]];
+    let targets = for_size.map(|(target, ..)| target);
+    board::build_all(Level::Small, &targets, &["vectors"])?;
+    for (target, machine, core) in for_size {
+        let elf = board::built(Level::Small, target, "vectors");
         let outcome = board::emulate(machine, &elf, 60).outcome()?;
         let line = outcome.text.trim_end();
         println!("{}", line.replace(core, &format!("{core}, at the level s")));
