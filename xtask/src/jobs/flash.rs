@@ -64,7 +64,7 @@ pub fn parts(_: &Arguments) -> Result {
 }
 
 /// Prints the bytes of flash of a complete gate in C, without its table, by part, core and level of optimization. On a Cortex-M4F
-/// also prints the bytes of code of a decision: on facets, including the reason of a denial, and of the walk of a grid.
+/// also prints the bytes of code of the parts of a decision.
 pub fn flash(_: &Arguments) -> Result {
     let mut report = Report::default();
     of_gates(&mut report, &PARTS)?;
@@ -180,51 +180,62 @@ fn linked(archive: &Path, functions: &[&str], layout: &Path, image: &Path) -> Re
         .len())
 }
 
+/// Parts of a decision, and the functions and modules of `posegate::contain` that are in each.
+const DECISION: [(&str, &[&str]); 4] = [
+    ("the decision on facets", &["facets", "decide"]),
+    ("facets, heading by heading", &["heading"]),
+    ("several pieces together", &["union"]),
+    (
+        "the walk of a grid",
+        &["grid", "section", "decide_on_cells"],
+    ),
+];
+
 fn of_decisions(report: &mut Report) -> Result {
     need::command("arm-none-eabi-nm", "binutils-arm-none-eabi")?;
     let elf = board::build(Level::Fast, "thumbv7em-none-eabihf", "flash")?;
     let symbols = cmd("arm-none-eabi-nm -C -S").arg(elf).read()?;
-    let (facets, grid) = sizes(&symbols);
-    report.at_most("m4f flash of the decision on facets", facets, "B", 4_000);
-    report.note("m4f flash of the walk of a grid", grid, "B");
-    report.require(facets > 1_000, "no symbols of the decision were found");
+    for (name, modules) in DECISION {
+        let bytes = size(&symbols, modules);
+        report.require(bytes > 1_000, format_args!("no symbols of {name}"));
+        let line = format!("m4f flash of {name}");
+        if modules.contains(&"facets") {
+            report.at_most(&line, bytes, "B", 4_000);
+        } else {
+            report.note(&line, bytes, "B");
+        }
+    }
     Ok(())
 }
 
-/// Returns the bytes of functions that decide on facets, and of the others of containment.
-fn sizes(symbols: &str) -> (u64, u64) {
-    let (mut facets, mut grid) = (0, 0);
-    for line in symbols.lines() {
-        // Address, size, kind, and a name that may contain spaces.
-        let mut words = line.splitn(4, ' ');
-        let (Some(_), Some(size), Some("t" | "T"), Some(name)) =
-            (words.next(), words.next(), words.next(), words.next())
-        else {
-            continue;
-        };
-        let Ok(size) = u64::from_str_radix(size, 16) else {
-            continue;
-        };
-        if name.starts_with("posegate::contain::facets::")
-            || name.starts_with("posegate::contain::decide")
-        {
-            facets += size;
-        } else if name.contains("posegate::contain::") {
-            grid += size;
-        }
-    }
-    (facets, grid)
+/// Returns the bytes of code of functions and modules of `posegate::contain`.
+fn size(symbols: &str, modules: &[&str]) -> u64 {
+    symbols
+        .lines()
+        .filter_map(|line| {
+            // Address, size, kind, and a name that may contain spaces.
+            let mut words = line.splitn(4, ' ');
+            let (_, size, kind) = (words.next()?, words.next()?, words.next()?);
+            let (_, path) = words.next()?.split_once("posegate::contain::")?;
+            let module = path
+                .split(|c: char| !c.is_alphanumeric() && c != '_')
+                .next()?;
+            let counts = ["t", "T"].contains(&kind) && modules.contains(&module);
+            counts.then(|| u64::from_str_radix(size, 16).ok())?
+        })
+        .sum()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::sizes;
+    use super::{DECISION, size};
 
     #[test]
     fn sizes_are_summed_by_the_names_of_functions() {
         let symbols = "00000400 00000010 T posegate::contain::decide\n00000410 00000020 t posegate::contain::facets::a<b, c>\n\
-                       00000430 00000008 t <posegate::contain::grid::Walk as Iterator>::next\n20000000 00000100 B posegate::contain::X\n\
-                       00000000 a posegate::contain::y\n";
-        assert_eq!(sizes(symbols), (0x30, 8));
+                       00000430 00000008 t <posegate::contain::grid::Walk as Iterator>::next\n20000000 00000100 B posegate::contain::grid\n\
+                       00000440 00000004 t posegate::contain::decide_on_cells\n00000000 a posegate::contain::y\n";
+        let sizes = DECISION.map(|(_, modules)| size(symbols, modules));
+        assert_eq!(sizes, [0x30, 0, 0, 12]);
     }
 }
