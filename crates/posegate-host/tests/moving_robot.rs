@@ -14,6 +14,7 @@ use posegate::table::Table;
 use posegate_testkit::counts::{first_seed, is_deep};
 use posegate_testkit::hall::{self, Believed};
 use posegate_testkit::oracle::Rng;
+use rayon::prelude::*;
 
 /// A source, a controller, and a robot.
 #[derive(Clone, Copy, Debug)]
@@ -60,11 +61,27 @@ impl Drive {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Found {
     openings: u64,
     moments: u64,
     outside: u64,
+}
+
+impl Found {
+    const NONE: Self = Self {
+        openings: 0,
+        moments: 0,
+        outside: 0,
+    };
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            openings: self.openings + other.openings,
+            moments: self.moments + other.moments,
+            outside: self.outside + other.outside,
+        }
+    }
 }
 
 /// Drives with a gate whose motion bounds are `stated(drive)`.
@@ -156,13 +173,22 @@ fn drive(rng: &mut Rng, bytes: &[u8], stated: impl Fn(&Drive) -> MotionBounds, f
     }
 }
 
-fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> MotionBounds) -> Found {
+/// Streams of random drives, which run in parallel.
+const STREAMS: u64 = 16;
+
+fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> MotionBounds + Sync) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
-    let mut rng = Rng::new(seed);
-    let mut found = Found::default();
-    while found.openings < openings {
-        drive(&mut rng, &bytes, &stated, &mut found);
-    }
+    let found = (0..STREAMS)
+        .into_par_iter()
+        .map(|stream| {
+            let mut rng = Rng::new(seed.wrapping_add(stream << 40));
+            let mut found = Found::NONE;
+            while found.openings < openings.div_ceil(STREAMS) {
+                drive(&mut rng, &bytes, &stated, &mut found);
+            }
+            found
+        })
+        .reduce(|| Found::NONE, Found::plus);
     println!("{found:?}");
     found
 }

@@ -18,6 +18,7 @@ use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_testkit::counts::{first_seed, is_deep};
 use posegate_testkit::hall::{self, Believed, CORNERS, TO_WALL_M, WALLS};
 use posegate_testkit::oracle::Rng;
+use rayon::prelude::*;
 
 /// The largest axes of a fix's ellipsoid, metres and radians.
 const SIZES: [f64; 2] = [0.05, 0.1];
@@ -284,7 +285,7 @@ fn moved([x, y, yaw]: [f64; 3], [ahead, left, turn]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Found {
     openings: u64,
     moments: u64,
@@ -294,6 +295,30 @@ struct Found {
     /// Moments with less than a centimetre of slack, and the least slack, micrometres.
     near: u64,
     least_um: i64,
+}
+
+impl Found {
+    const NONE: Self = Self {
+        openings: 0,
+        moments: 0,
+        outside: 0,
+        late: 0,
+        early: 0,
+        near: 0,
+        least_um: i64::MAX,
+    };
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            openings: self.openings + other.openings,
+            moments: self.moments + other.moments,
+            outside: self.outside + other.outside,
+            late: self.late + other.late,
+            early: self.early + other.early,
+            near: self.near + other.near,
+            least_um: self.least_um.min(other.least_um),
+        }
+    }
 }
 
 /// Drives with a tracker whose odometry errors are `stated(drive)`.
@@ -470,16 +495,22 @@ fn drive(
     }
 }
 
-fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> OdometryErrors) -> Found {
+/// Streams of random drives, which run in parallel.
+const STREAMS: u64 = 16;
+
+fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> OdometryErrors + Sync) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
-    let mut rng = Rng::new(seed);
-    let mut found = Found {
-        least_um: i64::MAX,
-        ..Found::default()
-    };
-    while found.openings < openings {
-        drive(&mut rng, &bytes, &stated, &mut found);
-    }
+    let found = (0..STREAMS)
+        .into_par_iter()
+        .map(|stream| {
+            let mut rng = Rng::new(seed.wrapping_add(stream << 40));
+            let mut found = Found::NONE;
+            while found.openings < openings.div_ceil(STREAMS) {
+                drive(&mut rng, &bytes, &stated, &mut found);
+            }
+            found
+        })
+        .reduce(|| Found::NONE, Found::plus);
     println!("{found:?}");
     found
 }
