@@ -7,6 +7,8 @@
 
 mod input;
 
+mod sheet;
+
 pub mod printable;
 
 pub mod excerpt;

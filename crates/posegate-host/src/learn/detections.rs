@@ -3,8 +3,8 @@
 use super::LearnError;
 use super::draw::{Digesting, Kept};
 use super::runs::Runs;
-use super::sheet::{Column, Line, Sheet};
 use crate::input::Limit;
+use crate::sheet::{Column, Line, Sheet, SheetError, each};
 use std::io::Read;
 
 const NEEDED: [&str; 6] = [
@@ -80,22 +80,14 @@ impl Detections {
     fn drawn(reader: impl Read, file: &str, most: usize, seed: u64) -> Result<Self, LearnError> {
         let mut digest = Digesting::new(reader);
         let mut sheet = Sheet::new(&mut digest, file)?;
-        let mut columns = Vec::new();
-        for name in NEEDED {
-            columns.push(sheet.needed(name, &NEEDED)?);
-        }
-        let second = match [sheet.optional(SECOND[0])?, sheet.optional(SECOND[1])?] {
+        let [d, phi, psi, detected, first @ ..] = each(NEEDED, |name| sheet.needed(name, &NEEDED))?;
+        let second = match each(SECOND, |name| sheet.optional(name))? {
             [Some(translation), Some(yaw)] => Some([translation, yaw]),
             [None, None] => None,
             [first, _] => {
                 // The other column is missing.
                 let missing = SECOND[usize::from(first.is_some())];
-                return Err(sheet.needed(missing, &SECOND).map_or_else(
-                    |error| error,
-                    |_| LearnError::Empty {
-                        file: file.to_owned(),
-                    },
-                ));
+                return Err(sheet.missing(missing, &SECOND).into());
             }
         };
         let run = sheet.optional("run")?;
@@ -105,23 +97,24 @@ impl Detections {
         let mut kept = Kept::new(if dependent { usize::MAX } else { most }, seed);
         while let Some(line) = sheet.line()? {
             if dependent && most != usize::MAX && line.byte() > Limit::FILE.bytes {
-                return Err(line.wrong_row(format!(
+                let what = format!(
                     "more than {} MiB of rows with a `run` or a `t_s`; give fewer runs",
                     Limit::FILE.bytes >> 20
-                )));
+                );
+                return Err(line.wrong_row(what).into());
             }
-            let at = place(&line, &columns)?;
+            let at = place(&line, [d, phi, psi])?;
             if let Some(run) = run {
-                names.push(line.name(run, "the name of a drive, a video or an approach")?);
+                let name = line.name(run, "the name of a drive, a video or an approach")?;
+                names.push(name.to_owned());
             }
             if let Some(time) = time {
                 times.push(line.number(time, |_| true, "a time in seconds")?);
             }
-            let errors = if line.flag(columns[3])? {
-                let first = errors(&line, [columns[4], columns[5]])?;
-                let one =
-                    |[a, b]: [Column; 2]| line.empty(a, "").is_ok() && line.empty(b, "").is_ok();
-                match second.filter(|columns| !one(*columns)) {
+            let errors = if line.flag(detected)? {
+                let first = errors(&line, first)?;
+                let is_given = |column: &Column| !line.text(*column).is_empty();
+                match second.filter(|columns| columns.iter().any(is_given)) {
                     Some(columns) => {
                         let second = errors(&line, columns)?;
                         Some(if second[1] < first[1] { second } else { first })
@@ -129,7 +122,7 @@ impl Detections {
                     None => Some(first),
                 }
             } else {
-                for column in columns[4..].iter().chain(second.iter().flatten()) {
+                for column in first.iter().chain(second.iter().flatten()) {
                     line.empty(*column, "the row's `detected` is 0")?;
                 }
                 None
@@ -159,7 +152,7 @@ impl Detections {
 }
 
 /// Returns the magnitudes of a pose's errors, metres and radians.
-fn errors(line: &Line<'_>, [translation, yaw]: [Column; 2]) -> Result<[f64; 2], LearnError> {
+fn errors(line: &Line<'_>, [translation, yaw]: [Column; 2]) -> Result<[f64; 2], SheetError> {
     let translation = line.number(
         translation,
         |error| error >= 0.0,
@@ -179,23 +172,20 @@ fn errors(line: &Line<'_>, [translation, yaw]: [Column; 2]) -> Result<[f64; 2], 
 /// A missing column; the first invalid field, with its line and column.
 pub fn places(bytes: &[u8], file: &str) -> Result<Vec<[f64; 3]>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
-    let mut columns = Vec::new();
-    for name in PLACE {
-        columns.push(sheet.needed(name, &PLACE)?);
-    }
+    let columns = each(PLACE, |name| sheet.needed(name, &PLACE))?;
     let mut rows = Vec::new();
     while let Some(line) = sheet.line()? {
-        rows.push(place(&line, &columns)?);
+        rows.push(place(&line, columns)?);
     }
     Ok(rows)
 }
 
-fn place(line: &Line<'_>, columns: &[Column]) -> Result<[f64; 3], LearnError> {
+fn place(line: &Line<'_>, [d, phi, psi]: [Column; 3]) -> Result<[f64; 3], SheetError> {
     let angle = |angle: f64| (0.0..=180.0).contains(&angle);
     Ok([
-        line.number(columns[0], |d| d > 0.0, "a distance in metres, above 0")?,
-        line.number(columns[1], angle, "an angle in degrees, 0 to 180")?,
-        line.number(columns[2], angle, "an angle in degrees, 0 to 180")?,
+        line.number(d, |d| d > 0.0, "a distance in metres, above 0")?,
+        line.number(phi, angle, "an angle in degrees, 0 to 180")?,
+        line.number(psi, angle, "an angle in degrees, 0 to 180")?,
     ])
 }
 

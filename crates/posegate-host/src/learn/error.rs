@@ -1,5 +1,7 @@
 //! Errors of learning and of models.
 
+use crate::sheet::SheetError;
+
 /// The reason why learning failed or a model cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -101,4 +103,15 @@ pub enum LearnError {
     /// A model that could not be written.
     #[error("the model cannot be written: {0}")]
     Unwritten(String),
+}
+
+impl From<SheetError> for LearnError {
+    fn from(error: SheetError) -> Self {
+        Self::Place {
+            file: error.file,
+            line: error.line,
+            column: error.column.unwrap_or(1),
+            what: error.fault.to_string(),
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Estimates with true poses: their errors relative to their own covariance.
 
 use super::LearnError;
-use super::sheet::{Column, Line, Sheet};
+use crate::sheet::{Column, Line, Sheet, SheetError, each};
 use nalgebra::{Matrix3, Vector3};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -69,18 +69,16 @@ impl ScoredEstimates {
     pub fn read(bytes: &[u8], file: &str, condition: Option<&str>) -> Result<Self, LearnError> {
         let mut sheet = Sheet::new(bytes, file)?;
         let all: Vec<&str> = POSES.iter().chain(&COVARIANCE).copied().collect();
-        let mut poses = Vec::new();
-        for name in POSES {
-            poses.push(sheet.needed(name, &all)?);
-        }
-        let covariance = covariance_columns(&sheet, &all)?;
+        let needed = |name| sheet.needed(name, &all);
+        let (poses, covariance) = (each(POSES, needed)?, each(COVARIANCE, needed)?);
+        let since = |name: &&String| name.starts_with("since_") && name.ends_with("_s");
         let condition = condition
             .map(ToOwned::to_owned)
-            .or_else(|| sheet.first(|name| name.starts_with("since_") && name.ends_with("_s")))
+            .or_else(|| sheet.names().iter().find(since).cloned())
             .unwrap_or_else(|| LOG_DET.to_owned());
-        let place = condition_place(&sheet, &condition, file)?;
+        let place = condition_place(&sheet, &condition)?;
         let time = sheet.optional("t_s")?;
-        let [robot, source, run] = ["robot", "source", "run"].map(|name| sheet.place(name));
+        let [robot, source, run] = ["robot", "source", "run"].map(|name| sheet.first(name));
         let (grouping, grouped_by) = match (robot, run) {
             (Some(robot), _) => (Some(robot), "robot"),
             (None, run) => (run, "run"),
@@ -97,17 +95,15 @@ impl ScoredEstimates {
         let mut scored: Vec<([String; 3], f64, Scored)> = Vec::new();
         let mut groups: BTreeMap<String, u32> = BTreeMap::new();
         while let Some(line) = sheet.line()? {
-            let mut at = [0.0; 6];
-            for (value, column) in at.iter_mut().zip(&poses) {
-                *value = line.number(*column, |_| true, "a number in metres or radians")?;
-            }
-            let matrix = covariance_of(&line, &covariance)?;
-            let condition = condition_of(&line, place, &found.condition, &matrix)?;
+            let what = "a number in metres or radians";
+            let at = each(poses, |column| line.number(column, |_| true, what))?;
+            let matrix = covariance_of(&line, covariance)?;
+            let condition = condition_of(&line, place, &matrix)?;
             let now = match time {
                 Some(column) => line.number(column, |_| true, "a time in seconds")?,
                 None => 0.0,
             };
-            let text = |place: Option<usize>| place.map_or_else(String::new, |at| line.text(at));
+            let text = |place: Option<Column>| place.map_or("", |at| line.text(at)).to_owned();
             let who = [robot, source, run].map(text);
             let [x, y, yaw, true_x, true_y, true_yaw] = at;
             let e = Vector3::new(x - true_x, y - true_y, wrapped(yaw - true_yaw));
@@ -167,13 +163,13 @@ pub fn conditions(
     condition: &str,
 ) -> Result<Vec<Option<f64>>, LearnError> {
     let mut sheet = Sheet::new(bytes, file)?;
-    let covariance = covariance_columns(&sheet, &COVARIANCE)?;
-    let place = condition_place(&sheet, condition, file).ok();
+    let covariance = each(COVARIANCE, |name| sheet.needed(name, &COVARIANCE))?;
+    let place = condition_place(&sheet, condition).ok();
     let mut rows = Vec::new();
     while let Some(line) = sheet.line()? {
-        let matrix = covariance_of(&line, &covariance)?;
+        let matrix = covariance_of(&line, covariance)?;
         let value = match place {
-            Some(place) => Some(condition_of(&line, place, condition, &matrix)?),
+            Some(place) => Some(condition_of(&line, place, &matrix)?),
             None => None,
         };
         let possible = matrix.cholesky().is_some();
@@ -182,51 +178,28 @@ pub fn conditions(
     Ok(rows)
 }
 
-fn covariance_columns(sheet: &Sheet<'_, &[u8]>, all: &[&str]) -> Result<[Column; 6], LearnError> {
-    let mut columns = [sheet.needed(COVARIANCE[0], all)?; 6];
-    for (column, name) in columns.iter_mut().zip(COVARIANCE) {
-        *column = sheet.needed(name, all)?;
-    }
-    Ok(columns)
-}
-
-/// Returns the index of the condition's column; `None` for the covariance's size.
-fn condition_place(
-    sheet: &Sheet<'_, &[u8]>,
-    condition: &str,
-    file: &str,
-) -> Result<Option<usize>, LearnError> {
+/// Returns the condition's column; `None` for the covariance's size.
+fn condition_place(sheet: &Sheet<&[u8]>, condition: &str) -> Result<Option<Column>, SheetError> {
     if condition == LOG_DET {
         return Ok(None);
     }
-    match sheet.place(condition) {
-        Some(place) => Ok(Some(place)),
-        None => Err(LearnError::Place {
-            file: file.to_owned(),
-            line: 1,
-            column: 1,
-            what: format!("there is no column `{condition}`"),
-        }),
-    }
+    let missing = || sheet.missing(condition, &[condition]);
+    sheet.first(condition).map(Some).ok_or_else(missing)
 }
 
-fn covariance_of(line: &Line<'_>, columns: &[Column; 6]) -> Result<Matrix3<f64>, LearnError> {
-    let mut terms = [0.0; 6];
-    for (term, column) in terms.iter_mut().zip(columns) {
-        *term = line.number(*column, |_| true, "a number")?;
-    }
-    let [xx, xy, xt, yy, yt, tt] = terms;
+fn covariance_of(line: &Line<'_>, columns: [Column; 6]) -> Result<Matrix3<f64>, SheetError> {
+    let [xx, xy, xt, yy, yt, tt] =
+        each(columns, |column| line.number(column, |_| true, "a number"))?;
     Ok(Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt))
 }
 
 fn condition_of(
     line: &Line<'_>,
-    place: Option<usize>,
-    name: &str,
+    place: Option<Column>,
     covariance: &Matrix3<f64>,
-) -> Result<f64, LearnError> {
+) -> Result<f64, SheetError> {
     match place {
-        Some(index) => line.number_at(index, name, |_| true, "a number"),
+        Some(column) => line.number(column, |_| true, "a number"),
         None => Ok(libm::log(covariance.determinant())),
     }
 }

@@ -44,7 +44,6 @@ mod random;
 mod runs;
 mod sample;
 mod sequence;
-mod sheet;
 mod smooth;
 mod split;
 mod student;

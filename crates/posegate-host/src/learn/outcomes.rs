@@ -2,7 +2,7 @@
 
 use super::LearnError;
 use super::sequence::confidence_sequence;
-use super::sheet::Sheet;
+use crate::sheet::Sheet;
 
 /// Reads a fleet's outcomes: `success`, 0 or 1, in the order of `t_s` if that column exists.
 ///

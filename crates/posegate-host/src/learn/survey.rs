@@ -2,7 +2,7 @@
 
 use super::LearnError;
 use super::fisher::fisher_quantile;
-use super::sheet::Sheet;
+use crate::sheet::{Sheet, each};
 use nalgebra::{Cholesky, Const, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -80,36 +80,29 @@ pub struct OffsetReport {
 pub fn looks(bytes: &[u8], file: &str, site: &SurveyedSite) -> Result<Vec<Look>, LearnError> {
     const ALL: [&str; 6] = ["run", "dock", "tag", "x_m", "y_m", "yaw_rad"];
     let mut sheet = Sheet::new(bytes, file)?;
-    let [run, dock, tag] = [ALL[0], ALL[1], ALL[2]].map(|name| sheet.needed(name, &ALL));
-    let (run, dock, tag) = (run?, dock?, tag?);
-    let [x, y, yaw] = [ALL[3], ALL[4], ALL[5]].map(|name| sheet.needed(name, &ALL));
-    let pose = [x?, y?, yaw?];
+    let [run, dock, tag, pose @ ..] = each(ALL, |name| sheet.needed(name, &ALL))?;
     let mut rows = Vec::new();
     while let Some(line) = sheet.line()? {
         let known = |column, names: &mut dyn Iterator<Item = &String>, what: &str| {
             let name = line.name(column, what)?;
             let mut others = Vec::new();
             for known in names {
-                if *known == name {
-                    return Ok(name);
+                if known == name {
+                    return Ok(name.to_owned());
                 }
                 others.push(known.as_str());
             }
             let has = others.join(", ");
-            Err(line.wrong_at(
-                column,
-                format!("`{name}` is not a {what} of the site; it has: {has}"),
-            ))
+            let what = format!("`{name}` is not a {what} of the site; it has: {has}");
+            Err(line.wrong_at(column, what))
         };
-        let mut numbers = [0.0; 3];
-        for (number, column) in numbers.iter_mut().zip(pose) {
-            *number = line.number(column, |_| true, "a number in metres or radians")?;
-        }
+        let what = "a number in metres or radians";
+        let pose = each(pose, |column| line.number(column, |_| true, what))?;
         rows.push(Look {
-            run: line.name(run, "the name of the docking")?,
+            run: line.name(run, "the name of the docking")?.to_owned(),
             dock: known(dock, &mut site.docks.keys(), "work task")?,
             tag: known(tag, &mut site.tags.keys(), "tag")?,
-            pose: numbers,
+            pose,
         });
     }
     if rows.is_empty() {

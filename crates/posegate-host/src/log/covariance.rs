@@ -1,6 +1,8 @@
 //! A covariance as CSV: three rows of three numbers without a header.
 
 use super::LogError;
+use super::estimates::ANY_NUMBER;
+use crate::sheet::{SheetError, SheetFault, settings};
 use std::io::Read;
 
 /// Reads the covariance of (x, y, yaw), m and rad, by rows; `file` names it in errors. Lines that begin with `#`
@@ -14,23 +16,17 @@ pub fn covariance(input: impl Read, file: &str) -> Result<[[f64; 3]; 3], LogErro
         ["cov_yx", "cov_yy", "cov_yyaw"],
         ["cov_yawx", "cov_yawy", "cov_yawyaw"],
     ];
-    let mut reader = csv::ReaderBuilder::new()
+    let mut reader = settings()
         .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .quoting(false)
         .comment(Some(b'#'))
         .from_reader(input);
     let mut rows = [[0.0; 3]; 3];
     let mut count = 0;
     let mut last = 0;
     for record in reader.records() {
-        let record = record.map_err(|source| LogError::Csv {
-            file: file.into(),
-            source,
-        })?;
+        let record = record.map_err(|fault| SheetError::unreadable(file, last.max(1), fault))?;
         let line = record.position().map_or(0, csv::Position::line);
-        if record.iter().all(str::is_empty) {
+        if record.iter().all(|text| text.trim().is_empty()) {
             continue;
         }
         let shape = |what: &'static str, found: usize| LogError::Shape {
@@ -46,16 +42,15 @@ pub fn covariance(input: impl Read, file: &str) -> Result<[[f64; 3]; 3], LogErro
             return Err(shape("numbers in each row", record.len()));
         }
         for (column, (entry, name)) in row.iter_mut().zip(names).enumerate() {
-            let text = record
-                .get(column)
-                .unwrap_or("")
-                .trim_start_matches('\u{feff}');
-            *entry = text.parse().map_err(|_| LogError::NotANumber {
-                file: file.into(),
-                line,
-                column: column + 1,
-                name,
-                found: text.to_string(),
+            let text = record.get(column).unwrap_or("").trim();
+            let text = text.trim_start_matches('\u{feff}');
+            *entry = text.parse().map_err(|_| {
+                let fault = SheetFault::Field {
+                    text: text.into(),
+                    name: (*name).into(),
+                    expected: ANY_NUMBER.into(),
+                };
+                SheetError::new(file, line, Some(column + 1), fault)
             })?;
         }
         (count, last) = (count + 1, line);

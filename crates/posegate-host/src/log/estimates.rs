@@ -6,6 +6,7 @@
 //! `true_x_m, true_y_m, true_yaw_rad`, the true pose (all three or none; empty if unknown); `hypothesis`, the number of the row
 //! within its report ([`super::reports`]).
 
+use crate::sheet::{Column, Line, Sheet, SheetError, each, settings};
 use posegate::set::Estimate;
 use std::io::Read;
 
@@ -45,44 +46,9 @@ pub struct Row {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
-    /// A required column is missing.
-    #[error(
-        "{file}:1:1: there is no column `{column}`; expected a header with {expected} (this one has {found})"
-    )]
-    MissingColumn {
-        /// The file.
-        file: String,
-        /// The column.
-        column: &'static str,
-        /// All required columns.
-        expected: String,
-        /// The existing columns.
-        found: String,
-    },
-    /// A column appears twice.
-    #[error("{file}:1:1: the column `{column}` appears twice; keep one of them")]
-    RepeatedColumn {
-        /// The file.
-        file: String,
-        /// The column.
-        column: String,
-    },
-    /// A field is not a number.
-    #[error(
-        "{file}:{line}:{column}: `{found}` in `{name}` is not a number; expected a decimal number (`nan` and `inf` are numbers, and are denied)"
-    )]
-    NotANumber {
-        /// The file.
-        file: String,
-        /// Line, from 1.
-        line: u64,
-        /// Field of the line, from 1.
-        column: usize,
-        /// The column's name.
-        name: &'static str,
-        /// The text of the field.
-        found: String,
-    },
+    /// A fault of the header, a row or a field.
+    #[error(transparent)]
+    Sheet(#[from] SheetError),
     /// The `hypothesis` of a row does not continue its report.
     #[error("{file}:{line}: `hypothesis` is {found}; expected {expected}")]
     Hypothesis {
@@ -109,14 +75,6 @@ pub enum LogError {
         /// Their number.
         found: usize,
     },
-    /// The file cannot be read, or a line has another number of fields than the header.
-    #[error("{file}: {source}")]
-    Csv {
-        /// The file.
-        file: String,
-        /// The cause.
-        source: csv::Error,
-    },
 }
 
 const POSE: [&str; 3] = ["x_m", "y_m", "yaw_rad"];
@@ -128,11 +86,13 @@ const COVARIANCE: [&str; 6] = [
     "cov_yyaw",
     "cov_yawyaw",
 ];
+const LOWER: [&str; 3] = ["cov_yx", "cov_yawx", "cov_yawy"];
 
 const TRUTH: [&str; 3] = ["true_x_m", "true_y_m", "true_yaw_rad"];
 
-/// The index and the name of an existing column.
-type Place = (usize, &'static str);
+/// A number in a recording: the gate denies one that is not finite.
+pub(super) const ANY_NUMBER: &str =
+    "a decimal number (`nan` and `inf` are numbers, and are denied)";
 
 /// Reads the rows of a CSV; `file` names it in errors.
 ///
@@ -144,17 +104,19 @@ pub fn estimates(input: impl Read, file: &str, columns: Columns) -> Result<Vec<R
 
 /// An iterator over the rows of a CSV.
 pub struct Rows<R: Read> {
-    reader: csv::Reader<R>,
-    record: csv::StringRecord,
-    file: String,
-    header: String,
-    times: [Option<Place>; 2],
-    pose: [Place; 3],
-    upper: Option<[Place; 6]>,
-    lower: [Option<Place>; 3],
-    truth: Option<[Place; 3]>,
-    hypothesis: Option<Place>,
-    since_fix: Option<Place>,
+    sheet: Sheet<R>,
+    columns: Places,
+}
+
+/// The columns of a row.
+struct Places {
+    times: [Option<Column>; 2],
+    pose: [Column; 3],
+    upper: Option<[Column; 6]>,
+    lower: [Option<Column>; 3],
+    truth: Option<[Column; 3]>,
+    hypothesis: Option<Column>,
+    since_fix: Option<Column>,
 }
 
 impl<R: Read> Rows<R> {
@@ -163,197 +125,101 @@ impl<R: Read> Rows<R> {
     /// # Errors
     /// A [`LogError`] about the header.
     pub fn new(input: R, file: &str, columns: Columns) -> Result<Self, LogError> {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            // Numbers need no quotes. An unclosed quote would hide the rest of the file.
-            .quoting(false)
-            .comment(Some(b'#'))
-            .from_reader(input);
-        let header = reader.headers().map_err(|source| LogError::Csv {
-            file: file.into(),
-            source,
-        })?;
-        let names: Vec<String> = header
-            .iter()
-            .map(|name| name.trim_start_matches('\u{feff}').into())
-            .collect();
-        let optional = |name: &'static str| -> Result<Option<Place>, LogError> {
-            let mut places = names.iter().enumerate().filter(|(_, n)| **n == *name);
-            let place = places.next().map(|(index, _)| (index, name));
-            match places.next() {
-                None => Ok(place),
-                Some(_) => Err(LogError::RepeatedColumn {
-                    file: file.into(),
-                    column: name.into(),
-                }),
-            }
+        let mut settings = settings();
+        settings.comment(Some(b'#')).flexible(false);
+        let sheet = Sheet::with(&settings, input, file)?;
+        let required: &[&[&str]] = match columns {
+            Columns::Estimates => &[&POSE, &COVARIANCE],
+            _ => &[&POSE],
         };
-        let missing = |column: &'static str, expected: &[&str]| LogError::MissingColumn {
-            file: file.into(),
-            column,
-            expected: expected.join(", "),
-            found: format!("{:?}", names.join(", ")),
-        };
-        let needed = |name: &'static str| {
-            optional(name)?.ok_or_else(|| {
-                let mut expected = POSE.to_vec();
-                if columns == Columns::Estimates {
-                    expected.extend(COVARIANCE);
-                }
-                missing(name, &expected)
+        // The error of a repeated column is that of the header, as for a missing one.
+        let optional = |name: &str| {
+            let column = sheet.optional(name);
+            column.map_err(|error| SheetError {
+                column: Some(1),
+                ..error
             })
         };
-        let timed = |name| match columns {
+        let needed =
+            |name: &str| optional(name)?.ok_or_else(|| sheet.missing(name, &required.concat()));
+        let timed = |name: &str| match columns {
             Columns::Poses => Ok(None),
             _ => optional(name),
         };
-        let pose = [needed(POSE[0])?, needed(POSE[1])?, needed(POSE[2])?];
+        let pose = each(POSE, needed)?;
         let (upper, lower) = if columns == Columns::Estimates {
-            let mut places = [(0, ""); 6];
-            for (place, name) in places.iter_mut().zip(COVARIANCE) {
-                *place = needed(name)?;
-            }
-            let lower = [
-                optional("cov_yx")?,
-                optional("cov_yawx")?,
-                optional("cov_yawy")?,
-            ];
-            (Some(places), lower)
+            (Some(each(COVARIANCE, needed)?), each(LOWER, optional)?)
         } else {
             (None, [None; 3])
         };
-        let truth = match [timed(TRUTH[0])?, timed(TRUTH[1])?, timed(TRUTH[2])?] {
+        let truth = match each(TRUTH, timed)? {
             [Some(x), Some(y), Some(yaw)] => Some([x, y, yaw]),
             [None, None, None] => None,
-            [x, y, _] => {
-                let column = match (x, y) {
-                    (None, _) => TRUTH[0],
-                    (_, None) => TRUTH[1],
-                    _ => TRUTH[2],
-                };
-                return Err(missing(column, &TRUTH));
+            found => {
+                let missing = found.iter().position(Option::is_none).unwrap_or(0);
+                return Err(sheet.missing(TRUTH[missing], &TRUTH).into());
             }
         };
-        let times = [timed("t_s")?, timed("now_s")?];
-        let hypothesis = timed("hypothesis")?;
-        let header = names.join(", ");
-        Ok(Self {
-            reader,
-            record: csv::StringRecord::new(),
-            file: file.into(),
-            header,
-            times,
+        let columns = Places {
+            times: each(["t_s", "now_s"], timed)?,
             pose,
             upper,
             lower,
             truth,
-            hypothesis,
+            hypothesis: timed("hypothesis")?,
             since_fix: None,
-        })
+        };
+        Ok(Self { sheet, columns })
     }
 
     /// Also reads the time since the last fix from a column. Returns `true` if the header has it.
     pub fn reads_since_fix(&mut self, column: &str) -> bool {
-        let index = self.header.split(", ").position(|name| name == column);
-        self.since_fix = index.map(|index| (index, "the time since the last fix"));
-        index.is_some()
+        self.columns.since_fix = self.sheet.first(column);
+        self.columns.since_fix.is_some()
     }
 
     /// Requires that the header has a time column.
     ///
     /// # Errors
-    /// [`LogError::MissingColumn`] if it has none.
+    /// [`LogError::Sheet`] if it has none.
     pub fn needs_time(&self) -> Result<(), LogError> {
-        match self.times[0] {
-            Some(_) => Ok(()),
-            None => Err(LogError::MissingColumn {
-                file: self.file.clone(),
-                column: "t_s",
-                expected: "t_s, the time of each estimate in seconds".into(),
-                found: format!("{:?}", self.header),
-            }),
-        }
+        let expected = "t_s, the time of each estimate in seconds";
+        let missing = || self.sheet.missing("t_s", &[expected]);
+        Ok(self.columns.times[0].map(drop).ok_or_else(missing)?)
     }
 
     /// Returns `true` if the header has `now_s`.
     pub const fn has_use(&self) -> bool {
-        self.times[1].is_some()
+        self.columns.times[1].is_some()
     }
+}
 
-    fn number(&self, (index, name): Place) -> Result<f64, LogError> {
-        let text = self.record.get(index).unwrap_or("");
-        text.parse::<f64>().map_err(|_| LogError::NotANumber {
-            file: self.file.clone(),
-            line: self.line(),
-            column: index + 1,
-            name,
-            found: text.to_string(),
-        })
-    }
-
-    fn line(&self) -> u64 {
-        self.record.position().map_or(0, csv::Position::line)
-    }
-
-    /// Returns a whole number.
-    fn whole(&self, (index, name): Place) -> Result<u64, LogError> {
-        let text = self.record.get(index).unwrap_or("");
-        text.parse::<u64>().map_err(|_| LogError::NotANumber {
-            file: self.file.clone(),
-            line: self.line(),
-            column: index + 1,
-            name,
-            found: text.to_string(),
-        })
-    }
-
-    /// Returns a number, or `None` if the field is empty or its column is missing.
-    fn maybe(&self, place: Option<Place>) -> Result<Option<f64>, LogError> {
-        place
-            .filter(|(index, _)| !self.record.get(*index).unwrap_or("").is_empty())
-            .map(|place| self.number(place))
-            .transpose()
-    }
-
-    fn row(&self) -> Result<Row, LogError> {
+impl Places {
+    fn row(&self, line: &Line<'_>) -> Result<Row, SheetError> {
+        let number = |column| line.any_number(column, ANY_NUMBER);
+        let maybe = |column| line.optional_number(column, ANY_NUMBER);
         let mut covariance = [[f64::NAN; 3]; 3];
         if let Some(upper) = self.upper {
-            let mut v = [0.0; 6];
-            for (value, place) in v.iter_mut().zip(upper) {
-                *value = self.number(place)?;
-            }
-            let [xx, xy, xt, yy, yt, tt] = v;
-            let yx = self.maybe(self.lower[0])?.unwrap_or(xy);
-            let tx = self.maybe(self.lower[1])?.unwrap_or(xt);
-            let ty = self.maybe(self.lower[2])?.unwrap_or(yt);
+            let [xx, xy, xt, yy, yt, tt] = each(upper, number)?;
+            let [yx, tx, ty] = each(self.lower, maybe)?;
+            let [yx, tx, ty] = [yx.unwrap_or(xy), tx.unwrap_or(xt), ty.unwrap_or(yt)];
             covariance = [[xx, xy, xt], [yx, yy, yt], [tx, ty, tt]];
         }
-        let time = |place: Option<Place>| place.map(|place| self.number(place)).transpose();
-        let truth = match self.truth {
-            None => None,
-            Some(places) => {
-                let empty = |(index, _): &Place| self.record.get(*index).unwrap_or("").is_empty();
-                if places.iter().all(empty) {
-                    None
-                } else {
-                    let [x, y, yaw] = places;
-                    Some([self.number(x)?, self.number(y)?, self.number(yaw)?])
-                }
-            }
-        };
+        let is_given = |columns: &[Column; 3]| columns.iter().any(|c| !line.text(*c).is_empty());
+        let truth = self.truth.filter(is_given);
+        let truth = truth.map(|columns| each(columns, number)).transpose()?;
+        let [t_s, now_s] = each(self.times, |column| column.map(number).transpose())?;
+        let [x_m, y_m, yaw_rad] = each(self.pose, number)?;
+        let hypothesis = self.hypothesis.map(|column| line.whole(column));
         Ok(Row {
-            t_s: time(self.times[0])?,
-            now_s: time(self.times[1])?,
-            estimate: Estimate {
-                x_m: self.number(self.pose[0])?,
-                y_m: self.number(self.pose[1])?,
-                yaw_rad: self.number(self.pose[2])?,
-            },
+            t_s,
+            now_s,
+            estimate: Estimate { x_m, y_m, yaw_rad },
             covariance,
             truth,
-            hypothesis: self.hypothesis.map(|place| self.whole(place)).transpose()?,
-            since_fix_s: self.maybe(self.since_fix)?,
-            line: self.line(),
+            hypothesis: hypothesis.transpose()?,
+            since_fix_s: maybe(self.since_fix)?,
+            line: line.number,
         })
     }
 }
@@ -362,14 +228,11 @@ impl<R: Read> Iterator for Rows<R> {
     type Item = Result<Row, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        match self.reader.read_record(&mut self.record) {
-            Ok(false) => None,
-            Ok(true) => Some(self.row()),
-            Err(source) => Some(Err(LogError::Csv {
-                file: self.file.clone(),
-                source,
-            })),
-        }
+        let row = match self.sheet.line() {
+            Ok(line) => self.columns.row(&line?),
+            Err(error) => Err(error),
+        };
+        Some(row.map_err(LogError::from))
     }
 }
 

@@ -24,6 +24,7 @@ pub mod tum;
 pub use self::covariance::covariance;
 pub use self::estimates::{Columns, LogError, Row, clock_ms, estimates};
 pub use self::known_tags::{AlikeTags, KnownTags};
+pub use crate::sheet::{SheetError, SheetFault};
 
 pub use self::hypotheses::{MOST_HYPOTHESES, reports};
 

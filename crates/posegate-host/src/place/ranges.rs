@@ -1,5 +1,6 @@
 //! Parses ranges of a search space from the command line, and candidates from a file.
 
+use crate::sheet::{Column, Sheet, SheetError, SheetFault, each, settings};
 use posegate::shape::Pose3Deg;
 
 /// The names of the free numbers, in the order of [`super::Space::free`].
@@ -52,61 +53,39 @@ pub struct Candidate {
 /// # Errors
 /// A description of the error, with file and line.
 pub fn candidates(input: &[u8], file: &str) -> Result<Vec<Candidate>, String> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        // An unclosed quote would hide the rest of the file.
-        .quoting(false)
-        .comment(Some(b'#'))
-        .from_reader(input);
-    let header = reader
-        .headers()
-        .map_err(|error| format!("{file}:1: {error}"))?
-        .clone();
-    let column = |name: &str| {
-        header
-            .iter()
-            .position(|known| known.trim_start_matches('\u{feff}') == name)
-    };
-    let needed = |name: &str| {
-        column(name).ok_or_else(|| {
-            format!("{file}:1: there is no column `{name}`; expected x, y, z, yaw_deg")
-        })
-    };
-    let columns = [needed("x")?, needed("y")?, needed("z")?, needed("yaw_deg")?];
-    let others = [column("roll_deg"), column("pitch_deg")];
-    let name = column("name");
+    read(input, file).map_err(|error| match *error.fault {
+        SheetFault::Field { text, name, .. } => format!(
+            "{file}:{}: `{text}` in column `{name}` is not a number",
+            error.line
+        ),
+        fault => format!("{file}:{}: {fault}", error.line),
+    })
+}
+
+fn read(input: &[u8], file: &str) -> Result<Vec<Candidate>, SheetError> {
+    let mut sheet = Sheet::with(settings().comment(Some(b'#')), input, file)?;
+    // Of repeated columns, the first one is used.
+    let needed = |name| sheet.first(name).ok_or_else(|| sheet.missing(name, &NAMES));
+    let [x, y, z, yaw] = each(NAMES, needed)?;
+    let [name, roll, pitch] = ["name", "roll_deg", "pitch_deg"].map(|name| sheet.first(name));
     let mut all: Vec<Candidate> = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| {
-            let line = error.position().map_or(0, csv::Position::line);
-            format!("{file}:{line}: {error}")
-        })?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: usize| {
-            let text = record.get(column).unwrap_or_default();
-            let number: Option<f64> = text.parse().ok();
-            number.filter(|number| number.is_finite()).ok_or_else(|| {
-                format!(
-                    "{file}:{line}: `{text}` in column `{}` is not a number",
-                    &header[column]
-                )
-            })
-        };
-        let or_zero = |column: Option<usize>| column.map_or(Ok(0.0), number);
+    while let Some(line) = sheet.line()? {
+        let number = |column| line.number(column, |_| true, "a finite number");
+        let or_zero = |column: Option<Column>| column.map_or(Ok(0.0), number);
         let pose = Pose3Deg {
-            x: number(columns[0])?,
-            y: number(columns[1])?,
-            z: number(columns[2])?,
-            roll_deg: or_zero(others[0])?,
-            pitch_deg: or_zero(others[1])?,
-            yaw_deg: number(columns[3])?,
+            x: number(x)?,
+            y: number(y)?,
+            z: number(z)?,
+            roll_deg: or_zero(roll)?,
+            pitch_deg: or_zero(pitch)?,
+            yaw_deg: number(yaw)?,
         };
-        let name = match name.and_then(|column| record.get(column)) {
-            Some(name) if !name.is_empty() => name.to_string(),
-            _ => (all.len() + 1).to_string(),
+        let name = match name.map_or("", |column| line.text(column)) {
+            "" => (all.len() + 1).to_string(),
+            name => name.to_owned(),
         };
         if all.iter().any(|other| other.name == name) {
-            return Err(format!("{file}:{line}: a second candidate `{name}`"));
+            return Err(line.wrong_row(format!("a second candidate `{name}`")));
         }
         all.push(Candidate { name, pose });
     }

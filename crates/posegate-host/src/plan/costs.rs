@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::PlanError;
+use crate::sheet::{Sheet, SheetError, SheetFault, each, settings};
 
 /// Costs of drives and looks.
 #[derive(Clone, Debug, Default)]
@@ -30,40 +31,22 @@ impl Costs {
 /// # Errors
 /// [`PlanError::Costs`] with file and line if the header or a cost is wrong, or a pair of names has two costs.
 pub fn costs(text: &[u8], file: &str) -> Result<BTreeMap<(String, String), f64>, PlanError> {
-    let wrong = |line: u64, what: &str| PlanError::Costs(format!("{file}:{line}: {what}"));
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text);
-    let header = reader
-        .headers()
-        .map_err(|error| wrong(1, &format!("{error}")))?;
-    if header.iter().ne(["from", "to", "cost"]) {
-        return Err(wrong(1, "expected the header `from,to,cost`"));
+    const HEADER: [&str; 3] = ["from", "to", "cost"];
+    let wrong = |error: SheetError| PlanError::Costs(error.to_string());
+    let mut sheet = Sheet::with(settings().quoting(true), text, file).map_err(wrong)?;
+    if sheet.names() != HEADER {
+        let what = SheetFault::Other("expected the header `from,to,cost`".into());
+        return Err(wrong(sheet.wrong_header(None, what)));
     }
+    let [from, to, cost] = each(HEADER, |name| sheet.needed(name, &HEADER)).map_err(wrong)?;
     let mut costs = BTreeMap::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| {
-            let line = error.position().map_or(0, csv::Position::line);
-            wrong(line, &format!("{error}"))
-        })?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let cost: f64 = record[2]
-            .parse()
-            .ok()
-            .filter(|cost: &f64| *cost >= 0.0 && cost.is_finite())
-            .ok_or_else(|| {
-                wrong(
-                    line,
-                    &format!("`{}` is not a cost; write a number, at least 0", &record[2]),
-                )
-            })?;
-        if costs
-            .insert((record[0].into(), record[1].into()), cost)
-            .is_some()
-        {
-            let [from, to] = [0, 1].map(|at| &record[at]);
+    while let Some(line) = sheet.line().map_err(wrong)? {
+        let cost = line.number(cost, |cost| cost >= 0.0, "a number, at least 0");
+        let [from, to] = [from, to].map(|column| line.text(column));
+        let before = costs.insert((from.into(), to.into()), cost.map_err(wrong)?);
+        if before.is_some() {
             let what = format!("the drive from `{from}` to `{to}` has a cost already");
-            return Err(wrong(line, &what));
+            return Err(wrong(line.wrong_row(what)));
         }
     }
     Ok(costs)
