@@ -50,23 +50,23 @@ pub(super) struct Nearest {
     turn: Limit,
 }
 
-/// A scale is at most `room / share`, unit 2^-10.
+/// An upper bound of the scale: `slack / share`, unit 2^-10.
 struct Limit {
-    room: u32,
+    slack: u32,
     share: u32,
 }
 
 impl Limit {
-    const NONE: Self = Self { room: 1, share: 0 };
+    const NONE: Self = Self { slack: 1, share: 0 };
 
     /// Returns the smaller one of a scale and this limit.
     fn lower(&self, scale_q10: u32) -> u32 {
         let needed = u64::from(self.share).wrapping_mul(u64::from(scale_q10));
-        if needed <= u64::from(self.room) {
+        if needed <= u64::from(self.slack) {
             return scale_q10;
         }
         // A share of zero needs nothing.
-        self.room.checked_div(self.share).unwrap_or(0)
+        self.slack.checked_div(self.share).unwrap_or(0)
     }
 }
 
@@ -95,7 +95,7 @@ impl DecisionObserver for Nearest {
         // The bounds of a frame are valid up to half a radian. Without levers there are none.
         if turns {
             self.turn = Limit {
-                room: Turn::LARGEST.unsigned_abs() << 10,
+                slack: Turn::LARGEST.unsigned_abs() << 10,
                 share: turn.radians_q15.unsigned_abs(),
             };
         }
@@ -103,7 +103,7 @@ impl DecisionObserver for Nearest {
             let above = set.above_goal.wrapping_sub(piece.from);
             let room = above.min(piece.width.saturating_sub(above));
             self.arc = Limit {
-                room: room.saturating_sub(8),
+                slack: room.saturating_sub(8),
                 // 2^-10 of the reach, rounded up.
                 share: (turn.reach >> 10).wrapping_add(1),
             };
@@ -140,7 +140,7 @@ struct Needs {
 
 impl Needs {
     /// Returns `A + l (E + l R)`, rounded up, for a scale l of unit 2^-BITS. `None` if `E + l R` exceeds 16 bits.
-    /// The product `l R` must fit in 32 bits.
+    /// The products `l R` and `l (E + l R)`, in the scale's unit, must fit in 32 bits.
     #[inline(always)]
     fn at<const BITS: u32>(&self, scale: u32) -> Option<u32> {
         let up = |value: u32| (scale.wrapping_mul(value) >> BITS).wrapping_add(1);
@@ -148,7 +148,7 @@ impl Needs {
         (more <= 0xffff).then(|| self.extent.wrapping_add(up(more)))
     }
 
-    /// A quick test in 32 bits: up to a scale of 16, with the scale rounded up to 2^-8.
+    /// A quick test in 32 bits: below a scale of 16, with the scale rounded up to 2^-8.
     #[inline(always)]
     fn are_surely_met_at(&self, scale_q10: u32, spare_q10: u32) -> bool {
         let scale_q8 = (scale_q10 >> 2).wrapping_add(1);

@@ -28,8 +28,27 @@ impl Level {
     }
 }
 
+/// Firmware examples that are built.
+pub struct Built(Level);
+
+impl Built {
+    /// Returns the ELF file of an example.
+    pub fn elf(&self, target: &str, example: &str) -> PathBuf {
+        let folder = self.0.folder().join(target);
+        folder.join("firmware/examples").join(example)
+    }
+
+    /// Runs an example under an emulated clock that makes its counts repeatable, and prints its lines. Returns `true` if it succeeds.
+    pub fn count(&self, target: &str, machine: &str, example: &str) -> Result<bool> {
+        let code = emulate(machine, &self.elf(target, example), 600)
+            .words("-icount shift=6")
+            .print_code()?;
+        Ok(code == 0)
+    }
+}
+
 /// Builds firmware examples in one command: the link of a firmware occupies one processor core, and cargo makes several at once.
-pub fn build_all(level: Level, targets: &[&str], examples: &[&str]) -> Result {
+pub fn build_all(level: Level, targets: &[&str], examples: &[&str]) -> Result<Built> {
     let mut build = cmd("cargo build -p posegate --profile firmware --features firmware");
     for target in targets {
         build = build.args(["--target", target]);
@@ -40,19 +59,13 @@ pub fn build_all(level: Level, targets: &[&str], examples: &[&str]) -> Result {
     if let Level::Small = level {
         build = build.words("--config profile.firmware.opt-level=\"s\"");
     }
-    build.arg("--target-dir").arg(level.folder()).run()
+    build.arg("--target-dir").arg(level.folder()).run()?;
+    Ok(Built(level))
 }
 
 /// Builds a firmware example and returns its ELF file.
 pub fn build(level: Level, target: &str, example: &str) -> Result<PathBuf> {
-    build_all(level, &[target], &[example])?;
-    Ok(built(level, target, example))
-}
-
-/// Returns the ELF file of an example that is built.
-pub fn built(level: Level, target: &str, example: &str) -> PathBuf {
-    let folder = level.folder().join(target);
-    folder.join("firmware/examples").join(example)
+    Ok(build_all(level, &[target], &[example])?.elf(target, example))
 }
 
 /// Returns the command that runs a firmware in QEMU, for this many seconds at most.
@@ -61,12 +74,4 @@ pub fn emulate(machine: &str, elf: &Path, seconds: u64) -> Cmd {
         "qemu-system-arm -M {machine} -display none -monitor none -serial none -semihosting-config enable=on,target=native -kernel"
     );
     cmd(&line).arg(elf).limit(seconds)
-}
-
-/// Runs an example that is built so that its counts repeat, and prints its lines. Returns `true` if it succeeds.
-pub fn count(target: &str, machine: &str, example: &str) -> Result<bool> {
-    let code = emulate(machine, &built(Level::Fast, target, example), 600)
-        .words("-icount shift=6")
-        .print_code()?;
-    Ok(code == 0)
 }

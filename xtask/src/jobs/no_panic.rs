@@ -7,7 +7,7 @@ use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd};
 
-/// What the linker says of a panic that can be reached.
+/// The linker's message for a panic that can be reached.
 const SEEN: &str = "undefined symbol: a_panic_is_reachable";
 
 /// Makes links that fail if a panic can be reached, at level 3 and for size, and checks that one fails with an added panic.
@@ -48,9 +48,10 @@ pub fn no_panic(_: &Arguments) -> Result {
 
 /// Returns `true` if the link for a target has failed by the added panic.
 fn sees_panic(text: &str, target: &str) -> bool {
-    text.split("error: linking with")
-        .skip(1)
-        .any(|link| link.contains(&format!("/{target}/")) && link.contains(SEEN))
+    text.split("error: linking with").skip(1).any(|link| {
+        let link = link.split("error: could not compile").next().unwrap_or("");
+        link.contains(&format!("/{target}/")) && link.contains(SEEN)
+    })
 }
 
 #[cfg(test)]
@@ -65,6 +66,11 @@ mod tests {
         );
         assert!(sees_panic(&text, THUMBS[0]));
         assert!(!sees_panic(&text, THUMBS[1]));
+        let more = format!(
+            "{text}error: could not compile\nerror in /t/{}/a\n",
+            THUMBS[1]
+        );
+        assert!(!sees_panic(&more, THUMBS[1]));
         let otherwise = text.replace(SEEN, "undefined symbol: memcpy");
         assert!(!sees_panic(&otherwise, THUMBS[0]));
         assert!(!sees_panic(SEEN, THUMBS[0]));

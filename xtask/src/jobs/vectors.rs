@@ -44,9 +44,9 @@ pub fn vectors(_: &Arguments) -> Result {
     if outcome.code != 0 || count < LEAST || line != right(&host, count) {
         failed.push(host);
     }
-    board::build_all(Level::Fast, &TARGETS, &["vectors"])?;
+    let built = board::build_all(Level::Fast, &TARGETS, &["vectors"])?;
     for (target, machine, core) in CORES {
-        let elf = board::built(Level::Fast, target, "vectors");
+        let elf = built.elf(target, "vectors");
         let outcome = board::emulate(machine, &elf, 60).outcome()?;
         let line = outcome.text.trim_end();
         println!("{line}");
@@ -57,9 +57,9 @@ pub fn vectors(_: &Arguments) -> Result {
     // Code for size shares functions that level 3 copies.
     let for_size = [CORES[0], CORES[2]];
     let targets = for_size.map(|(target, ..)| target);
-    board::build_all(Level::Small, &targets, &["vectors"])?;
+    let built = board::build_all(Level::Small, &targets, &["vectors"])?;
     for (target, machine, core) in for_size {
-        let elf = board::built(Level::Small, target, "vectors");
+        let elf = built.elf(target, "vectors");
         let outcome = board::emulate(machine, &elf, 60).outcome()?;
         let line = outcome.text.trim_end();
         println!("{}", line.replace(core, &format!("{core}, at the level s")));
