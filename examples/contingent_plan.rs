@@ -16,10 +16,15 @@ fn main() {}
 mod contingent_run;
 
 #[cfg(target_os = "none")]
+#[path = "board/emulated.rs"]
+mod emulated;
+
+#[cfg(target_os = "none")]
 mod firmware {
+    use crate::contingent_run;
+    use crate::emulated::run;
     use core::fmt::{Error, Write};
     use cortex_m_rt::entry;
-    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
     use cortex_m_semihosting::hprint;
 
     struct Out;
@@ -33,20 +38,6 @@ mod firmware {
 
     #[entry]
     fn main() -> ! {
-        match crate::contingent_run::run(&mut Out) {
-            Ok(()) => stop(EXIT_SUCCESS),
-            Err(_) => stop(EXIT_FAILURE),
-        }
-    }
-
-    fn stop(status: debug::ExitStatus) -> ! {
-        loop {
-            debug::exit(status);
-        }
-    }
-
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-        stop(EXIT_FAILURE)
+        run(|| contingent_run::run(&mut Out))
     }
 }

@@ -15,14 +15,14 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
-#[path = "board/measurement.rs"]
-mod measurement;
+#[path = "board/emulated.rs"]
+mod emulated;
 
 #[cfg(target_os = "none")]
 mod firmware {
     use crate::board::counter::{Counter, Failure, goal};
     use crate::board::stack::used_by;
-    use crate::measurement::run;
+    use crate::emulated::run;
     use core::hint::black_box;
     use cortex_m_rt::entry;
     use cortex_m_semihosting::hprintln;

@@ -16,8 +16,8 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
-#[path = "board/measurement.rs"]
-mod measurement;
+#[path = "board/emulated.rs"]
+mod emulated;
 
 #[cfg(target_os = "none")]
 #[path = "faults/schedule.rs"]
@@ -28,7 +28,7 @@ mod schedule;
 mod firmware {
     use crate::board::counter::{Counter, Failure, M4F};
     use crate::board::stack::used_by;
-    use crate::measurement::run;
+    use crate::emulated::run;
     use crate::schedule::{SCHEDULE, SETTINGS, START_MS, TABLE};
     use core::hint::black_box;
     use cortex_m_rt::entry;

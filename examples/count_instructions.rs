@@ -25,8 +25,8 @@ fn main() {}
 mod board;
 
 #[cfg(target_os = "none")]
-#[path = "board/measurement.rs"]
-mod measurement;
+#[path = "board/emulated.rs"]
+mod emulated;
 
 #[cfg(target_os = "none")]
 #[path = "../crates/posegate-testkit/src/looks.rs"]
@@ -41,8 +41,8 @@ mod firmware {
     use crate::board::counter::{Counter, Failure, M4F, goal, spin};
     use crate::board::stack::used_by;
     use crate::board::worst::{Bounds, Genes, MIDDLE, Search};
+    use crate::emulated::run;
     use crate::looks::{self, LOOKS, Looks, added};
-    use crate::measurement::run;
     use crate::naive_grid::BitGrid;
     use core::f64::consts::PI;
     use core::hint::black_box;

@@ -80,10 +80,14 @@ fn main() -> std::process::ExitCode {
 }
 
 #[cfg(target_os = "none")]
+#[path = "board/emulated.rs"]
+mod emulated;
+
+#[cfg(target_os = "none")]
 mod firmware {
+    use crate::emulated::run;
     use crate::{Line, replayed};
-    use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+    use cortex_m_rt::entry;
     use cortex_m_semihosting::hprintln;
 
     /// Returns the core that this runs on, from its CPUID register.
@@ -105,37 +109,15 @@ mod firmware {
 
     #[entry]
     fn main() -> ! {
-        match replayed() {
-            Ok(outcome) => {
-                hprintln!("{}", Line(core(), outcome));
-                stop(if outcome.is_good() {
-                    EXIT_SUCCESS
-                } else {
-                    EXIT_FAILURE
-                })
+        run(|| {
+            let outcome = replayed()?;
+            let is_good = outcome.is_good();
+            hprintln!("{}", Line(core(), outcome));
+            if is_good {
+                Ok(())
+            } else {
+                Err("a decision differs from the file")
             }
-            Err(fault) => {
-                hprintln!("{{\"error\":\"{}\"}}", fault);
-                stop(EXIT_FAILURE)
-            }
-        }
-    }
-
-    fn stop(status: debug::ExitStatus) -> ! {
-        loop {
-            debug::exit(status);
-        }
-    }
-
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-        hprintln!("{{\"error\":\"panic\"}}");
-        stop(EXIT_FAILURE)
-    }
-
-    #[exception]
-    unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-        hprintln!("{{\"error\":\"fault\"}}");
-        stop(EXIT_FAILURE)
+        })
     }
 }

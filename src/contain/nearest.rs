@@ -38,6 +38,8 @@ impl DecisionObserver for NoObserver {
 
 /// Scales are reported up to 2^11.
 const MOST_Q10: u32 = 1 << 21;
+/// With a bend or a rest, up to 2^6.
+const MOST_BENT_Q10: u32 = 1 << 16;
 pub(super) const ONE_Q10: u32 = 1 << 10;
 
 /// The nearest facet.
@@ -50,7 +52,7 @@ pub(super) struct Nearest {
     turn: Limit,
 }
 
-/// An upper bound of the scale: `slack / share`, unit 2^-10.
+/// An upper bound of the scale: `slack / share`, unit 2^-10. A share of zero is no bound.
 struct Limit {
     slack: u32,
     share: u32,
@@ -65,7 +67,6 @@ impl Limit {
         if needed <= u64::from(self.slack) {
             return scale_q10;
         }
-        // A share of zero needs nothing.
         self.slack.checked_div(self.share).unwrap_or(0)
     }
 }
@@ -148,10 +149,12 @@ impl Needs {
         (more <= 0xffff).then(|| self.extent.wrapping_add(up(more)))
     }
 
-    /// A quick test in 32 bits: below a scale of 16, with the scale rounded up to 2^-8.
+    /// Returns `true` if the slack is surely enough at a scale. A quick test in 32 bits: it takes the scale rounded up to 2^-8, and
+    /// shows nothing from 16 on.
     #[inline(always)]
     fn are_surely_met_at(&self, scale_q10: u32, spare_q10: u32) -> bool {
         let scale_q8 = (scale_q10 >> 2).wrapping_add(1);
+        // Below 2^12 * 2^18, and then 2^12 * 2^20.
         scale_q8 <= 1 << 12
             && self.rest >> 18 == 0
             && self.at::<8>(scale_q8).is_some_and(|needs| {
@@ -177,9 +180,6 @@ impl Needs {
             .min(limit)
     }
 }
-
-/// Bends and rests are taken into account up to a scale of 64.
-const MOST_BENT_Q10: u32 = 1 << 16;
 
 #[cfg(test)]
 mod tests;

@@ -173,17 +173,15 @@ fn drive(rng: &mut Rng, bytes: &[u8], stated: impl Fn(&Drive) -> MotionBounds, f
     }
 }
 
-/// Streams of random drives, which run in parallel.
-const STREAMS: u64 = 16;
-
 fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> MotionBounds + Sync) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
-    let found = (0..STREAMS)
+    let streams = Rng::streams(seed);
+    let each = openings.div_ceil(streams.len() as u64);
+    let found = streams
         .into_par_iter()
-        .map(|stream| {
-            let mut rng = Rng::new(seed.wrapping_add(stream << 40));
+        .map(|mut rng| {
             let mut found = Found::NONE;
-            while found.openings < openings.div_ceil(STREAMS) {
+            while found.openings < each {
                 drive(&mut rng, &bytes, &stated, &mut found);
             }
             found

@@ -17,6 +17,12 @@ impl Rng {
         Self(seed)
     }
 
+    /// Returns sixteen generators with different numbers: so many parts of a long test can run in parallel, with the same result for
+    /// any number of threads.
+    pub fn streams(seed: u64) -> [Self; 16] {
+        core::array::from_fn(|stream| Self::new(seed.wrapping_add((stream as u64) << 40)))
+    }
+
     pub fn next_u64(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
