@@ -2,7 +2,7 @@
 
 use crate::sheet;
 use crate::site_input::{
-    Failure, Outcome, answer, check_stated_errors, print, print_json, progress, warn,
+    Failure, Outcome, answer, check_stated_errors, parsed, print, print_json, progress, warn,
 };
 use indicatif::ProgressBar;
 use posegate_host::cover::{
@@ -77,8 +77,8 @@ pub enum Choice {
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
-    let (bytes, name) = files.read(&arguments.site)?;
-    let site = crate::site_input::parsed(files, bytes.clone(), &name)?;
+    let (text, name) = files.read_text(&arguments.site)?;
+    let site = parsed(files, &text, &name)?;
     check_stated_errors(&site)?;
     if let Some(from) = &arguments.from {
         site.chain(from).map_err(Failure::input)?;
@@ -96,7 +96,6 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         most_risk: arguments.most_risk,
         limit: arguments.limit,
     };
-    let text = String::from_utf8_lossy(&bytes);
     if let Some(reach) = arguments.polish
         && !(reach > 0.0 && reach <= 100.0)
     {

@@ -64,13 +64,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         part: part.map(str::to_owned),
         ..Import::of(format)
     };
-    let (bytes, name) = files.read(&OsString::from(path).into())?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        Failure::usage(
-            format!("{name}: not UTF-8: {error}"),
-            "save the file in the encoding UTF-8",
-        )
-    })?;
+    let (text, name) = files.read_text(&OsString::from(path).into())?;
     let imported = match order.parse(&text, &name) {
         Ok(imported) => imported,
         Err(ImportError::File(error)) => return Err(Failure::in_file(&error)),

@@ -78,13 +78,7 @@ fn thresholds(text: &str) -> Result<[f64; 2], String> {
 }
 
 fn poses(path: &Input, files: &Files) -> Result<Vec<Stamped>, Failure> {
-    let (bytes, name) = files.read(path)?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        Failure::usage(
-            format!("{name}: not UTF-8: {error}"),
-            "trajectories are text in the TUM format",
-        )
-    })?;
+    let (text, name) = files.read_text(path)?;
     trajectory(&text, &name).map_err(Failure::input)
 }
 

@@ -1,7 +1,7 @@
 //! `posegate predict`: evaluates a learnt model.
 
 use crate::learn::refused;
-use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
+use crate::site_input::{Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{ErrorModel, InflationModel, Model, conditions, places};
 use serde_json::{Value, json};
@@ -28,13 +28,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
-    let (bytes, name) = files.read(&arguments.model)?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        Failure::usage(
-            format!("{name}: not UTF-8: {error}"),
-            "models are UTF-8 text",
-        )
-    })?;
+    let (text, name) = files.read_text(&arguments.model)?;
     let model = Model::parse(&text, &name).map_err(refused)?;
     let (bytes, name) = files.read(&arguments.at)?;
     let lines: Vec<Value> = match &model {

@@ -8,15 +8,13 @@ use posegate_host::site::{Site, Task};
 
 /// Reads and checks a site file.
 pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {
-    let (bytes, name) = files.read(input)?;
-    parsed(files, bytes, &name)
+    Ok(site_and_text(files, input)?.0)
 }
 
 /// Reads a site file, and returns its text too.
 pub fn site_and_text(files: &Files, input: &Input) -> Result<(Site, String), Failure> {
-    let (bytes, name) = files.read(input)?;
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    Ok((parsed(files, bytes, &name)?, text))
+    let (text, name) = files.read_text(input)?;
+    Ok((parsed(files, &text, &name)?, text))
 }
 
 /// Reads a site for commands that rely on its localization tasks: also checks the stated errors of these tasks.
@@ -43,14 +41,8 @@ pub fn check_stated_errors(site: &Site) -> Result<(), Failure> {
 }
 
 /// Parses and checks the text of a site file, and registers the files that it names as inputs of the command.
-pub fn parsed(files: &Files, bytes: Vec<u8>, name: &str) -> Result<Site, Failure> {
-    let text = String::from_utf8(bytes).map_err(|error| {
-        Failure::usage(
-            format!("{name}: not UTF-8: {error}"),
-            "site files are UTF-8 text",
-        )
-    })?;
-    let site = Site::parse(&text, name).map_err(|error| Failure::in_file(&error))?;
+pub fn parsed(files: &Files, text: &str, name: &str) -> Result<Site, Failure> {
+    let site = Site::parse(text, name).map_err(|error| Failure::in_file(&error))?;
     register(files, &site)?;
     Ok(site)
 }

@@ -1,9 +1,10 @@
 //! Rows of a CSV with a header: columns by name, in any order, others ignored. Errors state the line and the column of
 //! an invalid field.
 //!
-//! Entry points: [`Sheet::new`], [`Sheet::with`]. Rows are read one by one into the same memory.
+//! Entry points: [`Sheet::new`], [`Sheet::with`]; [`Records`] for a file without a header. Rows are read one by one into the same
+//! memory.
 
-use std::io::Read;
+use std::io::{Chain, Read};
 use std::str::FromStr;
 
 /// A fault in a CSV.
@@ -52,7 +53,10 @@ pub enum SheetFault {
     /// A fault that only the reader of this kind of file knows.
     #[error("{0}")]
     Other(String),
-    /// The bytes cannot be read as fields.
+    /// A field is not text.
+    #[error("bytes that are not UTF-8; save the file as UTF-8")]
+    NotText,
+    /// The input cannot be read.
     #[error("{0}")]
     Csv(csv::Error),
 }
@@ -68,10 +72,13 @@ impl SheetError {
         }
     }
 
-    /// Returns the error of bytes that cannot be read. `line` is used if the fault has no line.
-    pub(crate) fn unreadable(file: &str, line: u64, fault: csv::Error) -> Self {
-        let line = fault.position().map_or(line, csv::Position::line);
-        Self::new(file, line, None, SheetFault::Csv(fault))
+    fn unreadable(file: &str, line: u64, fault: csv::Error) -> Self {
+        match fault.kind() {
+            csv::ErrorKind::Utf8 { err, .. } => {
+                Self::new(file, line, Some(err.field() + 1), SheetFault::NotText)
+            }
+            _ => Self::new(file, line, None, SheetFault::Csv(fault)),
+        }
     }
 }
 
@@ -79,12 +86,20 @@ impl SheetError {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Column(usize);
 
+/// A reader of the lines of a CSV that are neither blank nor comments.
+pub struct Records<R> {
+    file: String,
+    reader: csv::Reader<Chain<R, &'static [u8]>>,
+    record: csv::StringRecord,
+    number: u64,
+}
+
 /// A reader of a CSV.
 pub struct Sheet<R> {
-    file: String,
     names: Vec<String>,
-    reader: csv::Reader<R>,
-    record: csv::StringRecord,
+    /// The line of the names, from 1.
+    header: u64,
+    records: Records<R>,
 }
 
 /// A row of a CSV.
@@ -96,11 +111,14 @@ pub struct Line<'a> {
     pub number: u64,
 }
 
-/// Returns the usual settings: no comments, no quotes. [`Sheet`] compares the number of fields with the header.
+/// Returns the usual settings: no comments, no quotes.
 pub fn settings() -> csv::ReaderBuilder {
     let mut settings = csv::ReaderBuilder::new();
     // Numbers need no quotes. An unclosed quote would hide the rest of the file.
-    settings.quoting(false).flexible(true);
+    settings.quoting(false);
+    // A line feed ends a record, so the line feeds before its end tell its number. A carriage return is white space.
+    settings.terminator(csv::Terminator::Any(b'\n'));
+    settings.has_headers(false).flexible(true);
     settings
 }
 
@@ -116,6 +134,37 @@ pub fn each<A, T: Copy + Default, E, const N: usize>(
     Ok(results)
 }
 
+impl<R: Read> Records<R> {
+    /// Starts before the first line. The settings are [`settings()`] with what this file has besides; `file` names the input in errors.
+    pub fn new(settings: &csv::ReaderBuilder, input: R, file: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            reader: settings.from_reader(input.chain(&b"\n"[..])),
+            record: csv::StringRecord::new(),
+            number: 0,
+        }
+    }
+
+    /// Returns the fields of the next line and its number, from 1; `None` at the end. Fields are not trimmed: a trimmed copy of each
+    /// row would take as long as its numbers.
+    pub fn next(&mut self) -> Result<Option<(&csv::StringRecord, u64)>, SheetError> {
+        loop {
+            let more = self.reader.read_record(&mut self.record);
+            let ends_before = self.reader.position().line();
+            // A field in quotes may have several lines.
+            let within = self.record.as_slice().matches('\n').count() as u64;
+            self.number = ends_before.saturating_sub(1 + within).max(1);
+            if !more.map_err(|fault| SheetError::unreadable(&self.file, self.number, fault))? {
+                return Ok(None);
+            }
+            let is_blank = self.record.len() == 1 && self.record.as_slice().trim().is_empty();
+            if !is_blank {
+                return Ok(Some((&self.record, self.number)));
+            }
+        }
+    }
+}
+
 impl<R: Read> Sheet<R> {
     /// Reads the header with the usual settings; `file` names the input in errors.
     pub fn new(input: R, file: &str) -> Result<Self, SheetError> {
@@ -124,17 +173,16 @@ impl<R: Read> Sheet<R> {
 
     /// Reads the header.
     pub fn with(settings: &csv::ReaderBuilder, input: R, file: &str) -> Result<Self, SheetError> {
-        // Fields are trimmed when they are used: a trimmed copy of each row would take as long as its numbers.
-        let mut reader = settings.from_reader(input);
-        let unreadable = |fault| SheetError::unreadable(file, 1, fault);
-        let header = reader.headers().map_err(unreadable)?;
+        let mut records = Records::new(settings, input, file);
         let name = |name: &str| name.trim().trim_start_matches('\u{feff}').trim().to_owned();
-        let names = header.iter().map(name).collect();
+        let (names, header) = match records.next()? {
+            Some((names, line)) => (names.iter().map(name).collect(), line),
+            None => (Vec::new(), 1),
+        };
         Ok(Self {
-            file: file.to_owned(),
             names,
-            reader,
-            record: csv::StringRecord::new(),
+            header,
+            records,
         })
     }
 
@@ -179,21 +227,19 @@ impl<R: Read> Sheet<R> {
 
     /// Returns an error of the header; `column` is from 1.
     pub fn wrong_header(&self, column: Option<usize>, fault: SheetFault) -> SheetError {
-        SheetError::new(&self.file, 1, column, fault)
+        SheetError::new(&self.records.file, self.header, column, fault)
     }
 
     /// Returns the next row.
     pub fn line(&mut self) -> Result<Option<Line<'_>>, SheetError> {
-        let more = self.reader.read_record(&mut self.record);
-        let reached = self.reader.position().line();
-        if !more.map_err(|fault| SheetError::unreadable(&self.file, reached, fault))? {
+        if self.records.next()?.is_none() {
             return Ok(None);
         }
         let line = Line {
-            file: &self.file,
+            file: &self.records.file,
             names: &self.names,
-            number: self.record.position().map_or(0, csv::Position::line),
-            record: &self.record,
+            record: &self.records.record,
+            number: self.records.number,
         };
         let (found, expected) = (line.record.len(), self.names.len());
         if found != expected {

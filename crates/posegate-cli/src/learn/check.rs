@@ -33,13 +33,7 @@ pub struct Check {
 }
 
 pub fn run(arguments: &Check, files: &Files) -> Outcome {
-    let (bytes, name) = files.read(&arguments.model)?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        Failure::usage(
-            format!("{name}: not UTF-8: {error}"),
-            "models are UTF-8 text",
-        )
-    })?;
+    let (text, name) = files.read_text(&arguments.model)?;
     let Model::Bounds(model) = Model::parse(&text, &name).map_err(refused)? else {
         return Err(Failure::usage(
             format!("{name}: not a model of bounds"),

@@ -42,13 +42,7 @@ impl Inflated {
                 "leave one of them out",
             ));
         }
-        let (bytes, name) = files.read(path)?;
-        let text = String::from_utf8(bytes).map_err(|error| {
-            Failure::usage(
-                format!("{name}: not UTF-8: {error}"),
-                "models are UTF-8 text",
-            )
-        })?;
+        let (text, name) = files.read_text(path)?;
         let model = InflationModel::parse(&text, &name).map_err(refused)?;
         let learnt = radius_squared(model.epsilon()).unwrap_or(f64::NAN);
         let used = f64::from(radius.q16()) / 65536.0;

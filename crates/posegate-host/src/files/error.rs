@@ -2,6 +2,7 @@
 
 use std::io;
 use std::path::Path;
+use std::str::Utf8Error;
 
 /// The reason why a file is not read or not written.
 #[derive(Debug, thiserror::Error)]
@@ -14,6 +15,14 @@ pub enum FileError {
         name: String,
         /// The reason.
         cause: io::Error,
+    },
+    /// An input is not text in UTF-8.
+    #[error("{name}: not UTF-8: {cause}")]
+    NotText {
+        /// The file's name.
+        name: String,
+        /// The place of the first wrong byte.
+        cause: Utf8Error,
     },
     /// An output cannot be written.
     #[error("{name}: {cause}")]
@@ -63,6 +72,7 @@ impl FileError {
     pub const fn help(&self) -> &'static str {
         match self {
             Self::Unread { .. } => "check the path; `-` reads standard input",
+            Self::NotText { .. } => "save the file in the encoding UTF-8",
             Self::Unwritten { .. } => "check that the folder exists and can be written",
             Self::ReplacesInput { .. } => "name another output",
             Self::OneForTwo { .. } => "name another file for one of them",

@@ -2,7 +2,7 @@
 
 use super::LogError;
 use super::estimates::ANY_NUMBER;
-use crate::sheet::{SheetError, SheetFault, settings};
+use crate::sheet::{Records, SheetError, SheetFault, settings};
 use std::io::Read;
 
 /// Reads the covariance of (x, y, yaw), m and rad, by rows; `file` names it in errors. Lines that begin with `#`
@@ -16,16 +16,13 @@ pub fn covariance(input: impl Read, file: &str) -> Result<[[f64; 3]; 3], LogErro
         ["cov_yx", "cov_yy", "cov_yyaw"],
         ["cov_yawx", "cov_yawy", "cov_yawyaw"],
     ];
-    let mut reader = settings()
-        .has_headers(false)
-        .comment(Some(b'#'))
-        .from_reader(input);
+    let mut settings = settings();
+    settings.comment(Some(b'#'));
+    let mut records = Records::new(&settings, input, file);
     let mut rows = [[0.0; 3]; 3];
     let mut count = 0;
     let mut last = 0;
-    for record in reader.records() {
-        let record = record.map_err(|fault| SheetError::unreadable(file, last.max(1), fault))?;
-        let line = record.position().map_or(0, csv::Position::line);
+    while let Some((record, line)) = records.next()? {
         if record.iter().all(|text| text.trim().is_empty()) {
             continue;
         }

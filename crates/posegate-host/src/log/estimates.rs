@@ -126,7 +126,7 @@ impl<R: Read> Rows<R> {
     /// A [`LogError`] about the header.
     pub fn new(input: R, file: &str, columns: Columns) -> Result<Self, LogError> {
         let mut settings = settings();
-        settings.comment(Some(b'#')).flexible(false);
+        settings.comment(Some(b'#'));
         let sheet = Sheet::with(&settings, input, file)?;
         let required: &[&[&str]] = match columns {
             Columns::Estimates => &[&POSE, &COVARIANCE],

@@ -50,8 +50,32 @@ fn faults_have_line_and_column() {
     ] {
         assert_eq!(usual(text).unwrap_err(), format!("s.csv:{expected}"));
     }
-    let short = read(settings().flexible(false), "a,b\n1,2\n3\n").unwrap_err();
-    assert!(short.starts_with("s.csv:3: CSV error"), "{short}");
+}
+
+/// Lines are counted as an editor counts them: with blank lines, comments, line ends of Windows and fields of several lines.
+#[test]
+fn lines_are_those_of_an_editor() {
+    let mut settings = settings();
+    settings.comment(Some(b'#')).quoting(true);
+    for (text, place) in [
+        ("a,b\n1,2\n\n \n\n3,x\n", "6:2"),
+        ("a,b\n1,2\n\n3,x", "4:2"),
+        ("# sizes\n\na,b\n# 5\n1,2\n# 6\n# 7\n3,x\n# 8\n", "8:2"),
+        ("# sizes\na,c\n", "2:1"),
+        ("a,b,c\n1,2,\"p\nq\nr\"\n3,x,\"p\nq\"\n", "5:2"),
+        ("a,b\n1,2\n3", "3:2"),
+    ] {
+        for text in [text.to_owned(), text.replace('\n', "\r\n")] {
+            let error = read(&settings, &text).unwrap_err();
+            assert!(error.starts_with(&format!("s.csv:{place}:")), "{error}");
+        }
+    }
+    assert_eq!(usual("a,b\r\n\r\n1,2\r\n\r\n").unwrap(), [[1.0, 2.0]]);
+    let mut sheet = Sheet::new(&b"a,b\n1,2\n\n3,\xff\n"[..], "s.csv").unwrap();
+    sheet.line().unwrap();
+    let error = sheet.line().map(|_| ()).unwrap_err().to_string();
+    let expected = "s.csv:4:2: bytes that are not UTF-8; save the file as UTF-8";
+    assert_eq!(error, expected);
 }
 
 /// The mark may arrive byte by byte.
