@@ -24,6 +24,7 @@ const TRIG_ERROR: f64 = 4.0 * (f64::EPSILON / 2.0);
 const TINY: f64 = 1e-150;
 
 /// Returns a number below every number that rounds to `value`.
+#[inline]
 fn below(value: f64) -> f64 {
     if value.abs() >= TINY {
         value.next_down()
@@ -48,6 +49,7 @@ impl Interval {
     };
 
     /// Encloses one number exactly.
+    #[inline]
     #[must_use]
     pub const fn point(value: f64) -> Self {
         Self {
@@ -58,6 +60,7 @@ impl Interval {
 
     /// Rounds both ends one number outwards; an end that is NaN makes the interval everything. An end that is closer to zero than
     /// [`TINY`] becomes zero, or `TINY` on the other side of it.
+    #[inline]
     fn outwards(lo: f64, hi: f64) -> Self {
         if lo.is_nan() || hi.is_nan() {
             return Self::ENTIRE;
@@ -149,6 +152,7 @@ impl Interval {
 impl Add for Interval {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::outwards(self.lo + other.lo, self.hi + other.hi)
     }
@@ -157,6 +161,7 @@ impl Add for Interval {
 impl Sub for Interval {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self::outwards(self.lo - other.hi, self.hi - other.lo)
     }
@@ -165,6 +170,7 @@ impl Sub for Interval {
 impl Neg for Interval {
     type Output = Self;
 
+    #[inline]
     fn neg(self) -> Self {
         Self {
             lo: -self.hi,
@@ -176,6 +182,7 @@ impl Neg for Interval {
 impl Mul for Interval {
     type Output = Self;
 
+    #[inline]
     fn mul(self, other: Self) -> Self {
         let [a, b] = [self.lo * other.lo, self.lo * other.hi];
         let [c, d] = [self.hi * other.lo, self.hi * other.hi];
@@ -224,6 +231,7 @@ impl Scalar for Interval {
         }
     }
 
+    #[inline]
     fn square(self) -> Self {
         let (a, b) = (self.lo * self.lo, self.hi * self.hi);
         let straddles = self.lo <= 0.0 && self.hi >= 0.0;

@@ -150,15 +150,13 @@ impl Lattice {
         let n = self.len();
         let mut band = BandedMatrix::new(n, 2 * self.counts[1] * self.counts[2]);
         let mut right = std::vec![0.0; n];
-        for (index, spot) in spots.iter().enumerate() {
-            for a in 0..8 {
-                let weight = spot.weights[a];
-                right[spot.corners[a]] += pull[index] * weight;
-                for b in 0..8 {
-                    if spot.corners[b] <= spot.corners[a] {
-                        let product = price[index] * weight * spot.weights[b];
-                        band.add(spot.corners[a], spot.corners[b], product);
-                    }
+        for ((spot, price), pull) in spots.iter().zip(price).zip(pull) {
+            for (a, (corner, weight)) in spot.corners.iter().zip(spot.weights).enumerate() {
+                right[*corner] += pull * weight;
+                // The corners of a cell ascend.
+                let row = band.row(*corner);
+                for (below, other) in spot.corners.iter().zip(spot.weights).take(a + 1) {
+                    row[row.len() - 1 - (corner - below)] += price * weight * other;
                 }
             }
         }
@@ -363,6 +361,9 @@ pub(super) fn fit(
     target.fit(lattice, &all, &known, SmoothnessPenalty { bend, slope })
 }
 
+/// The number of columns that [`BandedMatrix::factorize`] subtracts at once.
+const TOGETHER: usize = 4;
+
 /// A symmetric matrix with a band around its diagonal: the lower half, row by row.
 struct BandedMatrix {
     n: usize,
@@ -397,32 +398,59 @@ impl BandedMatrix {
         }
     }
 
+    /// Returns row `i` of the band; its last element is on the diagonal.
+    fn row(&mut self, i: usize) -> &mut [f64] {
+        let length = self.width + 1;
+        &mut self.rows[i * length..(i + 1) * length]
+    }
+
     /// Returns the place of row `i`, column `j <= i` within the band.
     const fn place(&self, i: usize, j: usize) -> usize {
         i * (self.width + 1) + self.width + j - i
     }
 
-    /// Replaces the matrix by the factor `L` of `L L'`. Each finished column is subtracted from all that are right of it, so the numbers of
-    /// a row do not wait for each other.
+    /// Replaces the matrix by the factor `L` of `L L'`. Finished columns are subtracted from all that are right of them, [`TOGETHER`] at
+    /// once, so each number is loaded and stored only once for all of these.
     fn factorize(&mut self) {
-        let mut column = Vec::with_capacity(self.width);
-        for k in 0..self.n {
-            let below = k + 1..self.n.min(k + self.width + 1);
-            let diagonal = self.place(k, k);
-            let root = libm::sqrt(self.rows[diagonal].max(1e-12));
-            self.rows[diagonal] = root;
-            column.clear();
-            for i in below.clone() {
-                let place = self.place(i, k);
-                self.rows[place] /= root;
-                column.push(self.rows[place]);
+        let mut panel = [(); TOGETHER].map(|()| std::vec![0.0; self.width]);
+        for first in (0..self.n).step_by(TOGETHER) {
+            let next = self.n.min(first + TOGETHER);
+            for (k, column) in (first..next).zip(&mut panel) {
+                self.finish_column(k, next, column);
             }
-            for i in below {
-                let row = self.place(i, k + 1)..=self.place(i, i);
-                let factor = column[i - k - 1];
-                for (value, other) in self.rows[row].iter_mut().zip(&column) {
-                    *value -= factor * other;
+            let [a, b, c, d] = &panel;
+            for i in next..self.n.min(next + self.width) {
+                let factors = [a, b, c, d].map(|column| column[i - next]);
+                let row = self.place(i, next)..=self.place(i, i);
+                let columns = a.iter().zip(b).zip(c).zip(d);
+                for (value, (((a, b), c), d)) in self.rows[row].iter_mut().zip(columns) {
+                    *value -= factors[0] * a;
+                    *value -= factors[1] * b;
+                    *value -= factors[2] * c;
+                    *value -= factors[3] * d;
                 }
+            }
+        }
+    }
+
+    /// Finishes column `k`, subtracts it from the columns between it and `next`, and copies its rows from `next` on into `column`,
+    /// which is zero beyond the band.
+    fn finish_column(&mut self, k: usize, next: usize, column: &mut [f64]) {
+        let diagonal = self.place(k, k);
+        let root = libm::sqrt(self.rows[diagonal].max(1e-12));
+        self.rows[diagonal] = root;
+        column.fill(0.0);
+        for i in k + 1..self.n.min(k + self.width + 1) {
+            let place = self.place(i, k);
+            self.rows[place] /= root;
+            let factor = self.rows[place];
+            if i >= next {
+                column[i - next] = factor;
+            }
+            for j in k + 1..next.min(i + 1) {
+                let other = self.rows[self.place(j, k)];
+                let place = self.place(i, j);
+                self.rows[place] -= factor * other;
             }
         }
     }
@@ -493,6 +521,35 @@ mod tests {
                 lattice.spot(cell, [0, 1, 2].map(|i| axes[i].through(cell[i], at[i])))
             })
             .collect()
+    }
+
+    /// Systems of all sizes and bands around the number of columns that are subtracted at once.
+    #[test]
+    fn solution_of_a_banded_system_has_no_residual() {
+        for n in 1..=3 * TOGETHER {
+            for width in 0..n {
+                let number = |k: usize| rows(1 + k as u64).last().unwrap().1 - 0.5;
+                let element = |i: usize, j: usize| match i - j {
+                    0 => n as f64 + 1.0,
+                    apart if apart <= width => number(i * n + j),
+                    _ => 0.0,
+                };
+                let mut band = BandedMatrix::new(n, width);
+                for i in 0..n {
+                    for j in i.saturating_sub(width)..=i {
+                        band.add(i, j, element(i, j));
+                    }
+                }
+                let right: Vec<f64> = (0..n).map(|i| number(1_000 + i)).collect();
+                let mut found = right.clone();
+                band.solve(&mut found);
+                for (i, right) in right.iter().enumerate() {
+                    let product = |j: usize| element(i.max(j), i.min(j)) * found[j];
+                    let off = (0..n).map(product).sum::<f64>() - right;
+                    assert!(off.abs() < 1e-12, "n {n}, width {width}, row {i}: {off}");
+                }
+            }
+        }
     }
 
     #[test]

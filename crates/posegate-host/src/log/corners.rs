@@ -322,29 +322,50 @@ impl<'e> View<'e> {
         ))
     }
 
-    /// Returns the residual of each corner's pixels at a pose; `None` if a corner is not in front of the camera.
-    fn residuals(&self, pose: &Vector3<f64>) -> Option<Vec<f64>> {
-        let robot = Isometry3::from_parts(
-            Translation3::new(pose.x, pose.y, 0.0),
-            UnitQuaternion::from_euler_angles(0.0, 0.0, pose.z),
-        );
-        let to_mount = (robot * self.mount).inverse();
-        let mut residuals = Vec::with_capacity(2 * self.corners.len());
+    /// Calls `take` with the residual of each corner's pixels at a pose, until it returns `None`. Returns `None` then, and if a corner
+    /// is not in front of the camera.
+    fn each_residual(
+        &self,
+        pose: &Vector3<f64>,
+        mut take: impl FnMut([f64; 2]) -> Option<()>,
+    ) -> Option<()> {
+        let (sin, cos) = libm::sincos(pose.z);
         for (corner, [u, v]) in &self.corners {
-            let at = to_mount * corner;
+            let (x, y) = (corner.x - pose.x, corner.y - pose.y);
+            // In the robot's frame, then in the camera's.
+            let robot = Point3::new(cos * x + sin * y, cos * y - sin * x, corner.z);
+            let at = self.mount.inverse_transform_point(&robot);
             if !(at.x > 1e-3) {
                 return None;
             }
             let [pu, pv] = self.camera.project([-at.y / at.x, -at.z / at.x]);
-            residuals.extend([pu - u, pv - v]);
+            take([pu - u, pv - v])?;
         }
+        Some(())
+    }
+
+    /// As [`View::each_residual`], in one list.
+    fn residuals(&self, pose: &Vector3<f64>) -> Option<Vec<f64>> {
+        let mut residuals = Vec::with_capacity(2 * self.corners.len());
+        self.each_residual(pose, |residual| {
+            residuals.extend(residual);
+            Some(())
+        })?;
         Some(residuals)
     }
 
     fn cost(&self, pose: &Vector3<f64>) -> Option<f64> {
-        let residuals = self.residuals(pose)?;
-        let cost: f64 = residuals.iter().map(|value| value * value).sum();
-        cost.is_finite().then_some(cost)
+        self.cost_below(pose, f64::INFINITY)
+    }
+
+    /// Returns the cost at a pose if it is less than `level`.
+    fn cost_below(&self, pose: &Vector3<f64>, level: f64) -> Option<f64> {
+        let mut cost = 0.0;
+        self.each_residual(pose, |[u, v]| {
+            cost = cost + u * u + v * v;
+            (cost < level).then_some(())
+        })?;
+        Some(cost)
     }
 
     /// Returns the columns of the Jacobian of the residuals at a pose: by x, y and yaw.
@@ -373,8 +394,7 @@ impl<'e> View<'e> {
     /// every sampled pose whose cost is below a level. `None` if the factor would be above 4.
     fn grown(&self, pose: &Vector3<f64>, root: &Matrix3<f64>, level: f64) -> Option<f64> {
         let fits = |ray: &Vector3<f64>, radii: f64| {
-            self.cost(&(pose + ray * radii))
-                .is_some_and(|cost| cost < level)
+            self.cost_below(&(pose + ray * radii), level).is_some()
         };
         let mut most = 1.0_f64;
         for k in 0..RAYS {
