@@ -424,7 +424,8 @@ fn contained_place_has_a_margin_of_at_least_1() {
 fn margin_holds_for_every_mounting_error_within_the_reserve() {
     let folder = tempfile::tempdir().unwrap();
     let line = "--free x=0.3:7,yaw_deg=150:210 --budget 60 --objective contained-cost";
-    for (more, [metres, degrees]) in [("", [0.01, 0.5]), (" --reserve 0.04,3", [0.04, 3.0])] {
+    let reserves = [("", [0.01, 0.5]), (" --reserve 0.04,3", [0.04, 3.0])];
+    for (more, [metres, degrees]) in counts::one_a_day(&reserves) {
         let held = json(SITE, &place("0.1", &format!("{line}{more}")), 0);
         assert_eq!(number(&held["reserve"], "translation"), metres, "{held}");
         assert_eq!(number(&held["reserve"], "yaw_deg"), degrees, "{held}");

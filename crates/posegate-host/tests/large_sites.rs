@@ -2,7 +2,7 @@
 //! the file and any faults.
 
 #[allow(dead_code)]
-use posegate_testkit::plant;
+use posegate_testkit::{counts, plant};
 
 use posegate_host::site::{Site, SiteIndex};
 use posegate_host::site_build::{Inventory, Piece, Recipe, Shard, part};
@@ -456,7 +456,7 @@ fn edited(text: &str, edit: &Edit) -> String {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4_000))]
+    #![proptest_config(ProptestConfig::with_cases(counts::cases(4_000) as u32))]
 
     /// For any edit of a file, the tasks of every shard equal those of the complete site. If the complete site has a
     /// fault, at least one shard reads the complete file and finds it.

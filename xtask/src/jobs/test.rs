@@ -62,6 +62,7 @@ pub fn deep(_: &Arguments) -> Result {
     cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib")
         .words("--test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot")
         .words("--test cheapest_chains --test other_tags --test pose_set_proofs --test stricter_sets --test worst_pose")
+        .words("--test large_sites --test table_faults")
         .env("POSEGATE_DEEP", "1")
         .run()?;
     // Those of recordings are run by `recorded`.
