@@ -305,7 +305,10 @@ fn bad_tables_and_recordings_are_refused() {
         ("x_m,y_m\n0,0\n".to_string(), "yaw_rad"),
         (HEADER.replace("cov_yy,", ""), "cov_yy"),
         (format!("{HEADER}0,0,zero,0,1,0,0,1,0,1\n"), "zero"),
-        (format!("{HEADER}0,0,0,0,1,0,0\n"), "line: 2"),
+        (
+            format!("{HEADER}0,0,0,0,1,0,0\n"),
+            "bad.csv:2:8: 7 fields; the header has 10",
+        ),
         (
             format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,\"1e-5\n"),
             "\"1e-5",

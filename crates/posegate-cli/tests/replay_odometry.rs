@@ -148,7 +148,7 @@ fn faulty_odometry_is_refused_with_its_line() {
         ),
         (
             with_row("0.06,0,0"),
-            &["odom.csv", "line: 5", "3 fields", "has 4 fields"],
+            &["odom.csv:5:4: 3 fields; the header has 4"],
         ),
         (
             with_row("0.06,0,nan,0"),
