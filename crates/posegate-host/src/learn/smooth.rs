@@ -420,14 +420,17 @@ impl BandedMatrix {
             }
             let [a, b, c, d] = &panel;
             for i in next..self.n.min(next + self.width) {
-                let factors = [a, b, c, d].map(|column| column[i - next]);
+                let (of_a, of_b, of_c, of_d) = (a[i - next], b[i - next], c[i - next], d[i - next]);
                 let row = self.place(i, next)..=self.place(i, i);
-                let columns = a.iter().zip(b).zip(c).zip(d);
-                for (value, (((a, b), c), d)) in self.rows[row].iter_mut().zip(columns) {
-                    *value -= factors[0] * a;
-                    *value -= factors[1] * b;
-                    *value -= factors[2] * c;
-                    *value -= factors[3] * d;
+                let row = &mut self.rows[row];
+                // Of one length, so that no index is checked.
+                let length = row.len();
+                let (a, b, c, d) = (&a[..length], &b[..length], &c[..length], &d[..length]);
+                for (j, value) in row.iter_mut().enumerate() {
+                    *value -= of_a * a[j];
+                    *value -= of_b * b[j];
+                    *value -= of_c * c[j];
+                    *value -= of_d * d[j];
                 }
             }
         }
