@@ -56,6 +56,14 @@ pub enum SheetFault {
     /// A field is not text.
     #[error("bytes that are not UTF-8; save the file as UTF-8")]
     NotText,
+    /// A carriage return is not part of a line end.
+    #[error(
+        "a carriage return without a line feed; save the file with lines that end with a line feed"
+    )]
+    CarriageReturn,
+    /// A quote has no second one.
+    #[error("a quote that is not closed; close it, or leave both quotes out")]
+    OpenQuote,
     /// The input cannot be read.
     #[error("{0}")]
     Csv(csv::Error),
@@ -69,15 +77,6 @@ impl SheetError {
             line,
             column,
             fault: Box::new(fault),
-        }
-    }
-
-    fn unreadable(file: &str, line: u64, fault: csv::Error) -> Self {
-        match fault.kind() {
-            csv::ErrorKind::Utf8 { err, .. } => {
-                Self::new(file, line, Some(err.field() + 1), SheetFault::NotText)
-            }
-            _ => Self::new(file, line, None, SheetFault::Csv(fault)),
         }
     }
 }
@@ -116,7 +115,7 @@ pub fn settings() -> csv::ReaderBuilder {
     let mut settings = csv::ReaderBuilder::new();
     // Numbers need no quotes. An unclosed quote would hide the rest of the file.
     settings.quoting(false);
-    // A line feed ends a record, so the line feeds before its end tell its number. A carriage return is white space.
+    // Only a line feed ends a record, so the line number of a record follows from the line feeds up to its end.
     settings.terminator(csv::Terminator::Any(b'\n'));
     settings.has_headers(false).flexible(true);
     settings
@@ -135,7 +134,8 @@ pub fn each<A, T: Copy + Default, E, const N: usize>(
 }
 
 impl<R: Read> Records<R> {
-    /// Starts before the first line. The settings are [`settings()`] with what this file has besides; `file` names the input in errors.
+    /// Starts before the first line. `settings` are those of [`settings()`], perhaps with comments or quotes; `file` names the input in
+    /// errors.
     pub fn new(settings: &csv::ReaderBuilder, input: R, file: &str) -> Self {
         Self {
             file: file.to_owned(),
@@ -146,18 +146,42 @@ impl<R: Read> Records<R> {
     }
 
     /// Returns the fields of the next line and its number, from 1; `None` at the end. Fields are not trimmed: a trimmed copy of each
-    /// row would take as long as its numbers.
+    /// row would take as long as its numbers. The last field may end with the carriage return of a line end.
+    ///
+    /// # Errors
+    /// [`SheetFault::NotText`], [`SheetFault::CarriageReturn`], [`SheetFault::OpenQuote`], [`SheetFault::Csv`].
     pub fn next(&mut self) -> Result<Option<(&csv::StringRecord, u64)>, SheetError> {
         loop {
-            let more = self.reader.read_record(&mut self.record);
-            let ends_before = self.reader.position().line();
-            // A field in quotes may have several lines.
-            let within = self.record.as_slice().matches('\n').count() as u64;
-            self.number = ends_before.saturating_sub(1 + within).max(1);
-            if !more.map_err(|fault| SheetError::unreadable(&self.file, self.number, fault))? {
-                return Ok(None);
+            let mut bytes = std::mem::take(&mut self.record).into_byte_record();
+            let more = self.reader.read_byte_record(&mut bytes);
+            let reached = self.reader.position().line();
+            let fault = |line: u64, column: Option<usize>, fault: SheetFault| {
+                Err(SheetError::new(&self.file, line, column, fault))
+            };
+            match more {
+                Ok(true) => {}
+                Ok(false) => return Ok(None),
+                Err(cause) => return fault(reached, None, SheetFault::Csv(cause)),
             }
-            let is_blank = self.record.len() == 1 && self.record.as_slice().trim().is_empty();
+            // A field in quotes may have several lines. An open quote has all lines of the rest, and the line feed after the end.
+            let text = bytes.as_slice();
+            let within = text.iter().filter(|byte| **byte == b'\n').count() as u64;
+            if text.ends_with(b"\n") {
+                return fault(reached.saturating_sub(within), None, SheetFault::OpenQuote);
+            }
+            self.number = reached.saturating_sub(1 + within);
+            let is_lone = |pair: &[u8]| pair[0] == b'\r' && !matches!(pair[1], b'\r' | b'\n');
+            if text.windows(2).any(is_lone) {
+                return fault(self.number, None, SheetFault::CarriageReturn);
+            }
+            let is_blank = bytes.len() == 1 && text.iter().all(|byte| *byte == b'\r');
+            self.record = match csv::StringRecord::from_byte_record(bytes) {
+                Ok(record) => record,
+                Err(error) => {
+                    let column = error.utf8_error().field() + 1;
+                    return fault(self.number, Some(column), SheetFault::NotText);
+                }
+            };
             if !is_blank {
                 return Ok(Some((&self.record, self.number)));
             }

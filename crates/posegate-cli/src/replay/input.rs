@@ -4,7 +4,7 @@ use super::Arguments;
 use super::arguments::Kind;
 use super::inflation::Inflated;
 use crate::site_input::Failure;
-use posegate_host::files::{FileError, Files, Input, Opened, text};
+use posegate_host::files::{FileError, Files, Input, Opened};
 use posegate_host::log::corners::MountedCamera;
 use posegate_host::log::recording::{
     Bag, Format, ReaderDiagnostics, Recording, Role, TagLocalizer, Text, Wanted, format_of,
@@ -212,7 +212,8 @@ fn truth(
             track
         }
         Format::Tum => {
-            let text = text(bytes, &name)?;
+            // A comment may have another encoding; numbers have none.
+            let text = String::from_utf8_lossy(&bytes);
             let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
             Trajectory::of(&poses, arguments.truth_gap)
         }

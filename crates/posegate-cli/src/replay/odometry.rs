@@ -4,7 +4,7 @@ use super::Arguments;
 use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
-use posegate_host::files::{Files, Input, text};
+use posegate_host::files::{Files, Input};
 use posegate_host::log::recording::{
     Bag, Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
 };
@@ -44,7 +44,8 @@ fn of_file(from: &Input, files: &Files) -> Result<Vec<OdometryPose>, Failure> {
     match format_of(&bytes) {
         Format::Csv => odometry_csv(bytes.as_slice(), &name).map_err(Failure::input),
         Format::Tum => {
-            let text = text(bytes, &name)?;
+            // A comment may have another encoding; numbers have none.
+            let text = String::from_utf8_lossy(&bytes);
             let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
             Ok(poses.iter().map(|pose| (pose.t_s, pose.level())).collect())
         }

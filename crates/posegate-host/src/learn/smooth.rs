@@ -153,7 +153,7 @@ impl Lattice {
         for ((spot, price), pull) in spots.iter().zip(price).zip(pull) {
             for (a, (corner, weight)) in spot.corners.iter().zip(spot.weights).enumerate() {
                 right[*corner] += pull * weight;
-                // The corners of a cell ascend.
+                // The corners of a cell ascend, so only the first `a + 1` are in the lower half.
                 let row = band.row(*corner);
                 for (below, other) in spot.corners.iter().zip(spot.weights).take(a + 1) {
                     row[row.len() - 1 - (corner - below)] += price * weight * other;
@@ -423,7 +423,7 @@ impl BandedMatrix {
                 let (of_a, of_b, of_c, of_d) = (a[i - next], b[i - next], c[i - next], d[i - next]);
                 let row = self.place(i, next)..=self.place(i, i);
                 let row = &mut self.rows[row];
-                // Of one length, so that no index is checked.
+                // All slices have one length, so the compiler removes the checks of the index.
                 let length = row.len();
                 let (a, b, c, d) = (&a[..length], &b[..length], &c[..length], &d[..length]);
                 for (j, value) in row.iter_mut().enumerate() {

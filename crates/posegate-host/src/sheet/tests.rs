@@ -58,12 +58,13 @@ fn lines_are_those_of_an_editor() {
     let mut settings = settings();
     settings.comment(Some(b'#')).quoting(true);
     for (text, place) in [
-        ("a,b\n1,2\n\n \n\n3,x\n", "6:2"),
+        ("a,b\n1,2\n\n\n3,x\n", "5:2"),
         ("a,b\n1,2\n\n3,x", "4:2"),
         ("# sizes\n\na,b\n# 5\n1,2\n# 6\n# 7\n3,x\n# 8\n", "8:2"),
         ("# sizes\na,c\n", "2:1"),
         ("a,b,c\n1,2,\"p\nq\nr\"\n3,x,\"p\nq\"\n", "5:2"),
         ("a,b\n1,2\n3", "3:2"),
+        ("a,b\n1,2\n \n", "3:2"),
     ] {
         for text in [text.to_owned(), text.replace('\n', "\r\n")] {
             let error = read(&settings, &text).unwrap_err();
@@ -76,6 +77,41 @@ fn lines_are_those_of_an_editor() {
     let error = sheet.line().map(|_| ()).unwrap_err().to_string();
     let expected = "s.csv:4:2: bytes that are not UTF-8; save the file as UTF-8";
     assert_eq!(error, expected);
+    // The first line of a row of several lines, also if the row has another fault.
+    for (text, expected) in [
+        (&b"a,b\n1,2\n\"3\n\",\xff\n"[..], "s.csv:3:2: bytes"),
+        (b"a,b\n1,2\n3,\"4\n5,6\n", "s.csv:3: a quote"),
+        (b"a,b\r\n1,2\r\n3,\"4", "s.csv:3: a quote"),
+    ] {
+        let mut sheet = Sheet::with(&settings, text, "s.csv").unwrap();
+        sheet.line().unwrap();
+        let error = sheet.line().map(|_| ()).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
+}
+
+/// A file whose lines end with carriage returns alone would be one header.
+#[test]
+fn carriage_returns_without_line_feeds_are_refused() {
+    for (text, line) in [
+        ("a,b,note\r1,2,x\r", 1),
+        ("a,b\n1,2\n3\r,4\n", 3),
+        ("a,b\r\n1,2\r3,4\r\n", 2),
+    ] {
+        let error = usual(text).unwrap_err();
+        let place = format!("s.csv:{line}: a carriage return without a line feed");
+        assert!(error.starts_with(&place), "{error}");
+    }
+    assert_eq!(usual("a,b\r\r\n1,2\r\r\n").unwrap(), [[1.0, 2.0]]);
+}
+
+#[test]
+fn line_that_cannot_be_read_is_named() {
+    let text = format!("a,b\n1,2\n{}", "3".repeat(2 << 20));
+    let mut sheet = Sheet::new(crate::input::Lines::new(text.as_bytes()), "s.csv").unwrap();
+    sheet.line().unwrap();
+    let error = sheet.line().map(|_| ()).unwrap_err().to_string();
+    assert!(error.starts_with("s.csv:3: "), "{error}");
 }
 
 /// The mark may arrive byte by byte.
