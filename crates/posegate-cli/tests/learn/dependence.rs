@@ -133,27 +133,25 @@ const QUANTILES: [f64; 5] = [0.5, 0.8, 0.9, 0.95, 0.99];
 /// differ as a whole (`scale`).
 fn check(seeds: u64, cases: &[(f64, f64)]) {
     for (scale, quantile) in cases.iter().copied() {
+        // Of 60 approaches that differ as a whole, fewer than the 499 detections that a share of 0.99 needs are independent.
+        let runs = if quantile < 0.99 { 60 } else { 180 };
         let models = (0..seeds).filter_map(|seed| {
-            let detections = SQUARES.approaches(60, 0.9, scale, 7919 * seed + 13);
+            let detections = SQUARES.approaches(runs, 0.9, scale, 7919 * seed + 13);
             let model = learnt(&detections, quantile).ok()?;
             let (rows, independent) = model.independent();
             assert!(
-                rows == 6000 && independent > 100 && independent < rows / 3,
+                rows == 100 * u64::from(runs) && independent > 100 && independent < rows / 3,
                 "{independent}"
             );
-            assert_eq!(model.runs(), Some(60));
+            assert_eq!(model.runs(), Some(runs.into()));
             Some(model)
         });
         let low = low(models, scale, quantile);
         low.check(&format!(
-            "60 x 100 frames, Q {quantile}, scale {scale}, {seeds} data sets"
+            "{runs} x 100 frames, Q {quantile}, scale {scale}, {seeds} data sets"
         ));
-        // Fewer than one model in ten is refused. At 0.99 some data sets have too few independent rows.
-        let least = if quantile < 0.99 { 0.9 } else { 0.6 };
-        assert!(
-            low.models as f64 >= least * seeds as f64,
-            "{low:?} of {seeds}"
-        );
+        // Fewer than one model in ten is refused.
+        assert!(10 * low.models >= 9 * seeds, "{low:?} of {seeds}");
         assert!(low.share() <= 0.05, "{quantile} {scale}: {low:?}");
     }
 }
