@@ -53,7 +53,7 @@ pub enum SheetFault {
     /// A fault that only the reader of this kind of file knows.
     #[error("{0}")]
     Other(String),
-    /// A field is not text.
+    /// A field is not UTF-8.
     #[error("bytes that are not UTF-8; save the file as UTF-8")]
     NotText,
     /// A carriage return is not part of a line end.
@@ -61,7 +61,7 @@ pub enum SheetFault {
         "a carriage return without a line feed; save the file with lines that end with a line feed"
     )]
     CarriageReturn,
-    /// A quote has no second one.
+    /// An opening quote has no closing quote.
     #[error("a quote that is not closed; close it, or leave both quotes out")]
     OpenQuote,
     /// The input cannot be read.
@@ -139,6 +139,7 @@ impl<R: Read> Records<R> {
     pub fn new(settings: &csv::ReaderBuilder, input: R, file: &str) -> Self {
         Self {
             file: file.to_owned(),
+            // A line feed ends the last line, too.
             reader: settings.from_reader(input.chain(&b"\n"[..])),
             record: csv::StringRecord::new(),
             number: 0,
@@ -163,7 +164,7 @@ impl<R: Read> Records<R> {
                 Ok(false) => return Ok(None),
                 Err(cause) => return fault(reached, None, SheetFault::Csv(cause)),
             }
-            // A field in quotes may have several lines. An open quote has all lines of the rest, and the line feed after the end.
+            // A field in quotes may have several lines. A field whose quote is not closed ends with the line feed that `new` adds.
             let text = bytes.as_slice();
             let within = text.iter().filter(|byte| **byte == b'\n').count() as u64;
             if text.ends_with(b"\n") {

@@ -74,17 +74,6 @@ pub struct Opened {
 const STDIN: &str = "<stdin>";
 const STDOUT: &str = "<stdout>";
 
-/// Returns the bytes of an input as text; `name` is used in the error.
-///
-/// # Errors
-/// [`FileError::NotText`].
-pub fn text(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
-    String::from_utf8(bytes).map_err(|error| FileError::NotText {
-        name: name.to_owned(),
-        cause: error.utf8_error(),
-    })
-}
-
 impl Files {
     /// Creates the files of a command; only standard output is declared.
     #[must_use]
@@ -228,7 +217,13 @@ impl Files {
     /// As [`Files::read`]; [`FileError::NotText`] if the input is not UTF-8.
     pub fn read_text(&self, input: &Input) -> Result<(String, String), FileError> {
         let (bytes, name) = self.read(input)?;
-        Ok((text(bytes, &name)?, name))
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok((text, name)),
+            Err(error) => Err(FileError::NotText {
+                name,
+                cause: error.utf8_error(),
+            }),
+        }
     }
 
     /// Begins an output file.

@@ -154,9 +154,8 @@ impl Lattice {
             for (a, (corner, weight)) in spot.corners.iter().zip(spot.weights).enumerate() {
                 right[*corner] += pull * weight;
                 // The corners of a cell ascend, so only the first `a + 1` are in the lower half.
-                let row = band.row(*corner);
                 for (below, other) in spot.corners.iter().zip(spot.weights).take(a + 1) {
-                    row[row.len() - 1 - (corner - below)] += price * weight * other;
+                    band.add(*corner, *below, price * weight * other);
                 }
             }
         }
@@ -398,12 +397,6 @@ impl BandedMatrix {
         }
     }
 
-    /// Returns row `i` of the band; its last element is on the diagonal.
-    fn row(&mut self, i: usize) -> &mut [f64] {
-        let length = self.width + 1;
-        &mut self.rows[i * length..(i + 1) * length]
-    }
-
     /// Returns the place of row `i`, column `j <= i` within the band.
     const fn place(&self, i: usize, j: usize) -> usize {
         i * (self.width + 1) + self.width + j - i
@@ -495,12 +488,14 @@ mod tests {
         ]
     }
 
+    /// Returns a number uniform between 0 and 1.
+    fn even(k: u64) -> f64 {
+        let bits = crate::learn::random::mixed(k) >> 11;
+        bits as f64 / (1u64 << 53) as f64
+    }
+
     /// Rows all over the lattice, each with a number uniform between 0 and 1.
     fn rows(n: u64) -> Vec<([f64; 3], f64)> {
-        let even = |k: u64| {
-            let bits = crate::learn::random::mixed(k) >> 11;
-            bits as f64 / (1u64 << 53) as f64
-        };
         (0..n)
             .map(|k| {
                 let at = [
@@ -531,7 +526,7 @@ mod tests {
     fn solution_of_a_banded_system_has_no_residual() {
         for n in 1..=3 * TOGETHER {
             for width in 0..n {
-                let number = |k: usize| rows(1 + k as u64).last().unwrap().1 - 0.5;
+                let number = |k: usize| even(k as u64) - 0.5;
                 let element = |i: usize, j: usize| match i - j {
                     0 => n as f64 + 1.0,
                     apart if apart <= width => number(i * n + j),

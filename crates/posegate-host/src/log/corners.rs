@@ -354,6 +354,7 @@ impl<'e> View<'e> {
         Some(residuals)
     }
 
+    /// Returns the sum of the squared residuals at a pose, px^2; `None` if it is not finite, or as for [`View::each_residual`].
     fn cost(&self, pose: &Vector3<f64>) -> Option<f64> {
         self.cost_below(pose, f64::INFINITY)
     }

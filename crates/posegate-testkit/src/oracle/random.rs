@@ -17,8 +17,8 @@ impl Rng {
         Self(seed)
     }
 
-    /// Returns sixteen generators with different numbers: so many parts of a long test can run in parallel, with the same result for
-    /// any number of threads.
+    /// Returns sixteen generators with different numbers. The parts of a long test that use them can run in parallel, with the same
+    /// result for any number of threads.
     pub fn streams(seed: u64) -> [Self; 16] {
         core::array::from_fn(|stream| Self::new(seed.wrapping_add((stream as u64) << 40)))
     }

@@ -1,9 +1,8 @@
 //! The state of the interlock over time, open or shut for a reason, in a limited number of spans.
 
+use super::spans::{Joined, Spans};
 use posegate::gate::Reason;
 
-/// The most spans.
-const MOST: usize = 512;
 /// Open, and each code of a reason.
 const STATES: usize = 64;
 
@@ -14,10 +13,6 @@ pub struct LaneSpan {
 }
 
 impl LaneSpan {
-    const EMPTY: Self = Self {
-        seconds: [0.0; STATES],
-    };
-
     /// Returns the time for which the interlock was open, seconds.
     #[must_use]
     pub fn open_s(&self) -> f64 {
@@ -39,6 +34,12 @@ impl LaneSpan {
     fn of(&self, state: usize) -> f64 {
         self.seconds.get(state).copied().unwrap_or(0.0)
     }
+}
+
+impl Joined for LaneSpan {
+    const EMPTY: Self = Self {
+        seconds: [0.0; STATES],
+    };
 
     fn joined(&self, other: &Self) -> Self {
         let mut joined = *self;
@@ -51,70 +52,44 @@ impl LaneSpan {
 
 /// The states of the interlock over time.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Lanes {
-    start_s: f64,
-    width_s: f64,
-    spans: Vec<LaneSpan>,
-    /// The last span with a state.
-    last: usize,
-}
+pub struct Lanes(Spans<LaneSpan>);
 
 impl Lanes {
     /// Returns the time of the first step, seconds.
     #[must_use]
     pub const fn start_s(&self) -> f64 {
-        self.start_s
+        self.0.start_s
     }
 
     /// Returns the length of a span, seconds.
     #[must_use]
     pub const fn width_s(&self) -> f64 {
-        self.width_s
+        self.0.width_s
     }
 
     /// Returns the spans up to the last one with a state.
     #[must_use]
     pub fn spans(&self) -> &[LaneSpan] {
-        self.spans.get(..=self.last).unwrap_or(&[])
+        self.0.spans()
     }
 
     /// Adds a state from one time to another: open, or shut for a reason.
     pub(super) fn add(&mut self, from_s: f64, to_s: f64, shut: Option<Reason>) {
-        if self.spans.is_empty() {
-            self.start_s = from_s;
-            self.width_s = 1.0 / 1024.0;
-            self.spans = vec![LaneSpan::EMPTY; MOST];
-        }
-        let (from, to) = (from_s - self.start_s, to_s - self.start_s);
+        self.0.start(from_s);
+        let (from, to) = (from_s - self.0.start_s, to_s - self.0.start_s);
         if !(from >= 0.0 && to > from && to.is_finite()) {
             return;
         }
-        while to >= self.width_s * MOST as f64 {
-            self.halve();
-        }
+        self.0.reach(to);
+        let width = self.0.width_s;
         let state = shut.map_or(0, |reason| usize::from(reason.code()));
-        let place = |time: f64| ((time / self.width_s) as usize).min(MOST - 1);
-        let (first, last) = (place(from), place(to));
-        self.last = self.last.max(last);
-        let width = self.width_s;
-        let within = self.spans.iter_mut().enumerate().take(last + 1).skip(first);
-        for (index, span) in within {
+        for (index, span) in self.0.between(from, to) {
             let begins = index as f64 * width;
             let part = to.min(begins + width) - from.max(begins);
             if let Some(sum) = span.seconds.get_mut(state) {
                 *sum += part.max(0.0);
             }
         }
-    }
-
-    /// Joins each pair of spans into one.
-    fn halve(&mut self) {
-        self.width_s *= 2.0;
-        self.last /= 2;
-        let (pairs, _) = self.spans.as_chunks::<2>();
-        let mut joined: Vec<LaneSpan> = pairs.iter().map(|[a, b]| a.joined(b)).collect();
-        joined.resize(MOST, LaneSpan::EMPTY);
-        self.spans = joined;
     }
 }
 

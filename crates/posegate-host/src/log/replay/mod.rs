@@ -82,6 +82,7 @@ mod play;
 mod refused;
 mod row;
 mod rules;
+mod spans;
 mod stanford;
 mod summary;
 mod tally;

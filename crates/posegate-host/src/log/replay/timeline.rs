@@ -1,10 +1,7 @@
-//! Verdicts over time, in a limited number of spans, so that a picture of an hour is not larger than that of a
-//! minute.
+//! Verdicts over time, in a limited number of spans.
 
 use super::Row;
-
-/// The most spans.
-const MOST: usize = 512;
+use super::spans::{Joined, Spans};
 
 /// A span of time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,7 +57,7 @@ impl RuleCounts {
     }
 }
 
-impl Bucket {
+impl Joined for Bucket {
     const EMPTY: Self = Self {
         estimates: 0,
         permits: 0,
@@ -90,11 +87,7 @@ impl Bucket {
 /// Verdicts over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Timeline {
-    start_s: f64,
-    width_s: f64,
-    buckets: Vec<Bucket>,
-    /// The last span with an estimate.
-    last: usize,
+    spans: Spans<Bucket>,
     without_time: u64,
 }
 
@@ -102,20 +95,20 @@ impl Timeline {
     /// Returns the first estimate's time, seconds.
     #[must_use]
     pub const fn start_s(&self) -> f64 {
-        self.start_s
+        self.spans.start_s
     }
 
     /// Returns the length of a span, seconds.
     #[must_use]
     pub const fn width_s(&self) -> f64 {
-        self.width_s
+        self.spans.width_s
     }
 
     /// Returns the spans up to the last one with an estimate. The first span also holds everything before the first
     /// estimate's time.
     #[must_use]
     pub fn buckets(&self) -> &[Bucket] {
-        self.buckets.get(..=self.last).unwrap_or(&[])
+        self.spans.spans()
     }
 
     /// Returns the number of estimates in no span: their time is not finite.
@@ -127,22 +120,13 @@ impl Timeline {
     pub(super) fn note(&mut self, row: &Row) {
         let now_s = row.now_s();
         // The difference of two finite times may overflow.
-        let is_first = self.buckets.is_empty();
-        if !(now_s.is_finite() && (is_first || (now_s - self.start_s).is_finite())) {
+        let is_first = self.spans.is_empty();
+        if !(now_s.is_finite() && (is_first || (now_s - self.spans.start_s).is_finite())) {
             self.without_time += 1;
             return;
         }
-        if is_first {
-            self.start_s = now_s;
-            self.width_s = 1.0 / 1024.0;
-            self.buckets = vec![Bucket::EMPTY; MOST];
-        }
-        while now_s - self.start_s >= self.width_s * MOST as f64 {
-            self.halve();
-        }
-        let place = (now_s - self.start_s) / self.width_s;
-        let place = (place.max(0.0) as usize).min(MOST - 1);
-        self.last = self.last.max(place);
+        self.spans.start(now_s);
+        let since_s = now_s - self.spans.start_s;
         let is_outside = row.against.is_some_and(|against| !against.inside);
         let one = Bucket {
             estimates: 1,
@@ -153,18 +137,9 @@ impl Timeline {
             most_age_s: row.age_s().unwrap_or(0.0),
             rules: row.rules.map(|permits| RuleCounts::of(permits, is_outside)),
         };
-        if let Some(bucket) = self.buckets.get_mut(place) {
+        self.spans.reach(since_s);
+        for (_, bucket) in self.spans.between(since_s, since_s) {
             *bucket = bucket.joined(&one);
         }
-    }
-
-    /// Joins each pair of spans into one.
-    fn halve(&mut self) {
-        self.width_s *= 2.0;
-        self.last /= 2;
-        let (pairs, _) = self.buckets.as_chunks::<2>();
-        let mut joined: Vec<Bucket> = pairs.iter().map(|[a, b]| a.joined(b)).collect();
-        joined.resize(MOST, Bucket::EMPTY);
-        self.buckets = joined;
     }
 }
