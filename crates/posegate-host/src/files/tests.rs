@@ -140,3 +140,17 @@ fn drafts_are_removed_and_open_no_existing_file() {
     assert_eq!(fs::read(&out).unwrap(), b"new");
     assert_eq!(fs::read(&taken).unwrap(), b"taken");
 }
+
+#[test]
+fn text_is_utf_8() {
+    let (_linked_file, path, _) = linked_file();
+    let files = Files::new();
+    let (text, name) = files.read_text(&input(&path)).unwrap();
+    assert_eq!((text.as_str(), name), ("input", path.display().to_string()));
+    fs::write(&path, b"in\xffput").unwrap();
+    let error = Files::new().read_text(&input(&path)).unwrap_err();
+    assert!(
+        error.to_string().contains("in: not UTF-8: ") && error.to_string().ends_with("index 2"),
+        "{error}"
+    );
+}
