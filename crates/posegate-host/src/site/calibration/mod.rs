@@ -65,16 +65,17 @@ pub(super) fn read(
         text: &text,
     };
     let document = Document::new(source, &MANNER)?;
-    let keys = document.keys()?;
-    let numbers = if keys.iter().any(|key| is_camera(key)) {
-        kalibr::read(&document, camera)?
-    } else if keys.iter().any(|key| key == "camera_matrix") {
+    let root = document.parse()?;
+    let keys = document.map(&root)?;
+    let numbers = if keys.keys().any(is_camera) {
+        kalibr::read(&document, keys, camera)?
+    } else if keys.has("camera_matrix") {
         if let Some(camera) = camera {
             return Err(node
                 .error(format!("{name} is a ROS calibration, of one camera"))
                 .help(format!("remove `#{camera}`")));
         }
-        ros::read(&document)?
+        ros::read(&document, keys)?
     } else {
         return Err(source
             .error(0..0, "the file is not a known kind of calibration")

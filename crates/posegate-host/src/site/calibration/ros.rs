@@ -1,21 +1,8 @@
 //! The calibration file of ROS's camera_calibration_parsers.
 
-use serde::Deserialize;
-
 use super::{Numbers, ParsedCalibration, lens};
 use crate::site::error::SiteError;
-use crate::site::yaml::{Document, Matrix, Spanned, plain};
-
-#[derive(Deserialize)]
-struct File {
-    image_width: Option<Spanned<u32>>,
-    image_height: Option<Spanned<u32>>,
-    camera_matrix: Option<Spanned<Matrix>>,
-    distortion_model: Option<Spanned<String>>,
-    distortion_coefficients: Option<Spanned<Matrix>>,
-    rectification_matrix: Option<Spanned<Matrix>>,
-    projection_matrix: Option<Spanned<Matrix>>,
-}
+use crate::site::yaml::{Document, Map, Node};
 
 const AS_SAVED: &str = "copy the calibration file again as cameracalibrator saved it (ost.yaml)";
 
@@ -26,17 +13,24 @@ const CALIBRATE: &str = "calibrate it: ros2 run camera_calibration cameracalibra
 
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
-pub(super) fn read(document: &Document<'_>) -> Result<ParsedCalibration, SiteError> {
-    let file: File = document.read()?;
-    let width = document.required(file.image_width, 0..0, "image_width", AS_SAVED)?;
-    let height = document.required(file.image_height, 0..0, "image_height", AS_SAVED)?;
+pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalibration, SiteError> {
+    let required = |name: &str, help: &str| document.required(file.get(name), 0..0, name, help);
+    let width = required("image_width", AS_SAVED)?;
+    let height = required("image_height", AS_SAVED)?;
+    let size_px = [
+        f64::from(document.whole(width)?),
+        f64::from(document.whole(height)?),
+    ];
 
-    let list = data(document, file.camera_matrix, "camera_matrix")?;
+    let list = data(
+        document,
+        required("camera_matrix", AS_SAVED)?,
+        "camera_matrix",
+    )?;
     let [fx, skew, cx, lower, fy, cy, rest @ ..]: [f64; 9] =
-        document.numbers(&list, "camera_matrix")?;
+        document.numbers(list, "camera_matrix")?;
     let fault = |at: usize, what: &str, expected: &str, help: &str| {
-        let place = list.value.get(at).map_or(list.referenced, |v| v.referenced);
-        let error = document.error(document.span(place), what);
+        let error = document.error(document.place_of(list, at), what);
         Err(error.expected(expected).help(help))
     };
     if fx == 0.0 {
@@ -54,45 +48,46 @@ pub(super) fn read(document: &Document<'_>) -> Result<ParsedCalibration, SiteErr
         return fault(1, what, "a camera matrix without skew", AS_SAVED);
     }
 
-    let model = document.required(file.distortion_model, 0..0, "distortion_model", WHICH_MODEL)?;
+    let model_at = required("distortion_model", WHICH_MODEL)?;
+    let model = document.text(model_at)?;
     let name = "distortion_coefficients";
-    let list = data(document, file.distortion_coefficients, name)?;
-    document.finite(&list, name)?;
-    let lens = match lens(&model.value, &plain(&list.value)) {
+    let list = data(document, required(name, AS_SAVED)?, name)?;
+    let coefficients = document.finite_numbers(list, name)?;
+    let lens = match lens(model, &coefficients) {
         Some(Ok(lens)) => lens,
         Some(Err(wanted)) => {
-            let found = list.value.len();
-            let message = format!("{name} has {found} numbers, {} has {wanted}", model.value);
+            let found = coefficients.len();
+            let message = format!("{name} has {found} numbers, {model} has {wanted}");
             return Err(document
-                .error(document.span(list.referenced), message)
+                .error(list.at.clone(), message)
                 .expected(format!("{wanted} numbers"))
                 .help(WHICH_MODEL));
         }
         None => {
-            let message = format!("the distortion model {:?} is not known", model.value);
+            let message = format!("the distortion model {model:?} is not known");
             return Err(document
-                .error(document.span(model.referenced), message)
+                .error(model_at.at.clone(), message)
                 .expected("plumb_bob, rational_polynomial or equidistant")
                 .help(WHICH_MODEL));
         }
     };
 
-    let rect = match file.projection_matrix {
+    let rect = match file.get("projection_matrix") {
         None => [fx, fy, cx, cy],
         Some(matrix) => {
-            let list = data(document, Some(matrix), "projection_matrix")?;
-            projection(document, &list)?.unwrap_or([fx, fy, cx, cy])
+            let list = data(document, matrix, "projection_matrix")?;
+            projection(document, list)?.unwrap_or([fx, fy, cx, cy])
         }
     };
-    let turned = match file.rectification_matrix {
+    let turned = match file.get("rectification_matrix") {
         None => None,
         Some(matrix) => {
-            let list = data(document, Some(matrix), "rectification_matrix")?;
-            let turn: [f64; 9] = document.numbers(&list, "rectification_matrix")?;
+            let list = data(document, matrix, "rectification_matrix")?;
+            let turn: [f64; 9] = document.numbers(list, "rectification_matrix")?;
             (turn != IDENTITY && turn != [0.0; 9]).then(|| {
                 document
                     .error(
-                        document.span(list.referenced),
+                        list.at.clone(),
                         "the rectification matrix turns the image: its axes are not the camera's",
                     )
                     .expected("the identity, as in the calibration of a single camera")
@@ -103,9 +98,9 @@ pub(super) fn read(document: &Document<'_>) -> Result<ParsedCalibration, SiteErr
         }
     };
     Ok(ParsedCalibration {
-        size_at: document.span(width.referenced),
+        size_at: width.at.clone(),
         numbers: Numbers {
-            size_px: [f64::from(width.value), f64::from(height.value)],
+            size_px,
             focal_px: [fx, fy],
             axis_px: [cx, cy],
             lens,
@@ -117,10 +112,7 @@ pub(super) fn read(document: &Document<'_>) -> Result<ParsedCalibration, SiteErr
 
 /// Returns fx, fy, cx, cy of a projection matrix; `None` if it is zero. (Its fourth column is the offset to
 /// another camera of a pair, and is ignored.)
-fn projection(
-    document: &Document<'_>,
-    list: &Spanned<Vec<Spanned<f64>>>,
-) -> Result<Option<[f64; 4]>, SiteError> {
+fn projection(document: &Document<'_>, list: &Node) -> Result<Option<[f64; 4]>, SiteError> {
     let all: [f64; 12] = document.numbers(list, "projection_matrix")?;
     let [fx, skew, cx, _, lower, fy, cy, _, rest @ ..] = all;
     if all == [0.0; 12] || fx == 0.0 {
@@ -129,7 +121,7 @@ fn projection(
     if !(fx > 0.0) || !(fy > 0.0) || [skew, lower] != [0.0; 2] || rest != [0.0, 0.0, 1.0, 0.0] {
         return Err(document
             .error(
-                document.span(list.referenced),
+                list.at.clone(),
                 "projection_matrix is not [fx, 0, cx, Tx, 0, fy, cy, Ty, 0, 0, 1, 0]",
             )
             .expected("a projection matrix without skew")
@@ -138,13 +130,8 @@ fn projection(
     Ok(Some([fx, fy, cx, cy]))
 }
 
-/// Returns the numbers of a matrix.
-fn data(
-    document: &Document<'_>,
-    matrix: Option<Spanned<Matrix>>,
-    name: &str,
-) -> Result<Spanned<Vec<Spanned<f64>>>, SiteError> {
-    let matrix = document.required(matrix, 0..0, name, AS_SAVED)?;
-    let at = document.span(matrix.referenced);
-    document.required(matrix.value.data, at, &format!("{name}.data"), AS_SAVED)
+/// Returns the list of numbers of a matrix in the notation of ROS and OpenCV.
+fn data<'n>(document: &Document<'_>, matrix: &'n Node, name: &str) -> Result<&'n Node, SiteError> {
+    let data = document.map(matrix)?.get("data");
+    document.required(data, matrix.at.clone(), &format!("{name}.data"), AS_SAVED)
 }

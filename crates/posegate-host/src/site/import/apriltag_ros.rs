@@ -2,49 +2,14 @@
 
 use std::ops::Range;
 
-use serde::Deserialize;
-
 use super::place::{Frame, LENGTH_SLACK};
 use super::{Placed, is_size};
 use crate::site::error::{SiteError, Source};
 use crate::site::suggest;
-use crate::site::yaml::{Document, FormatMessages, Spanned};
+use crate::site::yaml::{Document, FormatMessages, Node};
 
-#[derive(Deserialize)]
-struct File {
-    standalone_tags: Option<Spanned<Vec<Spanned<Single>>>>,
-    tag_bundles: Option<Spanned<Vec<Spanned<Bundle>>>>,
-}
-
-// An unknown key is refused: a misspelt key would silently leave the default.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Single {
-    id: Option<Spanned<u32>>,
-    size: Option<Spanned<f64>>,
-    name: Option<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Bundle {
-    name: Option<String>,
-    layout: Option<Spanned<Vec<Spanned<Member>>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Member {
-    id: Option<Spanned<u32>>,
-    size: Option<Spanned<f64>>,
-    x: Option<Spanned<f64>>,
-    y: Option<Spanned<f64>>,
-    z: Option<Spanned<f64>>,
-    qw: Option<Spanned<f64>>,
-    qx: Option<Spanned<f64>>,
-    qy: Option<Spanned<f64>>,
-    qz: Option<Spanned<f64>>,
-}
+const MEMBER_KEYS: [&str; 9] = ["id", "size", "x", "y", "z", "qw", "qx", "qy", "qz"];
+const POSE_KEYS: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 
 const MANNER: FormatMessages = FormatMessages {
     what: "a tags.yaml of apriltag_ros",
@@ -65,11 +30,9 @@ pub(super) type Found = Placed<(u32, f64, Frame)>;
 /// several.
 pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>, SiteError> {
     let document = Document::new(source, &MANNER)?;
-    let keys = document.keys()?;
-    if !keys
-        .iter()
-        .any(|key| key == "tag_bundles" || key == "standalone_tags")
-    {
+    let root = document.parse()?;
+    let file = document.map(&root)?;
+    if !file.has("tag_bundles") && !file.has("standalone_tags") {
         return Err(document
             .error(0..0, "the file has neither `tag_bundles` nor `standalone_tags`")
             .expected(MANNER.what)
@@ -78,34 +41,104 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
                  tables",
             ));
     }
-    let file: File = document.read()?;
-    let bundles = file.tag_bundles.map_or_else(Vec::new, |list| list.value);
-    let singles = file
-        .standalone_tags
-        .map_or_else(Vec::new, |list| list.value);
-    let mut parts: Vec<(String, Part)> = Vec::new();
-    for (index, bundle) in bundles.into_iter().enumerate() {
-        let name = bundle.value.name.clone();
-        let name = name.unwrap_or_else(|| format!("bundle_{index}"));
-        parts.push((name, Part::Bundle(bundle)));
+    let list = |key: &str| match file.get(key) {
+        Some(list) => document.list(list),
+        None => Ok(&[][..]),
+    };
+    // All are read, so that a misspelt key is found before its bundle is chosen.
+    let mut parts = Vec::new();
+    for (index, node) in list("tag_bundles")?.iter().enumerate() {
+        let bundle = document.map(node)?;
+        document.only_keys(bundle, &["name", "layout"])?;
+        let name = match bundle.get("name") {
+            Some(name) => document.text(name)?.to_owned(),
+            None => format!("bundle_{index}"),
+        };
+        let members = bundle.get("layout").map(|layout| {
+            let members = document.list(layout)?.iter();
+            members
+                .map(|node| Member::read(&document, node, &MEMBER_KEYS))
+                .collect()
+        });
+        parts.push((
+            name,
+            Part {
+                at: node.at.clone(),
+                members: members.transpose()?,
+            },
+        ));
     }
-    for single in singles {
+    for node in list("standalone_tags")? {
+        let member = Member::read(&document, node, &["id", "size", "name"])?;
         let id = document.required(
-            single.value.id.as_ref(),
-            document.span(single.referenced),
+            member.id.as_ref(),
+            node.at.clone(),
             "id",
             "write `{id: 7, size: 0.1, name: dock}`",
         )?;
-        let name = single.value.name.clone();
-        let name = name.unwrap_or_else(|| format!("tag_{}", id.value));
-        parts.push((name, Part::Single(single)));
+        let name = match document.map(node)?.get("name") {
+            Some(name) => document.text(name)?.to_owned(),
+            None => format!("tag_{}", id.value),
+        };
+        parts.push((
+            name,
+            Part {
+                at: node.at.clone(),
+                members: Some(std::vec![member]),
+            },
+        ));
     }
-    chosen(&document, parts, part)?.tags(&document)
+    let part = chosen(&document, parts, part)?;
+    let members = document.required(part.members, part.at, "layout", MANNER.written)?;
+    members
+        .into_iter()
+        .map(|member| of_member(&document, member))
+        .collect()
 }
 
-enum Part {
-    Bundle(Spanned<Bundle>),
-    Single(Spanned<Single>),
+/// A bundle, or a single tag in the middle of its own frame.
+struct Part {
+    at: Range<usize>,
+    members: Option<Vec<Member>>,
+}
+
+/// The numbers of a tag that are in the file.
+struct Member {
+    at: Range<usize>,
+    id: Option<Placed<u32>>,
+    size: Option<Placed<f64>>,
+    /// Of [`POSE_KEYS`].
+    pose: [Option<Placed<f64>>; 7],
+}
+
+impl Member {
+    fn read(document: &Document<'_>, node: &Node, known: &[&str]) -> Result<Self, SiteError> {
+        let map = document.map(node)?;
+        document.only_keys(map, known)?;
+        let number = |key: &str| {
+            let number = map.get(key).map(|node| {
+                let value = document.number(node)?;
+                let at = node.at.clone();
+                Ok(Placed { at, value })
+            });
+            number.transpose()
+        };
+        let id = map.get("id").map(|node| {
+            let value = document.whole(node)?;
+            let at = node.at.clone();
+            Ok(Placed { at, value })
+        });
+        let mut pose = [const { None }; 7];
+        for (value, key) in pose.iter_mut().zip(POSE_KEYS) {
+            *value = number(key)?;
+        }
+        Ok(Self {
+            at: node.at.clone(),
+            id: id.transpose()?,
+            size: number("size")?,
+            pose,
+        })
+    }
 }
 
 fn chosen(
@@ -143,85 +176,41 @@ fn chosen(
     }
 }
 
-impl Part {
-    fn tags(self, document: &Document<'_>) -> Result<Vec<Found>, SiteError> {
-        match self {
-            Self::Single(single) => {
-                let at = document.span(single.referenced);
-                let member = Member {
-                    id: single.value.id,
-                    size: single.value.size,
-                    x: None,
-                    y: None,
-                    z: None,
-                    qw: None,
-                    qx: None,
-                    qy: None,
-                    qz: None,
-                };
-                Ok(std::vec![of_member(document, &at, member)?])
-            }
-            Self::Bundle(bundle) => {
-                let at = document.span(bundle.referenced);
-                let layout =
-                    document.required(bundle.value.layout, at, "layout", MANNER.written)?;
-                layout
-                    .value
-                    .into_iter()
-                    .map(|member| {
-                        of_member(document, &document.span(member.referenced), member.value)
-                    })
-                    .collect()
-            }
-        }
-    }
-}
-
-fn of_member(
-    document: &Document<'_>,
-    at: &Range<usize>,
-    member: Member,
-) -> Result<Found, SiteError> {
-    let id = document.required(member.id, at.clone(), "id", MEMBER)?;
-    let size = document.required(member.size, at.clone(), "size", MEMBER)?;
+fn of_member(document: &Document<'_>, member: Member) -> Result<Found, SiteError> {
+    let at = || member.at.clone();
+    let id = document.required(member.id, at(), "id", MEMBER)?;
+    let size = document.required(member.size, at(), "size", MEMBER)?;
     if !is_size(size.value) {
         return Err(document
             .error(
-                document.span(size.referenced),
+                size.at,
                 format!("the size of tag {} is {}", id.value, size.value),
             )
             .expected("the black border's outer edge in metres, above 0 and at most 10")
             .help("sizes are metres: 165 mm are 0.165"));
     }
-    let number = |value: Option<Spanned<f64>>, name: &str, otherwise: f64| match value {
-        None => Ok(otherwise),
-        Some(value) if value.value.is_finite() => Ok(value.value),
-        Some(value) => Err(document
-            .error(
-                document.span(value.referenced),
-                format!("{name} of tag {} is {}", id.value, value.value),
-            )
-            .expected("a finite number")
-            .help(MANNER.not_finite)),
-    };
-    let at_metres = [
-        number(member.x, "x", 0.0)?,
-        number(member.y, "y", 0.0)?,
-        number(member.z, "z", 0.0)?,
-    ];
-    let quaternion = [
-        number(member.qw, "qw", 1.0)?,
-        number(member.qx, "qx", 0.0)?,
-        number(member.qy, "qy", 0.0)?,
-        number(member.qz, "qz", 0.0)?,
-    ];
-    let frame = Frame::of_quaternion(at_metres, quaternion).map_err(|length| {
-        let [w, x, y, z] = quaternion;
+    // Without its keys a tag is in the middle of the frame, as the frame is turned.
+    let mut pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    for ((value, key), given) in pose.iter_mut().zip(POSE_KEYS).zip(&member.pose) {
+        let Some(given) = given else { continue };
+        if !given.value.is_finite() {
+            return Err(document
+                .error(
+                    given.at.clone(),
+                    format!("{key} of tag {} is {}", id.value, given.value),
+                )
+                .expected("a finite number")
+                .help(MANNER.not_finite));
+        }
+        *value = given.value;
+    }
+    let [x, y, z, w, qx, qy, qz] = pose;
+    let frame = Frame::of_quaternion([x, y, z], [w, qx, qy, qz]).map_err(|length| {
         document
             .error(
-                at.to_owned(),
+                at(),
                 format!(
-                    "the quaternion of tag {} (qw {w}, qx {x}, qy {y}, qz {z}) has length {length:.4}",
+                    "the quaternion of tag {} (qw {w}, qx {qx}, qy {qy}, qz {qz}) has length {length:.4}",
                     id.value
                 ),
             )
@@ -229,7 +218,7 @@ fn of_member(
             .help("write all four with all digits: without it qw is 1")
     })?;
     Ok(Placed {
-        at: document.span(id.referenced),
+        at: id.at,
         value: (id.value, size.value, frame),
     })
 }

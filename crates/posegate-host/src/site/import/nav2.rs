@@ -1,29 +1,12 @@
 //! Nav2's dock database (opennav_docking): the poses of the robot's base when it is docked.
 
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-
-use serde::Deserialize;
 
 use super::Placed;
 use super::place::{tidy, tidy_angle};
 use crate::site::error::{SiteError, Source};
-use crate::site::yaml::{Document, FormatMessages, Spanned};
+use crate::site::yaml::{Document, FormatMessages};
 use posegate::shape::PoseDeg;
-
-#[derive(Deserialize)]
-struct File {
-    docks: Option<Spanned<BTreeMap<String, Spanned<Dock>>>>,
-}
-
-// Nav2 ignores unknown keys.
-#[derive(Deserialize)]
-struct Dock {
-    #[serde(rename = "type")]
-    kind: Option<Spanned<String>>,
-    frame: Option<Spanned<String>>,
-    pose: Option<Spanned<Vec<Spanned<f64>>>>,
-}
 
 const MANNER: FormatMessages = FormatMessages {
     what: "a dock database of Nav2",
@@ -37,13 +20,15 @@ const MANNER: FormatMessages = FormatMessages {
 const DEFAULT_FRAME: &str = "map";
 
 /// Returns docks by name, in their common frame. It must be `map` unless the import gives the
-/// frame's pose.
+/// frame's pose. Nav2 ignores unknown keys, and so does this.
 pub(super) fn read(
     source: Source<'_>,
     is_placed: bool,
 ) -> Result<Vec<(String, Placed<PoseDeg>)>, SiteError> {
     let document = Document::new(source, &MANNER)?;
-    if !document.keys()?.iter().any(|key| key == "docks") {
+    let root = document.parse()?;
+    let file = document.map(&root)?;
+    if !file.has("docks") {
         return Err(document
             .error(0..0, "the file has no `docks`")
             .expected(MANNER.what)
@@ -52,22 +37,19 @@ pub(super) fn read(
                  parameters must be moved into that file",
             ));
     }
-    let file: File = document.read()?;
-    let docks = document.required(file.docks, 0..0, "docks", MANNER.written)?;
+    let docks = document.required(file.get("docks"), 0..0, "docks", MANNER.written)?;
     let mut shared: Option<String> = None;
     let mut found = Vec::new();
-    for (name, dock) in docks.value {
-        let at = document.span(dock.referenced);
+    for (name, node) in document.map(docks)?.sorted() {
+        let at = node.at.clone();
         let key = |key: &str| format!("docks.{name}.{key}");
-        let dock = dock.value;
-        document.required(dock.kind, at.clone(), &key("type"), MANNER.written)?;
-        let frame_at = dock
-            .frame
-            .as_ref()
-            .map_or_else(|| at.clone(), |frame| document.span(frame.referenced));
-        let frame = dock
-            .frame
-            .map_or_else(|| DEFAULT_FRAME.into(), |frame| frame.value);
+        let dock = document.map(node)?;
+        let kind = document.required(dock.get("type"), at.clone(), &key("type"), MANNER.written)?;
+        document.text(kind)?;
+        let (frame, frame_at) = match dock.get("frame") {
+            None => (DEFAULT_FRAME, at.clone()),
+            Some(frame) => (document.text(frame)?, frame.at.clone()),
+        };
         if !is_placed && frame != DEFAULT_FRAME {
             return Err(document
                 .error(
@@ -79,8 +61,8 @@ pub(super) fn read(
                     "add the `pose` of the frame `{frame}` in the site's world"
                 )));
         }
-        let first = shared.get_or_insert_with(|| frame.clone());
-        if *first != frame {
+        let first = shared.get_or_insert_with(|| frame.to_owned());
+        if first != frame {
             return Err(document
                 .error(
                     frame_at,
@@ -91,13 +73,12 @@ pub(super) fn read(
                 .expected("one frame for all docks: there is one `pose`")
                 .help("write a dock database for each frame, and import each with its `pose`"));
         }
-        let list = document.required(dock.pose, at.clone(), &key("pose"), MANNER.written)?;
-        let [x, y, theta] = document.numbers(&list, &key("pose"))?;
+        let list = document.required(dock.get("pose"), at.clone(), &key("pose"), MANNER.written)?;
+        let [x, y, theta] = document.numbers(list, &key("pose"))?;
         if theta.abs() > TAU + 1e-3 {
-            let place = list.value.get(2).map_or(list.referenced, |v| v.referenced);
             return Err(document
                 .error(
-                    document.span(place),
+                    document.place_of(list, 2),
                     format!("the heading of dock `{name}` is {theta} radians"),
                 )
                 .expected("radians, from -6.2832 to 6.2832")
@@ -108,7 +89,7 @@ pub(super) fn read(
             y: tidy(y),
             yaw_deg: tidy_angle(theta.to_degrees()),
         };
-        found.push((name, Placed { at, value }));
+        found.push((name.to_owned(), Placed { at, value }));
     }
     Ok(found)
 }

@@ -190,21 +190,21 @@ fn digest_depends_on_the_calibration() {
 const ROS_FAULTS: &str = r#"
 image_width: 640 => \timage_width: 640 => - => \t => indented by a tab => expand
   rows: 3 => \trows: 3 => - => \t => indented by a tab => expand
-image_width: 640 => image_height: 640 => - => image_height: 480 => duplicate => as cameracalibrator
-image_width: 640 => image_width: 640.5 => - => 640.5 => not read: invalid u32 (at `640.5`) => plainly
+image_width: 640 => image_height: 640 => - => image_height: 480 => `image_height` is there twice, first in line 1 => as cameracalibrator
+image_width: 640 => image_width: 640.5 => - => 640.5 => found `640.5` => plainly
 image_width: 640\n => - => - => image_height => `image_width` is missing => ost.yaml
 410.5, => 0.0, => - => 0.0, 0.0, 325 => is 0: the camera is not calibrated => cameracalibrator
 411.75, => -1, => - => -1, => camera_matrix[4] is -1 => cameracalibrator
 410.5, 0.0 => 410.5, 0.1 => - => 0.1, => is not [fx, 0, cx, => ost.yaml
 410.5, => .nan, => - => .nan => camera_matrix[0] is NaN => calibrate again
--0.22, => .Nan, => - => .Nan => not read: invalid floating point (at `.Nan`) => calibrate again
+-0.22, => .Nan, => - => .Nan => found `.Nan` => calibrate again
 -0.22, => .inf, => - => .inf => distortion_coefficients[0] is inf => calibrate again
 -0.006] => ] => - => [-0.22 => has 4 numbers, plumb_bob has 5 => rational_polynomial
 236.5, 0.0, 0.0, 1.0] => 236.5] => - => [410.5 => camera_matrix has 6 numbers => saved
 plumb_bob => fov => - => fov => the distortion model "fov" is not known => equidistant
 distortion_model: plumb_bob\n => - => - => image_width => `distortion_model` is missing => do not say which
 camera_matrix: => camera_matrices: => - => image_width => is not a known kind of calibration => CameraInfo
-410.5, 0.0 => a410, 0.0 => - => a410 => not read: invalid floating point (at `a410`) => plainly
+410.5, 0.0 => a410, 0.0 => - => a410 => found `a410` => plainly
 data: [1, 0 => data: [0.9, 0.1 => - => [0.9 => the rectification matrix turns the image => image = "raw"
 380.5, 0, => 380.5, 2, => - => [380.5 => projection_matrix is not => ost.yaml
 image_width: 640 => image_width: 1280 => width_px = 640 => 1280 => is for images of 1280 x 480 px, the site's camera has 640 x 480 px => binning

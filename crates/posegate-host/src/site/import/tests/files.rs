@@ -67,15 +67,15 @@ fn errors_in_field_layouts_point_at_the_fault() {
 fn errors_in_bundles_point_at_the_fault() {
     let rows = [
         "z: 0.05 => z: 0.05, qw: 0.7, qz: 0.7 => {id: 11 => the quaternion of tag 11 (qw 0.7, qx 0, qy 0, qz 0.7) has length 0.9899 => all digits",
-        "z: 0.05 => z: 0.05, qW: 0.7 => qW => unknown field `qW` => qw: 1",
+        "z: 0.05 => z: 0.05, qW: 0.7 => qW => unknown key `qW` => qw: 1",
         "z: 0.05 => z: .nan => .nan => z of tag 11 is NaN => measure",
-        "z: 0.05 => z: 5cm => 5cm => not read => numbers plainly",
+        "z: 0.05 => z: 5cm => 5cm => found `5cm` => numbers plainly",
         "size: 0.15, => - => {id: 11 => `size` is missing => size: 0.1",
         "size: 0.15 => size: 150 => 150 => the size of tag 11 is 150 => 165 mm are 0.165",
         "size: 0.15 => size: -0.15 => -0.15 => the size of tag 11 is -0.15 => metres",
         "size: 0.15 => size: .nan => .nan => the size of tag 11 is NaN => metres",
         "id: 11 => id: 10 => 10, size: 0.15 => tag 10 is there twice, first in line 7 => remove one",
-        "id: 11 => id: 1.5 => 1.5 => not read => ids as whole numbers",
+        "id: 11 => id: 1.5 => 1.5 => found `1.5` => ids as whole numbers",
         "      - {id: 11 => \\t- {id: 11 => \\t => indented by a tab => expand FILE",
         "- layout => - name: dock\\n    layout => ^ => has `dock` several times => rename",
         "name: dock => name: docks => ^ => no bundle and no tag `dock` => FILE#NAME",
@@ -107,7 +107,7 @@ fn errors_in_docks_point_at_the_fault() {
         "1.5] => .inf] => .inf => docks.home.pose[2] is inf => measure",
         ", 1.5] => ] => [1.0, 2.0] => docks.home.pose has 2 numbers => there is no z",
         ", 1.5] => , 0.0, 1.5] => [1.0 => docks.home.pose has 4 numbers => metres, metres, radians",
-        "[1.0, 2.0, 1.5] => \"1 2 0\" => \"1 => not read => write",
+        "[1.0, 2.0, 1.5] => \"1 2 0\" => \"1 => found `\"1 2 0\"` => write",
         "frame: map => frame: odom => odom => the dock `home` is in the frame `odom` => the `pose` of the frame `odom`",
         "type: \"charger\",  => - => {frame => `docks.home.type` is missing => docks:",
         "    pose: [-3.5, 0.25, -3.0]\\n => - => type: conveyor => `docks.dock-3.pose` is missing => docks:",
@@ -117,7 +117,10 @@ fn errors_in_docks_point_at_the_fault() {
     check(&docks(), DOCKS, &rows);
     let twice = fault(&docks(), &DOCKS.replace("dock-3", "home"));
     assert!(
-        twice.message.contains("duplicate") && twice.at.is_some_and(|at| at.line == 3),
+        twice
+            .message
+            .contains("`home` is there twice, first in line 2")
+            && twice.at.is_some_and(|at| at.line == 3),
         "{twice}"
     );
     let long = DOCKS.replace("dock-3", "the-dock-at-the-end-of-the-long-hall");

@@ -1,0 +1,269 @@
+//! YAML with the position of every value.
+
+mod tree;
+
+use std::ops::Range;
+
+pub(super) use self::tree::Node;
+use self::tree::{Entry, Value};
+use crate::site::error::{SiteError, Source};
+use crate::site::suggest;
+
+/// Texts for the errors of one kind of file.
+pub(super) struct FormatMessages {
+    /// The kind of file: completes "expected ...".
+    pub what: &'static str,
+    /// Advice on the notation of the file.
+    pub written: &'static str,
+    /// Advice on the notation of its numbers.
+    pub numbers: &'static str,
+    /// Advice for a number that is not finite.
+    pub not_finite: &'static str,
+    /// Advice for a list of the wrong length.
+    pub length: &'static str,
+}
+
+const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
+
+/// The text of a YAML file, checked for tab indents.
+pub(super) struct Document<'a> {
+    source: Source<'a>,
+    manner: &'static FormatMessages,
+}
+
+/// The entries of a map in the file.
+#[derive(Clone, Copy)]
+pub(super) struct Map<'a> {
+    entries: &'a [Entry],
+}
+
+impl<'a> Map<'a> {
+    /// Returns the value of a key; `None` also if it is empty or `null`.
+    pub(super) fn get(&self, key: &str) -> Option<&'a Node> {
+        let entry = self.entries.iter().find(|entry| &*entry.key == key)?;
+        (!entry.node.value.is_null()).then_some(&entry.node)
+    }
+
+    /// Returns `true` if the map has a key, even without a value.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.keys().any(|other| other == key)
+    }
+
+    /// Returns the keys in the order of the file.
+    pub(super) fn keys(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.entries.iter().map(|entry| &*entry.key)
+    }
+
+    /// Returns keys and values by key.
+    pub(super) fn sorted(&self) -> Vec<(&'a str, &'a Node)> {
+        let mut all: Vec<_> = self
+            .entries
+            .iter()
+            .map(|entry| (&*entry.key, &entry.node))
+            .collect();
+        all.sort_unstable_by_key(|(key, _)| *key);
+        all
+    }
+}
+
+impl<'a> Document<'a> {
+    /// Refuses indents by tabs: the position of the text after a tab would be misleading. (The parser
+    /// ignores OpenCV's `%YAML:1.0` and `!!opencv-matrix`.)
+    pub(super) fn new(
+        source: Source<'a>,
+        manner: &'static FormatMessages,
+    ) -> Result<Self, SiteError> {
+        let mut start = 0;
+        for line in source.text.split_inclusive('\n') {
+            let indent = line.len() - line.trim_start_matches([' ', '\t']).len();
+            if let Some(tab) = line[..indent].find('\t') {
+                let at = start + tab;
+                return Err(source
+                    .error(at..at + 1, "the line is indented by a tab")
+                    .expected("spaces")
+                    .help(TABS));
+            }
+            start += line.len();
+        }
+        Ok(Self { source, manner })
+    }
+
+    /// Parses the file.
+    pub(super) fn parse(&self) -> Result<Node, SiteError> {
+        tree::parse(self)
+    }
+
+    pub(super) fn error(
+        &self,
+        at: Range<usize>,
+        message: impl Into<std::boxed::Box<str>>,
+    ) -> SiteError {
+        self.source.error(at, message)
+    }
+
+    /// Returns the error of a value of another kind than expected.
+    fn another(&self, node: &Node, expected: &str, help: &'static str) -> SiteError {
+        let found = match &*node.value {
+            Value::List(_) => "a list".to_owned(),
+            Value::Map(_) => "a map of keys".to_owned(),
+            Value::Scalar { .. } if node.value.is_null() => "no value".to_owned(),
+            Value::Scalar { .. } => format!("`{}`", self.source.quote(node.at.clone())),
+        };
+        self.error(node.at.clone(), format!("found {found}"))
+            .expected(expected.to_owned())
+            .help(help)
+    }
+
+    /// Returns the entries of a map. An empty file is an empty map.
+    pub(super) fn map<'n>(&self, node: &'n Node) -> Result<Map<'n>, SiteError> {
+        match &*node.value {
+            Value::Map(entries) => Ok(Map { entries }),
+            _ if node.at.is_empty() && node.value.is_null() => Ok(Map { entries: &[] }),
+            _ => Err(self.another(node, self.manner.what, self.manner.written)),
+        }
+    }
+
+    /// Returns the values of a list.
+    pub(super) fn list<'n>(&self, node: &'n Node) -> Result<&'n [Node], SiteError> {
+        match &*node.value {
+            Value::List(nodes) => Ok(nodes),
+            _ => Err(self.another(node, "a list", self.manner.written)),
+        }
+    }
+
+    /// Returns a text, with or without quotes.
+    pub(super) fn text<'n>(&self, node: &'n Node) -> Result<&'n str, SiteError> {
+        match &*node.value {
+            Value::Scalar { text, .. } => Ok(text),
+            _ => Err(self.another(node, "a text", self.manner.written)),
+        }
+    }
+
+    /// Returns a number in the notation of YAML 1.2. It may be infinite or NaN if it is written so.
+    pub(super) fn number(&self, node: &Node) -> Result<f64, SiteError> {
+        scalar(node)
+            .and_then(number)
+            .ok_or_else(|| self.another(node, "a number", self.manner.numbers))
+    }
+
+    /// Returns a whole number from 0 to 2^32 - 1.
+    pub(super) fn whole(&self, node: &Node) -> Result<u32, SiteError> {
+        scalar(node)
+            .and_then(whole)
+            .ok_or_else(|| self.another(node, "a whole number", self.manner.numbers))
+    }
+
+    /// Returns the numbers of a list.
+    pub(super) fn all_numbers(&self, list: &Node) -> Result<Vec<f64>, SiteError> {
+        let nodes = self.list(list)?;
+        nodes.iter().map(|node| self.number(node)).collect()
+    }
+
+    /// Returns the finite numbers of a list.
+    pub(super) fn finite_numbers(&self, list: &Node, name: &str) -> Result<Vec<f64>, SiteError> {
+        let numbers = self.all_numbers(list)?;
+        for (index, (number, node)) in numbers.iter().zip(self.list(list)?).enumerate() {
+            if !number.is_finite() {
+                return Err(self
+                    .error(node.at.clone(), format!("{name}[{index}] is {number}"))
+                    .expected("a finite number")
+                    .help(self.manner.not_finite));
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// Returns exactly `N` finite numbers.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        list: &Node,
+        name: &str,
+    ) -> Result<[f64; N], SiteError> {
+        let numbers = self.finite_numbers(list, name)?;
+        numbers.try_into().map_err(|all: Vec<f64>| {
+            self.error(list.at.clone(), format!("{name} has {} numbers", all.len()))
+                .expected(format!("{N} numbers"))
+                .help(self.manner.length)
+        })
+    }
+
+    /// Returns the place of an element of a list, or of the list if it has no such element.
+    pub(super) fn place_of(&self, list: &Node, index: usize) -> Range<usize> {
+        match &*list.value {
+            Value::List(nodes) => nodes.get(index).unwrap_or(list).at.clone(),
+            _ => list.at.clone(),
+        }
+    }
+
+    /// Returns a value that a file must have.
+    pub(super) fn required<T>(
+        &self,
+        value: Option<T>,
+        at: Range<usize>,
+        name: &str,
+        help: &str,
+    ) -> Result<T, SiteError> {
+        value.ok_or_else(|| {
+            self.error(at, format!("`{name}` is missing"))
+                .expected(format!("`{name}`"))
+                .help(help.to_owned())
+        })
+    }
+
+    /// Refuses keys that the format does not have: a misspelt key would silently leave the default.
+    pub(super) fn only_keys(&self, map: Map<'_>, known: &[&str]) -> Result<(), SiteError> {
+        match map
+            .entries
+            .iter()
+            .find(|entry| !known.contains(&&*entry.key))
+        {
+            None => Ok(()),
+            Some(entry) => Err(self
+                .error(
+                    entry.key_at.clone(),
+                    format!("unknown key `{}`", self.source.quote(entry.key_at.clone())),
+                )
+                .expected(format!("one of {}", suggest::list(known.iter().copied())))
+                .help(self.manner.written)),
+        }
+    }
+}
+
+fn scalar(node: &Node) -> Option<&str> {
+    match &*node.value {
+        Value::Scalar { text, .. } => Some(text.trim()),
+        _ => None,
+    }
+}
+
+/// Returns the number that a text states, as of YAML 1.2's core schema. A number too large for 64 bits is none.
+fn number(text: &str) -> Option<f64> {
+    let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
+    let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
+    match unsigned {
+        ".nan" | ".NaN" | ".NAN" => Some(f64::NAN),
+        ".inf" | ".Inf" | ".INF" => Some(sign * f64::INFINITY),
+        // Rust reads words such as `inf` too.
+        _ => text.parse().ok().filter(|number: &f64| number.is_finite()),
+    }
+}
+
+/// Returns the whole number that a text states, as of YAML 1.2's core schema. Decimal numbers do not begin with a needless 0, which
+/// would make them octal in YAML 1.1.
+fn whole(text: &str) -> Option<u32> {
+    let text = text.strip_prefix('+').unwrap_or(text);
+    let (digits, radix) = match (text.strip_prefix("0x"), text.strip_prefix("0o")) {
+        (Some(digits), _) => (digits, 16),
+        (_, Some(digits)) => (digits, 8),
+        _ if text.len() > 1 && text.starts_with('0') => return None,
+        _ => (text, 10),
+    };
+    // A second sign is none.
+    if !digits.starts_with(|first: char| first.is_ascii_hexdigit()) {
+        return None;
+    }
+    u32::from_str_radix(digits, radix).ok()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,344 @@
+//! The values of a YAML text, each with its position.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::rc::Rc;
+
+use granit_parser::{ErrorKind, Event, Parser, ScalarStyle, ScanError, Span, options};
+
+use super::{Document, TABS};
+use crate::site::error::{SiteError, Source};
+
+/// The most values of a file. What an alias names again is not counted again, since it is shared.
+const MAX_VALUES: usize = 250_000;
+/// The most entries that merge keys (`<<`) add.
+const MAX_MERGED: usize = 10_000;
+/// The most lists and maps inside one another.
+const MAX_DEPTH: usize = 64;
+const NESTS: &str = "the file nests too deep";
+
+/// A value with its position in the text.
+#[derive(Clone, Debug)]
+pub(in crate::site) struct Node {
+    /// Bytes of the text. An alias has a position of its own.
+    pub at: Range<usize>,
+    pub value: Rc<Value>,
+}
+
+#[derive(Debug)]
+pub(in crate::site) enum Value {
+    Scalar {
+        text: String,
+        /// Without quotes and tag: an empty text is no value.
+        is_plain: bool,
+    },
+    List(Vec<Node>),
+    Map(Vec<Entry>),
+}
+
+#[derive(Clone, Debug)]
+pub(in crate::site) struct Entry {
+    pub key: Rc<str>,
+    /// Bytes of the key in the text.
+    pub key_at: Range<usize>,
+    pub node: Node,
+}
+
+impl Value {
+    fn empty() -> Self {
+        Self::Scalar {
+            text: String::new(),
+            is_plain: true,
+        }
+    }
+
+    /// Returns `true` for no value, `~` and `null`.
+    pub(super) fn is_null(&self) -> bool {
+        matches!(self, Self::Scalar { text, is_plain: true } if matches!(text.as_str(), "" | "~" | "null" | "Null" | "NULL"))
+    }
+}
+
+/// Returns the value of a text with one document. An empty text has an empty value.
+pub(super) fn parse(document: &Document<'_>) -> Result<Node, SiteError> {
+    let options = options! {
+        flow_nesting_limit: MAX_DEPTH,
+        block_nesting_limit: MAX_DEPTH,
+    };
+    let mut tree = Tree::new(document);
+    for event in Parser::new_from_str_with_options(document.source.text, options) {
+        let (event, span) = event.map_err(|fault| not_read(document, &fault))?;
+        tree.take(event, bytes(span))?;
+    }
+    Ok(tree.root.unwrap_or_else(|| Node {
+        at: 0..0,
+        value: Rc::new(Value::empty()),
+    }))
+}
+
+fn bytes(span: Span) -> Range<usize> {
+    span.byte_range().unwrap_or(0..0)
+}
+
+fn not_read(document: &Document<'_>, fault: &ScanError) -> SiteError {
+    let start = fault.marker().byte_offset().unwrap_or(0);
+    let error = document.error(start..start, format!("not read: {}", fault.info()));
+    match fault.kind() {
+        ErrorKind::RecursionLimitExceeded => too_large(document.error(start..start, NESTS)),
+        ErrorKind::TabNotAllowed
+        | ErrorKind::TabInBlockIndentation
+        | ErrorKind::TabAtBlockScalarStart
+        | ErrorKind::TabInIndentation
+        | ErrorKind::TabInPlainScalar => error.expected("spaces").help(TABS),
+        _ => error
+            .expected(document.manner.what)
+            .help(document.manner.written),
+    }
+}
+
+fn too_large(error: SiteError) -> SiteError {
+    error
+        .expected(format!(
+            "at most {MAX_VALUES} values, nested at most {MAX_DEPTH} deep"
+        ))
+        .help("check that it is the file that is meant; cut a large map into several files")
+}
+
+/// A list or a map of which the end is still to come.
+struct Open {
+    at: Range<usize>,
+    anchor: usize,
+    /// The most lists and maps inside one another below this one.
+    depth: usize,
+    content: Content,
+}
+
+enum Content {
+    List(Vec<Node>),
+    Map {
+        entries: Vec<Entry>,
+        /// Where each key is, to refuse a second one.
+        keys: Keys,
+        /// Values of merge keys.
+        merged: Vec<Node>,
+        /// The key whose value comes next.
+        key: Option<(Rc<str>, Range<usize>, bool)>,
+    },
+}
+
+/// The first byte of each key of a map.
+type Keys = BTreeMap<Rc<str>, usize>;
+
+struct Tree<'a> {
+    document: &'a Document<'a>,
+    root: Option<Node>,
+    open: Vec<Open>,
+    /// Values that an alias may name, with their depths.
+    anchors: BTreeMap<usize, (Rc<Value>, usize)>,
+    values: usize,
+    merged: usize,
+}
+
+impl<'a> Tree<'a> {
+    fn new(document: &'a Document<'a>) -> Self {
+        Self {
+            document,
+            root: None,
+            open: Vec::new(),
+            anchors: BTreeMap::new(),
+            values: 0,
+            merged: 0,
+        }
+    }
+
+    fn source(&self) -> &Source<'a> {
+        &self.document.source
+    }
+
+    /// What a tag states is ignored, as OpenCV's `!!opencv-matrix`.
+    fn take(&mut self, event: Event<'_>, at: Range<usize>) -> Result<(), SiteError> {
+        match event {
+            Event::DocumentStart(..) if self.root.is_some() => Err(self
+                .document
+                .error(at, "the file has several documents")
+                .expected("one document")
+                .help("remove what begins with the second `---`")),
+            Event::Scalar(text, style, anchor, tag) => {
+                let value = Value::Scalar {
+                    text: text.into_owned(),
+                    is_plain: style == ScalarStyle::Plain && tag.is_none(),
+                };
+                self.add(at, anchor, 0, value)
+            }
+            Event::SequenceStart(_, anchor, _) => {
+                self.begin(at, anchor, Content::List(Vec::new()));
+                Ok(())
+            }
+            Event::MappingStart(_, anchor, _) => {
+                let content = Content::Map {
+                    entries: Vec::new(),
+                    keys: BTreeMap::new(),
+                    merged: Vec::new(),
+                    key: None,
+                };
+                self.begin(at, anchor, content);
+                Ok(())
+            }
+            Event::SequenceEnd | Event::MappingEnd => self.end(),
+            Event::Alias(anchor) => {
+                let Some((value, depth)) = self.anchors.get(&anchor).cloned() else {
+                    return Err(self
+                        .document
+                        .error(at, "the alias is inside the value that it names")
+                        .expected("an alias of a value that ends before it")
+                        .help("write the value out"));
+                };
+                self.place(Node { at, value }, depth)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn begin(&mut self, at: Range<usize>, anchor: usize, content: Content) {
+        self.open.push(Open {
+            at,
+            anchor,
+            depth: 0,
+            content,
+        });
+    }
+
+    fn end(&mut self) -> Result<(), SiteError> {
+        let Some(open) = self.open.pop() else {
+            return Ok(());
+        };
+        let value = match open.content {
+            Content::List(nodes) => Value::List(nodes),
+            Content::Map {
+                mut entries,
+                mut keys,
+                merged,
+                ..
+            } => {
+                for node in merged {
+                    self.merge(&node, &mut entries, &mut keys)?;
+                }
+                Value::Map(entries)
+            }
+        };
+        self.add(open.at, open.anchor, open.depth + 1, value)
+    }
+
+    /// Counts a value, remembers it if it has an anchor, and places it.
+    fn add(
+        &mut self,
+        at: Range<usize>,
+        anchor: usize,
+        depth: usize,
+        value: Value,
+    ) -> Result<(), SiteError> {
+        self.values += 1;
+        if self.values > MAX_VALUES || depth > MAX_DEPTH {
+            let what = if depth > MAX_DEPTH {
+                NESTS
+            } else {
+                "the file has too many values"
+            };
+            return Err(too_large(self.document.error(at, what)));
+        }
+        let value = Rc::new(value);
+        // The parser gives the number 0 to values without an anchor.
+        if anchor != 0 {
+            self.anchors.insert(anchor, (Rc::clone(&value), depth));
+        }
+        self.place(Node { at, value }, depth)
+    }
+
+    /// Puts a value into the list or map that is open, as its next key or value.
+    fn place(&mut self, node: Node, depth: usize) -> Result<(), SiteError> {
+        let source = *self.source();
+        let Some(open) = self.open.last_mut() else {
+            self.root = Some(node);
+            return Ok(());
+        };
+        open.depth = open.depth.max(depth);
+        match &mut open.content {
+            Content::List(nodes) => nodes.push(node),
+            Content::Map {
+                entries,
+                keys,
+                merged,
+                key,
+            } => match key.take() {
+                None => {
+                    let (text, is_plain) = match &*node.value {
+                        Value::Scalar { text, is_plain } if !node.value.is_null() => {
+                            (text, *is_plain)
+                        }
+                        _ => {
+                            return Err(source
+                                .error(node.at, "a key is empty, a list or a map")
+                                .expected("a text as key")
+                                .help(self.document.manner.written));
+                        }
+                    };
+                    let is_merge = is_plain && text == "<<";
+                    *key = Some((text.as_str().into(), node.at, is_merge));
+                }
+                Some((_, _, true)) => merged.push(node),
+                Some((key, key_at, false)) => {
+                    if let Some(first) = keys.insert(Rc::clone(&key), key_at.start) {
+                        let before = source.text.get(..first).unwrap_or_default();
+                        let line = 1 + before.matches('\n').count();
+                        let name = source.quote(key_at.clone());
+                        return Err(source
+                            .error(
+                                key_at,
+                                format!("`{name}` is there twice, first in line {line}"),
+                            )
+                            .expected("each key once")
+                            .help(format!("remove one; {}", self.document.manner.written)));
+                    }
+                    entries.push(Entry { key, key_at, node });
+                }
+            },
+        }
+        Ok(())
+    }
+
+    /// Adds the entries of a map, or of a list of maps, whose keys are not there yet.
+    fn merge(
+        &mut self,
+        node: &Node,
+        entries: &mut Vec<Entry>,
+        keys: &mut Keys,
+    ) -> Result<(), SiteError> {
+        let single = std::slice::from_ref(node);
+        let maps = match &*node.value {
+            Value::List(maps) => maps.as_slice(),
+            _ => single,
+        };
+        for map in maps {
+            let Value::Map(more) = &*map.value else {
+                return Err(self
+                    .document
+                    .error(node.at.clone(), "`<<` has a value that is not a map")
+                    .expected("a map, or a list of maps")
+                    .help("write `<<: *NAME`, where `&NAME` stands before a map"));
+            };
+            for entry in more {
+                self.merged += 1;
+                if self.merged > MAX_MERGED {
+                    return Err(too_large(self.document.error(
+                        node.at.clone(),
+                        format!("`<<` adds more than {MAX_MERGED} entries"),
+                    )));
+                }
+                if !keys.contains_key(&entry.key) {
+                    keys.insert(Rc::clone(&entry.key), entry.key_at.start);
+                    entries.push(entry.clone());
+                }
+            }
+        }
+        Ok(())
+    }
+}
