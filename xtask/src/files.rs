@@ -23,6 +23,11 @@ pub fn release(program: &str) -> PathBuf {
     target_folder().join("release").join(program)
 }
 
+/// Returns a program of the fast suite: `posegate`, or `examples/NAME`.
+pub fn tested(program: &str) -> PathBuf {
+    target_folder().join("debug").join(program)
+}
+
 /// A new temporary folder, removed when this is dropped.
 pub struct Scratch(PathBuf);
 

@@ -242,6 +242,12 @@ const JOBS: &[Job] = &[
         jobs::budgets::budgets,
     ),
     job(
+        "counts",
+        "",
+        "the figures of the budgets that are equal on every machine: instructions, stack, flash, accuracy",
+        jobs::budgets::counts,
+    ),
+    job(
         "flash",
         "",
         "bytes of flash of a complete gate in C, by part, core and level of optimization, and of a decision",
@@ -335,7 +341,7 @@ const ALL: &[&str] = &[
     "vectors",
     "c",
     "parts",
-    "budgets",
+    "counts",
     "adversarial 250000 today grid",
     "adversarial 250000 today facets",
 ];

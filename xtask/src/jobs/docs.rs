@@ -1,7 +1,8 @@
 //! `docs`: the API documents, and the commands of the README and of docs/.
 
 use crate::arguments::Arguments;
-use crate::files::{self, Scratch, root, target_folder};
+use crate::files::{self, Scratch, root, target_folder, tested};
+use crate::jobs::test::build_suite;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Result, cmd, program_at};
@@ -26,7 +27,7 @@ const PROGRAMS: [&str; 5] = [
     "make ",
 ];
 
-/// Commands that build and run a program, and the program that [`release_program`] built.
+/// Commands that build and run a program, and the program of the fast suite that stands for it.
 const BUILT: [(&str, &str); 2] = [
     ("cargo run --release -- ", "posegate"),
     (
@@ -39,7 +40,8 @@ const BUILT: [(&str, &str); 2] = [
 const OF_PYTHON: &str = "for-python.md";
 
 /// Builds the API documents of the core alone and of all libraries without a warning. Runs every command in the shell blocks of the
-/// README and of docs/, each page in a separate folder with the sample files.
+/// README and of docs/, each page in a separate folder with the sample files. The program is that
+/// of the fast suite, so that nothing is built twice; `budgets` and `dist` build it for release, and run the demo.
 pub fn docs(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
@@ -56,13 +58,11 @@ pub fn docs(_: &Arguments) -> Result {
     }
     let mut report = Report::default();
     check_front_pages(&mut report)?;
-    // Its lines are the README's. Built with the features of the fast suite, so that nothing is built twice.
-    cmd("cargo build --workspace --exclude posegate-peers --profile test --example may_dock")
-        .run()?;
-    program_at(&target_folder().join("debug/examples/may_dock")).run()?;
+    build_suite("--bin posegate --example may_dock --example drive_bag").run()?;
+    // Its lines are the README's.
+    program_at(&tested("examples/may_dock")).run()?;
     // Its command on the pages is replaced below, but its features must be enough.
     cmd("cargo check -p posegate-host --example drive_bag").run()?;
-    release_program()?;
     let mut pages = files::files_ending("docs", ".md")?;
     pages.retain(|page| !page.ends_with(OF_PYTHON));
     pages.insert(0, "README.md".into());
@@ -116,13 +116,6 @@ fn check_front_pages(report: &mut Report) -> Result {
         );
     }
     Ok(())
-}
-
-/// Builds the program, the example that the pages run, and that of the budgets. In one command, so that all have the same features.
-pub fn release_program() -> Result {
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate")
-        .words("--example drive_bag --example budgets")
-        .run()
 }
 
 /// Returns the commands of a page, or nothing if it has no block of them.
@@ -183,7 +176,7 @@ fn run(commands: &[String], folder: &Path) -> Result {
         files::copy(sample, folder.join(files::name(Path::new(sample))))?;
     }
     let old = std::env::var_os("PATH").unwrap_or_default();
-    let built = ["release", "release/examples"].map(|folder| target_folder().join(folder));
+    let built = ["", "examples"].map(tested);
     let paths = built.into_iter().chain(std::env::split_paths(&old));
     let path = std::env::join_paths(paths)?;
     for line in commands {

@@ -4,7 +4,6 @@
 use crate::arguments::Arguments;
 use crate::board::{self, Level};
 use crate::files::{self, Scratch, target_folder};
-use crate::jobs::docs::release_program;
 use crate::need;
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd, program_at, say};
@@ -117,7 +116,9 @@ pub fn nav2(given: &Arguments) -> Result {
 fn programs() -> Result {
     let manifest = format!("{CRATE}/Cargo.toml");
     in_target(cmd("cargo build --locked --release --manifest-path").arg(manifest)).run()?;
-    release_program()
+    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate")
+        .words("--example drive_bag")
+        .run()
 }
 
 /// Returns a command that runs a test of `tests/live` with a release of ROS.

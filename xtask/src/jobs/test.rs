@@ -1,5 +1,7 @@
 //! `test`, and the jobs that run one test with larger counts.
 
+mod programs;
+
 use crate::arguments::Arguments;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
@@ -10,6 +12,11 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// `posegate-peers` are separate: their dependencies take longer to build than the rest.
 pub fn suite(arguments: &str) -> Cmd {
     cmd("cargo test --workspace --exclude posegate-peers").words(arguments)
+}
+
+/// Returns the command that builds programs with the features of the fast suite, so that nothing is built twice.
+pub fn build_suite(arguments: &str) -> Cmd {
+    cmd("cargo build --workspace --exclude posegate-peers --profile test").words(arguments)
 }
 
 /// Firmware that tests of the fast suite run in the emulator.
@@ -27,7 +34,7 @@ pub fn test(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
     build_firmware()?;
-    suite("--lib --bins --tests").run()
+    programs::run(suite("--lib --bins --tests"))
 }
 
 /// Builds the firmware of the tests at once, where they look for it (`posegate_testkit::firmware`). Each test would build its own
@@ -52,8 +59,7 @@ pub fn alone(_: &Arguments) -> Result {
 pub fn peers(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
-    // With the features of the fast suite, which has built it.
-    cmd("cargo build --workspace --exclude posegate-peers --bin posegate --profile test").run()?;
+    build_suite("--bin posegate").run()?;
     cmd("cargo test -p posegate-peers").run()
 }
 

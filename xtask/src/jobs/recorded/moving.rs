@@ -1,6 +1,6 @@
 //! Recordings of robots that drive: for how long the interlock is open, with each fix carried along the odometry and without.
 
-use super::release_posegate;
+use super::posegate;
 use crate::files::{self, Scratch};
 use crate::jobs::test::suite;
 use crate::report::Report;
@@ -93,7 +93,7 @@ pub fn moving(folder: &Path) -> Result {
 /// The hall: AMCL under Nav2, without a truth.
 fn hall(folder: &Path, report: &mut Report) -> Result {
     let replay = |options: &str| -> Result<Interlock> {
-        let text = release_posegate()
+        let text = posegate()
             .words("replay examples/sites/turtlebot.toml")
             .arg(folder.join("nav2/nav2_turtlebot.mcap"))
             .words("--task hall --topic /amcl_pose --cross-terms yaw-unknown --json")
@@ -161,7 +161,7 @@ fn arena(folder: &Path, report: &mut Report) -> Result {
             files::write(scratch.join("odometry.csv"), &drive.odometry)?;
             files::write(scratch.join("truth.csv"), &drive.truth)?;
             let replay = |options: &str| {
-                release_posegate()
+                posegate()
                     .words("replay examples/sites/turtlebot.toml")
                     .arg(scratch.join("fixes.csv"))
                     .words("--task bay --json --truth-gap 3.2 --truth")

@@ -1,6 +1,6 @@
 //! The recorded robots: factors that are learnt on some of them, applied to the others.
 
-use super::{release_posegate, table};
+use super::{posegate, table};
 use crate::files::{self, Scratch};
 use crate::report::Report;
 use crate::shell::Result;
@@ -34,7 +34,7 @@ pub fn robots(folder: &Path) -> Result {
     let mut found = Vec::new();
     for left_out in subsets(&robots) {
         files::write(&all, rows_of(&estimates, |robot| !left_out.contains(robot)))?;
-        let learnt = release_posegate()
+        let learnt = posegate()
             .words("learn inflation")
             .arg(&all)
             .words(&format!("--epsilon {EPSILON} --json -o"))
@@ -53,7 +53,7 @@ pub fn robots(folder: &Path) -> Result {
         let learnt: Value = serde_json::from_str(&learnt.text)?;
         let factor = largest(&learnt).ok_or("no factor in the answer of `learn inflation`")?;
         files::write(&held, rows_of(&estimates, |name| name == robot))?;
-        let replay = release_posegate()
+        let replay = posegate()
             .words("replay examples/sites/turtlebot.toml")
             .arg(&held)
             .words(&format!("{BAY} --inflation {factor}"))
