@@ -18,6 +18,7 @@ pub mod judge;
 pub mod looks;
 pub mod mcap;
 pub mod mutants;
+pub mod nature;
 pub mod oracle;
 pub mod planning_sites;
 pub mod plant;

@@ -13,10 +13,15 @@ impl Random {
         z ^ (z >> 31)
     }
 
+    /// Returns a number from `low` to below `high`.
     pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// Returns one of a list.
+    ///
+    /// # Panics
+    /// If the list is empty.
     pub fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
         all[(self.bits() % all.len() as u64) as usize]
     }
@@ -32,8 +37,10 @@ impl Random {
     }
 }
 
+/// A vector in space, metres; or angles about x, y and z.
 pub type Vector = [f64; 3];
 
+/// Returns the length of a vector.
 pub fn norm(v: Vector) -> f64 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
@@ -53,7 +60,9 @@ fn dot(a: Vector, b: Vector) -> f64 {
 /// A rigid motion: the rows of the rotation, and the translation.
 #[derive(Clone, Copy)]
 pub struct Rigid {
+    /// Rows of the rotation.
     pub turn: [Vector; 3],
+    /// Metres.
     pub way: Vector,
 }
 
@@ -103,6 +112,7 @@ impl Rigid {
         }
     }
 
+    /// Returns the motion that undoes this one.
     pub fn inverse(&self) -> Self {
         let turn = [0, 1, 2].map(|r: usize| [0, 1, 2].map(|c: usize| self.turn[c][r]));
         let back = Self {
@@ -127,7 +137,9 @@ impl Rigid {
 /// A tag, a camera on the robot, and their tolerances.
 #[derive(Clone, Copy, Debug)]
 pub struct World {
+    /// Place of the tag in the world: metres; roll, pitch, yaw in degrees.
     pub tag: [Vector; 2],
+    /// Place of the camera on the robot: metres; roll, pitch, yaw in degrees.
     pub mount: [Vector; 2],
     /// Metres, degrees about the vertical.
     pub tag_off: [f64; 2],
@@ -167,6 +179,9 @@ fn view(camera: &Rigid, tag: &Rigid) -> [f64; 3] {
 impl World {
     /// Returns the largest errors of the robot's computed pose in all trials, metres and radians. `detector` bounds the
     /// detector's errors for the true view. It returns `None` for views that must not be used.
+    ///
+    /// # Errors
+    /// If the success set lets in a view that must not be used.
     pub fn worst(
         &self,
         pose: Vector,

@@ -1,17 +1,15 @@
 //! The error bound of a look holds for all true places of tag and camera within their tolerances.
 //!
-//! `nature.rs` displaces both to the ends of the tolerances, with the largest errors of the detector's error model. It
+//! `posegate_testkit::nature` displaces both to the ends of the tolerances, with the largest errors of the detector's error model. It
 //! computes the robot's pose from the places in the site file. It shares no code with the crate. The error must not
 //! exceed the bound at any pose of a success set S_l(r), nor in any look of a chain or a plan. The bound is not much
 //! larger than the largest error that is found.
 
-mod nature;
-
-use nature::{Random, Vector, World};
 use posegate_host::learn::{BoundsSettings, Detections, ErrorModel, learn_bounds};
 use posegate_host::place::{LearntCost, Task, ViewBound, ViewCost};
 use posegate_host::site::Site;
 use posegate_testkit::counts;
+use posegate_testkit::nature::{Random, Vector, World};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
