@@ -336,6 +336,63 @@ fn map_is_read_in_linear_time() {
     }
 }
 
+/// A small YAML file names a large value many times. It is refused before readers follow the names.
+#[test]
+fn aliases_are_counted_as_what_they_name() {
+    let folder = Folder::new(None);
+    let import = |format: &str| {
+        let more = match format {
+            "apriltag_ros" => "--convention apriltag_ros --family a --pose x=4",
+            _ => "",
+        };
+        format!("import mutant.yaml --format {format} {more} -o out.toml")
+    };
+    let check = || "check calibrated.toml".to_owned();
+    let members = format!(
+        "tag_bundles:\n  - &b {{name: d, layout: [{}]}}\n{}",
+        "{}, ".repeat(20_000),
+        "  - *b\n".repeat(2_000)
+    );
+    let keys = format!(
+        "k: &k \"a{}\"\nm: [{}]\n",
+        "a".repeat(200_000),
+        "{*k : 1}, ".repeat(30_000)
+    );
+    let numbers = format!(
+        "camera_matrix: {{data: [&n 0.{}1, {}]}}\n",
+        "0".repeat(400_000),
+        "*n, ".repeat(100_000)
+    );
+    let mut docks = format!(
+        "docks:\n  h: &h {{type: a, pose: [&n 0.{}1, *n, *n]}}\n",
+        "0".repeat(200_000)
+    );
+    for number in 0..20_000 {
+        writeln!(docks, "  a{number}: *h").unwrap();
+    }
+    let mut merged = format!("e: &e {{}}\nl: &l [{}]\n", "*e, ".repeat(150_000));
+    for number in 0..25_000 {
+        writeln!(merged, "m{number}: {{<<: *l}}").unwrap();
+    }
+    for (text, arguments) in [
+        (members, import("apriltag_ros")),
+        (keys, check()),
+        (numbers, check()),
+        (docks, import("nav2_docks")),
+        (merged, check()),
+    ] {
+        std::fs::write(folder.path("mutant.yaml"), text).unwrap();
+        let arguments: Vec<&str> = arguments.split_whitespace().collect();
+        let run = answered(&folder, &arguments.join(" "));
+        let error = words(&run.stderr);
+        assert_eq!(run.end, End::Exit(2), "{arguments:?}: {error}");
+        assert!(
+            error.contains("too many values") || error.contains("too long texts"),
+            "{arguments:?}: {error}"
+        );
+    }
+}
+
 /// Polygons with thousands of corners are refused. Those with the largest allowed number are read and built.
 #[test]
 fn polygon_with_too_many_corners_is_refused() {

@@ -37,6 +37,11 @@ pub fn run(suite: Cmd) -> Result {
         .words("--no-run --message-format json-render-diagnostics")
         .read()?;
     let programs = programs(&built)?;
+    for slow in SLOW {
+        if !programs.iter().any(|program| program.name == slow) {
+            return Err(format!("no test program is `{slow}`: correct the list SLOW").into());
+        }
+    }
     let failed = run_all(&programs)?;
     match failed.as_slice() {
         [] => Ok(()),

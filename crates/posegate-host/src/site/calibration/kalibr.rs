@@ -49,8 +49,8 @@ fn of_camera(
             AS_SAVED,
         )
     };
-    let unknown = |node: &Node, what: &str, word: &str, expected: &str, help: &str| {
-        let message = format!("the {what} {word:?} is not supported");
+    let unknown = |node: &Node, what: &str, expected: &str, help: &str| {
+        let message = format!("the {what} `{}` is not supported", document.quote(node));
         let error = document.error(node.at.clone(), message);
         error.expected(expected).help(help)
     };
@@ -59,7 +59,7 @@ fn of_camera(
     let word = document.text(model)?;
     if word != "pinhole" {
         let help = "calibrate with `--models pinhole-radtan` or `pinhole-equi`";
-        return Err(unknown(model, "camera model", word, "pinhole", help));
+        return Err(unknown(model, "camera model", "pinhole", help));
     }
     let list = required("intrinsics")?;
     let [fx, fy, cx, cy] = document.numbers(list, "intrinsics")?;
@@ -104,7 +104,7 @@ fn of_camera(
         None => {
             let help = "calibrate with `--models pinhole-radtan` or `pinhole-equi`";
             let expected = "radtan, equidistant or none";
-            return Err(unknown(model, "distortion model", word, expected, help));
+            return Err(unknown(model, "distortion model", expected, help));
         }
     };
     Ok(ParsedCalibration {

@@ -69,7 +69,7 @@ pub(super) fn read(
     let keys = document.map(&root)?;
     let numbers = if keys.keys().any(is_camera) {
         kalibr::read(&document, keys, camera)?
-    } else if keys.has("camera_matrix") {
+    } else if keys.get("camera_matrix").is_some() {
         if let Some(camera) = camera {
             return Err(node
                 .error(format!("{name} is a ROS calibration, of one camera"))

@@ -64,7 +64,10 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
                 .help(WHICH_MODEL));
         }
         None => {
-            let message = format!("the distortion model {model:?} is not known");
+            let message = format!(
+                "the distortion model `{}` is not known",
+                document.quote(model_at)
+            );
             return Err(document
                 .error(model_at.at.clone(), message)
                 .expected("plumb_bob, rational_polynomial or equidistant")

@@ -32,7 +32,8 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
     let document = Document::new(source, &MANNER)?;
     let root = document.parse()?;
     let file = document.map(&root)?;
-    if !file.has("tag_bundles") && !file.has("standalone_tags") {
+    let [bundles, singles] = ["tag_bundles", "standalone_tags"].map(|key| file.get(key));
+    if bundles.is_none() && singles.is_none() {
         return Err(document
             .error(0..0, "the file has neither `tag_bundles` nor `standalone_tags`")
             .expected(MANNER.what)
@@ -41,13 +42,9 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
                  tables",
             ));
     }
-    let list = |key: &str| match file.get(key) {
-        Some(list) => document.list(list),
-        None => Ok(&[][..]),
-    };
     // All are read, so that a misspelt key is found before its bundle is chosen.
     let mut parts = Vec::new();
-    for (index, node) in list("tag_bundles")?.iter().enumerate() {
+    for (index, node) in document.list_or_none(bundles)?.iter().enumerate() {
         let bundle = document.map(node)?;
         document.only_keys(bundle, &["name", "layout"])?;
         let name = match bundle.get("name") {
@@ -68,7 +65,7 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
             },
         ));
     }
-    for node in list("standalone_tags")? {
+    for node in document.list_or_none(singles)? {
         let member = Member::read(&document, node, &["id", "size", "name"])?;
         let id = document.required(
             member.id.as_ref(),

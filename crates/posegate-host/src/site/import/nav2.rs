@@ -28,16 +28,15 @@ pub(super) fn read(
     let document = Document::new(source, &MANNER)?;
     let root = document.parse()?;
     let file = document.map(&root)?;
-    if !file.has("docks") {
-        return Err(document
+    let docks = file.get("docks").ok_or_else(|| {
+        document
             .error(0..0, "the file has no `docks`")
             .expected(MANNER.what)
             .help(
                 "name the file of the docking server's parameter `dock_database`; docks in the server's own \
                  parameters must be moved into that file",
-            ));
-    }
-    let docks = document.required(file.get("docks"), 0..0, "docks", MANNER.written)?;
+            )
+    })?;
     let mut shared: Option<String> = None;
     let mut found = Vec::new();
     for (name, node) in document.map(docks)?.sorted() {

@@ -201,7 +201,7 @@ image_width: 640\n => - => - => image_height => `image_width` is missing => ost.
 -0.22, => .inf, => - => .inf => distortion_coefficients[0] is inf => calibrate again
 -0.006] => ] => - => [-0.22 => has 4 numbers, plumb_bob has 5 => rational_polynomial
 236.5, 0.0, 0.0, 1.0] => 236.5] => - => [410.5 => camera_matrix has 6 numbers => saved
-plumb_bob => fov => - => fov => the distortion model "fov" is not known => equidistant
+plumb_bob => fov => - => fov => the distortion model `fov` is not known => equidistant
 distortion_model: plumb_bob\n => - => - => image_width => `distortion_model` is missing => do not say which
 camera_matrix: => camera_matrices: => - => image_width => is not a known kind of calibration => CameraInfo
 410.5, 0.0 => a410, 0.0 => - => a410 => found `a410` => plainly
@@ -214,8 +214,8 @@ image_height: 480 => image_height: 960 => height_px = 480 => 640\n => is for ima
 const KALIBR_FAULTS: &str = r#"
 cam1: => cam2: => - => cam0 => several cameras: `cam0`, `cam2` => #cam0
 cam1: => cam2: => #cam1 => cam0 => no camera `cam1` => #cam0
-camera_model: pinhole => camera_model: omni => #cam0 => omni => the camera model "omni" is not supported => pinhole-radtan
-radtan => fov => #cam0 => fov => the distortion model "fov" is not supported => pinhole-equi
+camera_model: pinhole => camera_model: omni => #cam0 => omni => the camera model `omni` is not supported => pinhole-radtan
+radtan => fov => #cam0 => fov => the distortion model `fov` is not supported => pinhole-equi
 , -0.002] => ] => #cam0 => [-0.2 => has 3 numbers, radtan has 4 => camchain
 [410.5, 411.5 => [411.5 => #cam0 => [411.5 => intrinsics has 3 numbers => saved
 [410.5, => [0, => #cam0 => [0, => focal lengths are 0 and 411.5 => calibrate

@@ -38,15 +38,10 @@ pub(super) struct Map<'a> {
 }
 
 impl<'a> Map<'a> {
-    /// Returns the value of a key; `None` also if it is empty or `null`.
+    /// Returns the value of a key. A key without a value has an empty one, which no reader takes for a default.
     pub(super) fn get(&self, key: &str) -> Option<&'a Node> {
         let entry = self.entries.iter().find(|entry| &*entry.key == key)?;
-        (!entry.node.value.is_null()).then_some(&entry.node)
-    }
-
-    /// Returns `true` if the map has a key, even without a value.
-    pub(super) fn has(&self, key: &str) -> bool {
-        self.keys().any(|other| other == key)
+        Some(&entry.node)
     }
 
     /// Returns the keys in the order of the file.
@@ -68,7 +63,7 @@ impl<'a> Map<'a> {
 
 impl<'a> Document<'a> {
     /// Refuses indents by tabs: the position of the text after a tab would be misleading. (The parser
-    /// ignores OpenCV's `%YAML:1.0` and `!!opencv-matrix`.)
+    /// ignores OpenCV's `%YAML:1.0`.)
     pub(super) fn new(
         source: Source<'a>,
         manner: &'static FormatMessages,
@@ -93,6 +88,11 @@ impl<'a> Document<'a> {
         tree::parse(self)
     }
 
+    /// Returns the text of a value, shortened to a part of one line.
+    pub(super) fn quote(&self, node: &Node) -> String {
+        self.source.quote(node.at.clone())
+    }
+
     pub(super) fn error(
         &self,
         at: Range<usize>,
@@ -107,19 +107,26 @@ impl<'a> Document<'a> {
             Value::List(_) => "a list".to_owned(),
             Value::Map(_) => "a map of keys".to_owned(),
             Value::Scalar { .. } if node.value.is_null() => "no value".to_owned(),
-            Value::Scalar { .. } => format!("`{}`", self.source.quote(node.at.clone())),
+            Value::Scalar { .. } => format!("`{}`", self.quote(node)),
         };
         self.error(node.at.clone(), format!("found {found}"))
             .expected(expected.to_owned())
             .help(help)
     }
 
-    /// Returns the entries of a map. An empty file is an empty map.
+    /// Returns the entries of a map.
     pub(super) fn map<'n>(&self, node: &'n Node) -> Result<Map<'n>, SiteError> {
         match &*node.value {
             Value::Map(entries) => Ok(Map { entries }),
-            _ if node.at.is_empty() && node.value.is_null() => Ok(Map { entries: &[] }),
             _ => Err(self.another(node, self.manner.what, self.manner.written)),
+        }
+    }
+
+    /// Returns the values of a list; none if the key has no value.
+    pub(super) fn list_or_none<'n>(&self, node: Option<&'n Node>) -> Result<&'n [Node], SiteError> {
+        match node {
+            Some(node) if !node.value.is_null() => self.list(node),
+            _ => Ok(&[]),
         }
     }
 
@@ -134,7 +141,7 @@ impl<'a> Document<'a> {
     /// Returns a text, with or without quotes.
     pub(super) fn text<'n>(&self, node: &'n Node) -> Result<&'n str, SiteError> {
         match &*node.value {
-            Value::Scalar { text, .. } => Ok(text),
+            Value::Scalar { text, .. } if !node.value.is_null() => Ok(text),
             _ => Err(self.another(node, "a text", self.manner.written)),
         }
     }
@@ -231,7 +238,7 @@ impl<'a> Document<'a> {
 
 fn scalar(node: &Node) -> Option<&str> {
     match &*node.value {
-        Value::Scalar { text, .. } => Some(text.trim()),
+        Value::Scalar { text, .. } => Some(text.trim_ascii()),
         _ => None,
     }
 }

@@ -46,23 +46,85 @@ fn values_have_their_positions() {
     assert_eq!((at(e), document.whole(e).unwrap()), ("4", 4));
 }
 
+/// An empty value is no default: it would be 0 or the identity where someone has still to write a number.
 #[test]
-fn empty_values_are_missing() {
-    let document = document("a:\nb: ~\nc: null\nd: 'null'\ne: !!str\n");
+fn empty_values_are_refused() {
+    let document = document("a:\nb: ~\nc: null\nd: 'null'\ne: ''\nf: {g: }\n");
     let root = document.parse().unwrap();
     let map = document.map(&root).unwrap();
     for key in ["a", "b", "c"] {
-        assert!(map.has(key) && map.get(key).is_none(), "{key}");
+        let node = map.get(key).unwrap();
+        for error in [
+            document.text(node).unwrap_err(),
+            document.number(node).unwrap_err(),
+            document.whole(node).unwrap_err(),
+            document.list(node).unwrap_err(),
+            document.map(node).err().unwrap(),
+        ] {
+            assert_eq!(&*error.message, "found no value", "{key}");
+        }
+        assert!(document.list_or_none(Some(node)).unwrap().is_empty());
     }
-    assert!(map.get("d").is_some() && map.get("e").is_some() && !map.has("f"));
-    let nothing = self::document("# nothing\n");
-    let root = nothing.parse().unwrap();
-    assert_eq!(nothing.map(&root).unwrap().keys().count(), 0);
-    for other in ["~\n", "word\n", "[1]\n"] {
+    for (key, text) in [("d", "null"), ("e", "")] {
+        let node = map.get(key).unwrap();
+        assert_eq!(document.text(node).unwrap(), text);
+        assert!(document.list_or_none(Some(node)).is_err());
+    }
+    assert!(map.get("h").is_none() && document.list_or_none(None).unwrap().is_empty());
+    for nothing in ["", "# nothing\n", "---\n", "~\n"] {
+        let document = self::document(nothing);
+        let root = document.parse().unwrap();
+        assert_eq!(document.map(&root).unwrap().keys().count(), 0);
+    }
+    for other in ["word\n", "[1]\n"] {
         let document = self::document(other);
         let root = document.parse().unwrap();
         assert!(document.map(&root).is_err(), "{other}");
     }
+}
+
+/// A tag may change what a value means.
+#[test]
+fn tags_are_refused() {
+    for value in [
+        "!degrees 5",
+        "!!float 5",
+        "!!str 5",
+        "!!null 5",
+        "!!int 3.7",
+        "! 5",
+        "!!float [5]",
+        "!!float {b: 5}",
+        "!!opencv-matrix [5]",
+        "!!opencv-matrix 5",
+        "!!merge 5",
+        "&b !t 5",
+    ] {
+        let error = fault(&format!("a: {value}\n"));
+        assert!(
+            error.message.contains("the value has the tag `!"),
+            "{value}: {error}"
+        );
+        assert!(error.expected.is_some() && error.help.is_some() && error.at.unwrap().line == 1);
+    }
+    let text = "a: !!opencv-matrix\n  data: [5]\nb: &b {c: 1}\nd: {!!merge <<: *b}\n";
+    let document = document(text);
+    let root = document.parse().unwrap();
+    let map = document.map(&root).unwrap();
+    assert!(
+        document
+            .map(map.get("a").unwrap())
+            .unwrap()
+            .get("data")
+            .is_some()
+    );
+    assert!(
+        document
+            .map(map.get("d").unwrap())
+            .unwrap()
+            .get("c")
+            .is_some()
+    );
 }
 
 #[test]
@@ -136,7 +198,7 @@ fn merge_keys_add_what_is_missing() {
         [None, Some(3), Some(4)]
     );
     // In quotes it is a key like others.
-    assert!(map.has("<<"));
+    assert!(map.get("<<").is_some());
     assert_eq!(
         place(&fault("a: 1\n<<: 2\n")),
         ("`<<` has a value that is not a map", 2, 5)
@@ -237,33 +299,45 @@ fn values_of_another_kind_are_named() {
     }
 }
 
-/// Files that would fill the memory, or the stack, of a reader that follows every alias.
+/// Files that would fill the memory, the stack or a day of a reader that follows every alias.
 #[test]
 fn files_are_limited() {
-    // Each list has the one before nine times: 9^60 values if each alias was written out.
-    let mut laughs = String::from("a0: &a0 [1]\n");
-    for at in 1..60 {
-        let list = vec![format!("*a{}", at - 1); 9].join(", ");
-        laughs.push_str(&format!("a{at}: &a{at} [{list}]\n"));
-    }
-    let all = document(&laughs);
-    let root = all.parse().unwrap();
-    assert_eq!(all.map(&root).unwrap().keys().count(), 60);
+    let too_many = "the file has too many values";
+    let too_long = "the file has too long texts";
+    let nests = "the file nests too deep";
+    let refused = |text: &str, message: &str| {
+        let error = fault(text);
+        assert_eq!(&*error.message, message);
+        let expected = error.expected.unwrap();
+        assert!(expected.contains("250000 values"), "{expected}");
+    };
+    // Each list has the one before nine times.
+    let laughs = |count: usize| {
+        let mut text = String::from("a0: &a0 [1]\n");
+        for at in 1..count {
+            let list = vec![format!("*a{}", at - 1); 9].join(", ");
+            text.push_str(&format!("a{at}: &a{at} [{list}]\n"));
+        }
+        text
+    };
+    assert!(document(&laughs(5)).parse().is_ok());
+    refused(&laughs(60), too_many);
     // A chain of aliases is as deep as brackets are.
-    let mut chain = String::from("a0: &a0 [1]\n");
-    for at in 1..50_000 {
-        chain.push_str(&format!("a{at}: &a{at} [*a{}]\n", at - 1));
-    }
-    assert_eq!(place(&fault(&chain)).0, "the file nests too deep");
+    let chain = |count: usize| {
+        let mut text = String::from("a0: &a0 [1]\n");
+        for at in 1..count {
+            text.push_str(&format!("a{at}: &a{at} [*a{}]\n", at - 1));
+        }
+        text
+    };
+    assert!(document(&chain(60)).parse().is_ok());
+    refused(&chain(5_000), nests);
     for (open, close) in [("[", "]"), ("{a: ", "}")] {
         let nested = |depth: usize| format!("{}1{}", open.repeat(depth), close.repeat(depth));
         assert!(document(&nested(60)).parse().is_ok());
-        let error = fault(&nested(100_000));
-        assert!(
-            error.expected.as_deref().unwrap().contains("deep"),
-            "{error}"
-        );
+        refused(&nested(100_000), nests);
     }
+    // Maps that are merged count where they are merged, also those that add nothing.
     let merged = |count: usize| {
         let base: String = (0..100).map(|key| format!("k{key}: 1, ")).collect();
         let maps: String = (0..count)
@@ -271,12 +345,36 @@ fn files_are_limited() {
             .collect();
         format!("b: &b {{{base}}}\n{maps}")
     };
-    assert!(document(&merged(100)).parse().is_ok());
-    assert!(fault(&merged(101)).message.contains("adds more than 10000"));
+    assert!(document(&merged(1_000)).parse().is_ok());
+    refused(&merged(1_300), too_many);
+    let empty = |count: usize| {
+        let maps: String = (0..count)
+            .map(|map| format!("m{map}: {{<<: *l}}\n"))
+            .collect();
+        format!("e: &e {{}}\nl: &l [{}]\n{maps}", "*e, ".repeat(1_000))
+    };
+    assert!(document(&empty(200)).parse().is_ok());
+    refused(&empty(400), too_many);
     let many = |count: usize| format!("a: [{}]\n", "1, ".repeat(count));
     assert!(document(&many(249_990)).parse().is_ok());
-    assert_eq!(
-        place(&fault(&many(250_001))).0,
-        "the file has too many values"
-    );
+    refused(&many(250_001), too_many);
+    // A long number, and a long key, many times.
+    let long = |count: usize| {
+        format!(
+            "n: &n 0.{}1\na: [{}]\n",
+            "0".repeat(100_000),
+            "*n, ".repeat(count)
+        )
+    };
+    assert!(document(&long(100)).parse().is_ok());
+    refused(&long(1_000), too_long);
+    let keys = |count: usize| {
+        format!(
+            "k: &k \"{}\"\na: [{}]\n",
+            "a".repeat(100_000),
+            "{*k : 1}, ".repeat(count)
+        )
+    };
+    assert!(document(&keys(100)).parse().is_ok());
+    refused(&keys(1_000), too_long);
 }

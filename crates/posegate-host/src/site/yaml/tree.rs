@@ -9,10 +9,10 @@ use granit_parser::{ErrorKind, Event, Parser, ScalarStyle, ScanError, Span, opti
 use super::{Document, TABS};
 use crate::site::error::{SiteError, Source};
 
-/// The most values of a file. What an alias names again is not counted again, since it is shared.
+/// The most values of a file, with each alias as the values that it names: readers follow aliases.
 const MAX_VALUES: usize = 250_000;
-/// The most entries that merge keys (`<<`) add.
-const MAX_MERGED: usize = 10_000;
+/// The most bytes of all texts, counted likewise.
+const MAX_TEXT: usize = 64 << 20;
 /// The most lists and maps inside one another.
 const MAX_DEPTH: usize = 64;
 const NESTS: &str = "the file nests too deep";
@@ -29,7 +29,7 @@ pub(in crate::site) struct Node {
 pub(in crate::site) enum Value {
     Scalar {
         text: String,
-        /// Without quotes and tag: an empty text is no value.
+        /// Without quotes: an empty text is no value.
         is_plain: bool,
     },
     List(Vec<Node>),
@@ -45,20 +45,22 @@ pub(in crate::site) struct Entry {
 }
 
 impl Value {
-    fn empty() -> Self {
-        Self::Scalar {
-            text: String::new(),
-            is_plain: true,
-        }
-    }
-
     /// Returns `true` for no value, `~` and `null`.
     pub(super) fn is_null(&self) -> bool {
         matches!(self, Self::Scalar { text, is_plain: true } if matches!(text.as_str(), "" | "~" | "null" | "Null" | "NULL"))
     }
 }
 
-/// Returns the value of a text with one document. An empty text has an empty value.
+/// What a value and all that is in it takes.
+#[derive(Clone, Copy, Default)]
+struct Size {
+    values: usize,
+    text: usize,
+    /// Lists and maps inside one another.
+    depth: usize,
+}
+
+/// Returns the value of a text with one document. An empty text is a map without keys.
 pub(super) fn parse(document: &Document<'_>) -> Result<Node, SiteError> {
     let options = options! {
         flow_nesting_limit: MAX_DEPTH,
@@ -69,10 +71,13 @@ pub(super) fn parse(document: &Document<'_>) -> Result<Node, SiteError> {
         let (event, span) = event.map_err(|fault| not_read(document, &fault))?;
         tree.take(event, bytes(span))?;
     }
-    Ok(tree.root.unwrap_or_else(|| Node {
-        at: 0..0,
-        value: Rc::new(Value::empty()),
-    }))
+    Ok(match tree.root {
+        Some(node) if !node.value.is_null() => node,
+        _ => Node {
+            at: 0..0,
+            value: Rc::new(Value::Map(Vec::new())),
+        },
+    })
 }
 
 fn bytes(span: Span) -> Range<usize> {
@@ -95,6 +100,11 @@ fn not_read(document: &Document<'_>, fault: &ScanError) -> SiteError {
     }
 }
 
+/// Returns the beginning of a name of any length.
+fn short(name: &str) -> String {
+    name.chars().take(40).collect()
+}
+
 fn too_large(error: SiteError) -> SiteError {
     error
         .expected(format!(
@@ -107,8 +117,8 @@ fn too_large(error: SiteError) -> SiteError {
 struct Open {
     at: Range<usize>,
     anchor: usize,
-    /// The most lists and maps inside one another below this one.
-    depth: usize,
+    /// Of what is in it until now.
+    size: Size,
     content: Content,
 }
 
@@ -132,10 +142,10 @@ struct Tree<'a> {
     document: &'a Document<'a>,
     root: Option<Node>,
     open: Vec<Open>,
-    /// Values that an alias may name, with their depths.
-    anchors: BTreeMap<usize, (Rc<Value>, usize)>,
-    values: usize,
-    merged: usize,
+    /// Values that an alias may name.
+    anchors: BTreeMap<usize, (Rc<Value>, Size)>,
+    /// Of the whole file until now.
+    size: Size,
 }
 
 impl<'a> Tree<'a> {
@@ -145,8 +155,7 @@ impl<'a> Tree<'a> {
             root: None,
             open: Vec::new(),
             anchors: BTreeMap::new(),
-            values: 0,
-            merged: 0,
+            size: Size::default(),
         }
     }
 
@@ -154,25 +163,28 @@ impl<'a> Tree<'a> {
         &self.document.source
     }
 
-    /// What a tag states is ignored, as OpenCV's `!!opencv-matrix`.
     fn take(&mut self, event: Event<'_>, at: Range<usize>) -> Result<(), SiteError> {
+        self.check_tag(&event, &at)?;
         match event {
             Event::DocumentStart(..) if self.root.is_some() => Err(self
                 .document
                 .error(at, "the file has several documents")
                 .expected("one document")
                 .help("remove what begins with the second `---`")),
-            Event::Scalar(text, style, anchor, tag) => {
+            Event::Scalar(text, style, anchor, _) => {
+                let size = Size {
+                    values: 1,
+                    text: text.len(),
+                    depth: 0,
+                };
                 let value = Value::Scalar {
                     text: text.into_owned(),
-                    is_plain: style == ScalarStyle::Plain && tag.is_none(),
+                    is_plain: style == ScalarStyle::Plain,
                 };
-                self.add(at, anchor, 0, value)
+                self.charge(&at, size)?;
+                self.add(at, anchor, size, value)
             }
-            Event::SequenceStart(_, anchor, _) => {
-                self.begin(at, anchor, Content::List(Vec::new()));
-                Ok(())
-            }
+            Event::SequenceStart(_, anchor, _) => self.begin(at, anchor, Content::List(Vec::new())),
             Event::MappingStart(_, anchor, _) => {
                 let content = Content::Map {
                     entries: Vec::new(),
@@ -180,31 +192,83 @@ impl<'a> Tree<'a> {
                     merged: Vec::new(),
                     key: None,
                 };
-                self.begin(at, anchor, content);
-                Ok(())
+                self.begin(at, anchor, content)
             }
             Event::SequenceEnd | Event::MappingEnd => self.end(),
             Event::Alias(anchor) => {
-                let Some((value, depth)) = self.anchors.get(&anchor).cloned() else {
+                let Some((value, size)) = self.anchors.get(&anchor).cloned() else {
                     return Err(self
                         .document
                         .error(at, "the alias is inside the value that it names")
                         .expected("an alias of a value that ends before it")
                         .help("write the value out"));
                 };
-                self.place(Node { at, value }, depth)
+                self.charge(&at, size)?;
+                self.place(Node { at, value }, size)
             }
             _ => Ok(()),
         }
     }
 
-    fn begin(&mut self, at: Range<usize>, anchor: usize, content: Content) {
+    /// Refuses a tag: it may change a value, as `!degrees` does. OpenCV's `!!opencv-matrix` says only what its keys say, and
+    /// `!!merge` stands before merge keys.
+    fn check_tag(&self, event: &Event<'_>, at: &Range<usize>) -> Result<(), SiteError> {
+        let Some(tag) = event.tag() else {
+            return Ok(());
+        };
+        let name = tag.original();
+        let is_harmless = match event {
+            Event::MappingStart(..) => name == "!!opencv-matrix",
+            Event::Scalar(text, ..) => text == "<<" && name == "!!merge",
+            _ => false,
+        };
+        if is_harmless {
+            return Ok(());
+        }
+        Err(self
+            .document
+            .error(
+                at.clone(),
+                format!("the value has the tag `{}`", short(&name)),
+            )
+            .expected("a value without a tag")
+            .help("remove the tag, and write the value as it is meant"))
+    }
+
+    /// Counts a value.
+    fn charge(&mut self, at: &Range<usize>, size: Size) -> Result<(), SiteError> {
+        self.size.values = self.size.values.saturating_add(size.values);
+        self.size.text = self.size.text.saturating_add(size.text);
+        let message = if size.depth > MAX_DEPTH {
+            NESTS
+        } else if self.size.values > MAX_VALUES {
+            "the file has too many values"
+        } else if self.size.text > MAX_TEXT {
+            "the file has too long texts"
+        } else {
+            return Ok(());
+        };
+        Err(too_large(self.document.error(at.clone(), message)))
+    }
+
+    fn begin(
+        &mut self,
+        at: Range<usize>,
+        anchor: usize,
+        content: Content,
+    ) -> Result<(), SiteError> {
+        let size = Size {
+            values: 1,
+            ..Size::default()
+        };
+        self.charge(&at, size)?;
         self.open.push(Open {
             at,
             anchor,
-            depth: 0,
+            size,
             content,
         });
+        Ok(())
     }
 
     fn end(&mut self) -> Result<(), SiteError> {
@@ -225,42 +289,44 @@ impl<'a> Tree<'a> {
                 Value::Map(entries)
             }
         };
-        self.add(open.at, open.anchor, open.depth + 1, value)
+        let size = Size {
+            depth: open.size.depth + 1,
+            ..open.size
+        };
+        self.add(open.at, open.anchor, size, value)
     }
 
-    /// Counts a value, remembers it if it has an anchor, and places it.
+    /// Remembers a value if it has an anchor, and places it.
     fn add(
         &mut self,
         at: Range<usize>,
         anchor: usize,
-        depth: usize,
+        size: Size,
         value: Value,
     ) -> Result<(), SiteError> {
-        self.values += 1;
-        if self.values > MAX_VALUES || depth > MAX_DEPTH {
-            let what = if depth > MAX_DEPTH {
-                NESTS
-            } else {
-                "the file has too many values"
-            };
-            return Err(too_large(self.document.error(at, what)));
+        if size.depth > MAX_DEPTH {
+            return Err(too_large(self.document.error(at, NESTS)));
         }
         let value = Rc::new(value);
         // The parser gives the number 0 to values without an anchor.
         if anchor != 0 {
-            self.anchors.insert(anchor, (Rc::clone(&value), depth));
+            self.anchors.insert(anchor, (Rc::clone(&value), size));
         }
-        self.place(Node { at, value }, depth)
+        self.place(Node { at, value }, size)
     }
 
     /// Puts a value into the list or map that is open, as its next key or value.
-    fn place(&mut self, node: Node, depth: usize) -> Result<(), SiteError> {
+    fn place(&mut self, node: Node, size: Size) -> Result<(), SiteError> {
         let source = *self.source();
         let Some(open) = self.open.last_mut() else {
             self.root = Some(node);
             return Ok(());
         };
-        open.depth = open.depth.max(depth);
+        open.size = Size {
+            values: open.size.values.saturating_add(size.values),
+            text: open.size.text.saturating_add(size.text),
+            depth: open.size.depth.max(size.depth),
+        };
         match &mut open.content {
             Content::List(nodes) => nodes.push(node),
             Content::Map {
@@ -305,9 +371,9 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
-    /// Adds the entries of a map, or of a list of maps, whose keys are not there yet.
+    /// Adds the entries of a map, or of a list of maps, whose keys are not there yet. The map is counted already, where it stands.
     fn merge(
-        &mut self,
+        &self,
         node: &Node,
         entries: &mut Vec<Entry>,
         keys: &mut Keys,
@@ -326,13 +392,6 @@ impl<'a> Tree<'a> {
                     .help("write `<<: *NAME`, where `&NAME` stands before a map"));
             };
             for entry in more {
-                self.merged += 1;
-                if self.merged > MAX_MERGED {
-                    return Err(too_large(self.document.error(
-                        node.at.clone(),
-                        format!("`<<` adds more than {MAX_MERGED} entries"),
-                    )));
-                }
                 if !keys.contains_key(&entry.key) {
                     keys.insert(Rc::clone(&entry.key), entry.key_at.start);
                     entries.push(entry.clone());
