@@ -111,6 +111,12 @@ fn tags_are_refused() {
         );
         assert!(error.expected.is_some() && error.help.is_some() && error.at.unwrap().line == 1);
     }
+    // It would be a key like others, and its map would be ignored.
+    assert!(
+        fault("b: &b {c: 1}\nd: {!!merge '<<': *b}\n")
+            .message
+            .contains("`!!merge`")
+    );
     let text = "a: !!opencv-matrix\n  data: [5]\nb: &b {c: 1}\nd: {!!merge <<: *b}\n";
     let document = document(text);
     let root = document.parse().unwrap();

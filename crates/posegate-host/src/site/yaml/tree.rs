@@ -219,7 +219,7 @@ impl<'a> Tree<'a> {
         let name = tag.original();
         let is_harmless = match event {
             Event::MappingStart(..) => name == "!!opencv-matrix",
-            Event::Scalar(text, ..) => text == "<<" && name == "!!merge",
+            Event::Scalar(text, ScalarStyle::Plain, ..) => text == "<<" && name == "!!merge",
             _ => false,
         };
         if is_harmless {
