@@ -106,10 +106,11 @@ fn run_all(programs: &[Program]) -> Result<Vec<String>> {
     std::thread::scope(|scope| {
         for _ in 0..cores.min(programs.len()) {
             scope.spawn(|| {
-                while let Some((index, program)) = {
+                loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    programs.get(index).map(|program| (index, program))
-                } {
+                    let Some(program) = programs.get(index) else {
+                        break;
+                    };
                     if !run_one(program) {
                         failed
                             .lock()

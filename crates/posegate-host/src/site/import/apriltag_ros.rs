@@ -8,7 +8,6 @@ use crate::site::error::{SiteError, Source};
 use crate::site::suggest;
 use crate::site::yaml::{Document, FormatMessages, Node};
 
-const MEMBER_KEYS: [&str; 9] = ["id", "size", "x", "y", "z", "qw", "qx", "qy", "qz"];
 const POSE_KEYS: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 
 const MANNER: FormatMessages = FormatMessages {
@@ -42,7 +41,8 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
                  tables",
             ));
     }
-    // All are read, so that a misspelt key is found before its bundle is chosen.
+    // All bundles are read, so a misspelt key is found in each of them.
+    let member_keys = [&["id", "size"], &POSE_KEYS[..]].concat();
     let mut parts = Vec::new();
     for (index, node) in document.list_or_none(bundles)?.iter().enumerate() {
         let bundle = document.map(node)?;
@@ -54,7 +54,7 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
         let members = bundle.get("layout").map(|layout| {
             let members = document.list(layout)?.iter();
             members
-                .map(|node| Member::read(&document, node, &MEMBER_KEYS))
+                .map(|node| Member::read(&document, node, &member_keys))
                 .collect()
         });
         parts.push((
@@ -99,12 +99,12 @@ struct Part {
     members: Option<Vec<Member>>,
 }
 
-/// The numbers of a tag that are in the file.
+/// The numbers that the file states of a tag; `None` for each missing key.
 struct Member {
     at: Range<usize>,
     id: Option<Placed<u32>>,
     size: Option<Placed<f64>>,
-    /// Of [`POSE_KEYS`].
+    /// The values of [`POSE_KEYS`], metres and parts of a quaternion.
     pose: [Option<Placed<f64>>; 7],
 }
 
@@ -186,7 +186,7 @@ fn of_member(document: &Document<'_>, member: Member) -> Result<Found, SiteError
             .expected("the black border's outer edge in metres, above 0 and at most 10")
             .help("sizes are metres: 165 mm are 0.165"));
     }
-    // Without its keys a tag is in the middle of the frame, as the frame is turned.
+    // The defaults of apriltag_ros: the origin and the identity.
     let mut pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
     for ((value, key), given) in pose.iter_mut().zip(POSE_KEYS).zip(&member.pose) {
         let Some(given) = given else { continue };

@@ -38,7 +38,8 @@ pub(super) struct Map<'a> {
 }
 
 impl<'a> Map<'a> {
-    /// Returns the value of a key. A key without a value has an empty one, which no reader takes for a default.
+    /// Returns the value of a key; `None` if the map does not have the key. A key without a value has an empty scalar, which
+    /// [`Document::text`], [`Document::number`] and the others refuse: a default would hide that someone has still to write it.
     pub(super) fn get(&self, key: &str) -> Option<&'a Node> {
         let entry = self.entries.iter().find(|entry| &*entry.key == key)?;
         Some(&entry.node)
@@ -49,7 +50,7 @@ impl<'a> Map<'a> {
         self.entries.iter().map(|entry| &*entry.key)
     }
 
-    /// Returns keys and values by key.
+    /// Returns the keys in alphabetical order, with their values.
     pub(super) fn sorted(&self) -> Vec<(&'a str, &'a Node)> {
         let mut all: Vec<_> = self
             .entries
@@ -160,24 +161,19 @@ impl<'a> Document<'a> {
             .ok_or_else(|| self.another(node, "a whole number", self.manner.numbers))
     }
 
-    /// Returns the numbers of a list.
-    pub(super) fn all_numbers(&self, list: &Node) -> Result<Vec<f64>, SiteError> {
-        let nodes = self.list(list)?;
-        nodes.iter().map(|node| self.number(node)).collect()
-    }
-
-    /// Returns the finite numbers of a list.
+    /// Returns the numbers of a list, all of which must be finite. `name` is the list's name in errors.
     pub(super) fn finite_numbers(&self, list: &Node, name: &str) -> Result<Vec<f64>, SiteError> {
-        let numbers = self.all_numbers(list)?;
-        for (index, (number, node)) in numbers.iter().zip(self.list(list)?).enumerate() {
-            if !number.is_finite() {
-                return Err(self
-                    .error(node.at.clone(), format!("{name}[{index}] is {number}"))
-                    .expected("a finite number")
-                    .help(self.manner.not_finite));
+        let finite = |(index, node): (usize, &Node)| {
+            let number = self.number(node)?;
+            if number.is_finite() {
+                return Ok(number);
             }
-        }
-        Ok(numbers)
+            Err(self
+                .error(node.at.clone(), format!("{name}[{index}] is {number}"))
+                .expected("a finite number")
+                .help(self.manner.not_finite))
+        };
+        self.list(list)?.iter().enumerate().map(finite).collect()
     }
 
     /// Returns exactly `N` finite numbers.
@@ -243,7 +239,7 @@ fn scalar(node: &Node) -> Option<&str> {
     }
 }
 
-/// Returns the number that a text states, as of YAML 1.2's core schema. A number too large for 64 bits is none.
+/// Returns the number that a text states in YAML 1.2's core schema; `None` for other texts and for numbers beyond the range of `f64`.
 fn number(text: &str) -> Option<f64> {
     let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
     let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
@@ -255,8 +251,8 @@ fn number(text: &str) -> Option<f64> {
     }
 }
 
-/// Returns the whole number that a text states, as of YAML 1.2's core schema. Decimal numbers do not begin with a needless 0, which
-/// would make them octal in YAML 1.1.
+/// Returns the whole number that a text states in YAML 1.2's core schema; `None` for other texts and for numbers outside 0 to
+/// 2^32 - 1. Refuses decimal numbers with a leading 0, which YAML 1.1 reads as octal.
 fn whole(text: &str) -> Option<u32> {
     let text = text.strip_prefix('+').unwrap_or(text);
     let (digits, radix) = match (text.strip_prefix("0x"), text.strip_prefix("0o")) {
@@ -265,7 +261,7 @@ fn whole(text: &str) -> Option<u32> {
         _ if text.len() > 1 && text.starts_with('0') => return None,
         _ => (text, 10),
     };
-    // A second sign is none.
+    // `from_str_radix` accepts a sign, so it would accept a second one.
     if !digits.starts_with(|first: char| first.is_ascii_hexdigit()) {
         return None;
     }

@@ -9,9 +9,9 @@ use granit_parser::{ErrorKind, Event, Parser, ScalarStyle, ScanError, Span, opti
 use super::{Document, TABS};
 use crate::site::error::{SiteError, Source};
 
-/// The most values of a file, with each alias as the values that it names: readers follow aliases.
+/// The most values of a file. An alias counts as all values that it names, because readers follow it.
 const MAX_VALUES: usize = 250_000;
-/// The most bytes of all texts, counted likewise.
+/// The most bytes of all texts of a file. An alias counts as the texts that it names.
 const MAX_TEXT: usize = 64 << 20;
 /// The most lists and maps inside one another.
 const MAX_DEPTH: usize = 64;
@@ -51,12 +51,13 @@ impl Value {
     }
 }
 
-/// What a value and all that is in it takes.
+/// The size of a value with everything that is in it.
 #[derive(Clone, Copy, Default)]
 struct Size {
     values: usize,
+    /// Bytes of all texts.
     text: usize,
-    /// Lists and maps inside one another.
+    /// How many lists and maps are inside one another.
     depth: usize,
 }
 
@@ -113,11 +114,11 @@ fn too_large(error: SiteError) -> SiteError {
         .help("check that it is the file that is meant; cut a large map into several files")
 }
 
-/// A list or a map of which the end is still to come.
+/// A list or a map whose end has not been read yet.
 struct Open {
     at: Range<usize>,
     anchor: usize,
-    /// Of what is in it until now.
+    /// Of what has been read of it.
     size: Size,
     content: Content,
 }
@@ -144,7 +145,7 @@ struct Tree<'a> {
     open: Vec<Open>,
     /// Values that an alias may name.
     anchors: BTreeMap<usize, (Rc<Value>, Size)>,
-    /// Of the whole file until now.
+    /// Of what has been read of the file.
     size: Size,
 }
 
@@ -157,10 +158,6 @@ impl<'a> Tree<'a> {
             anchors: BTreeMap::new(),
             size: Size::default(),
         }
-    }
-
-    fn source(&self) -> &Source<'a> {
-        &self.document.source
     }
 
     fn take(&mut self, event: Event<'_>, at: Range<usize>) -> Result<(), SiteError> {
@@ -210,8 +207,8 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Refuses a tag: it may change a value, as `!degrees` does. OpenCV's `!!opencv-matrix` says only what its keys say, and
-    /// `!!merge` stands before merge keys.
+    /// Refuses a tag, because it may change a value, as `!degrees` does. Allows OpenCV's `!!opencv-matrix` on a map, which adds nothing to
+    /// the map's keys, and `!!merge` on a merge key.
     fn check_tag(&self, event: &Event<'_>, at: &Range<usize>) -> Result<(), SiteError> {
         let Some(tag) = event.tag() else {
             return Ok(());
@@ -235,13 +232,11 @@ impl<'a> Tree<'a> {
             .help("remove the tag, and write the value as it is meant"))
     }
 
-    /// Counts a value.
+    /// Adds a value to the size of the file, and refuses a file that is too large.
     fn charge(&mut self, at: &Range<usize>, size: Size) -> Result<(), SiteError> {
         self.size.values = self.size.values.saturating_add(size.values);
         self.size.text = self.size.text.saturating_add(size.text);
-        let message = if size.depth > MAX_DEPTH {
-            NESTS
-        } else if self.size.values > MAX_VALUES {
+        let message = if self.size.values > MAX_VALUES {
             "the file has too many values"
         } else if self.size.text > MAX_TEXT {
             "the file has too long texts"
@@ -317,7 +312,7 @@ impl<'a> Tree<'a> {
 
     /// Puts a value into the list or map that is open, as its next key or value.
     fn place(&mut self, node: Node, size: Size) -> Result<(), SiteError> {
-        let source = *self.source();
+        let source: Source<'a> = self.document.source;
         let Some(open) = self.open.last_mut() else {
             self.root = Some(node);
             return Ok(());
@@ -371,7 +366,8 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
-    /// Adds the entries of a map, or of a list of maps, whose keys are not there yet. The map is counted already, where it stands.
+    /// Adds the entries of a map, or of a list of maps, whose keys are not there yet. [`Tree::charge`] has counted them where the value of
+    /// the merge key is.
     fn merge(
         &self,
         node: &Node,
