@@ -12,7 +12,7 @@ use posegate::shape::Lens;
 mod kalibr;
 mod ros;
 
-const MANNER: FormatMessages = FormatMessages {
+const MESSAGES: FormatMessages = FormatMessages {
     what: "a calibration in YAML",
     written: "use the file as cameracalibrator or Kalibr wrote it: `key: value` lines, lists in [ ]",
     numbers: "write numbers plainly, as 615.0 or 6.15e+02; if a calibration has .Nan, it has failed: calibrate \
@@ -64,7 +64,7 @@ pub(super) fn read(
         file: &name,
         text: &text,
     };
-    let document = Document::new(source, &MANNER)?;
+    let document = Document::new(source, &MESSAGES)?;
     let root = document.parse()?;
     let keys = document.map(&root)?;
     let numbers = if keys.keys().any(is_camera) {

@@ -10,7 +10,7 @@ use crate::site::yaml::{Document, FormatMessages, Node};
 
 const POSE_KEYS: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 
-const MANNER: FormatMessages = FormatMessages {
+const MESSAGES: FormatMessages = FormatMessages {
     what: "a tags.yaml of apriltag_ros",
     written: "write `tag_bundles: [ { name: dock, layout: [ {id: 7, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, \
               qz: 0} ] } ]`",
@@ -28,14 +28,14 @@ pub(super) type Found = Placed<(u32, f64, Frame)>;
 /// Returns the tags of one bundle, or a single tag. `part` is its name, needed if the file has
 /// several.
 pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>, SiteError> {
-    let document = Document::new(source, &MANNER)?;
+    let document = Document::new(source, &MESSAGES)?;
     let root = document.parse()?;
     let file = document.map(&root)?;
     let [bundles, singles] = ["tag_bundles", "standalone_tags"].map(|key| file.get(key));
     if bundles.is_none() && singles.is_none() {
         return Err(document
             .error(0..0, "the file has neither `tag_bundles` nor `standalone_tags`")
-            .expected(MANNER.what)
+            .expected(MESSAGES.what)
             .help(
                 "parameters of ROS 2's node (ids, frames, sizes) have no poses: write such tags as [tag.NAME] \
                  tables",
@@ -86,7 +86,7 @@ pub(super) fn read(source: Source<'_>, part: Option<&str>) -> Result<Vec<Found>,
         ));
     }
     let part = chosen(&document, parts, part)?;
-    let members = document.required(part.members, part.at, "layout", MANNER.written)?;
+    let members = document.required(part.members, part.at, "layout", MESSAGES.written)?;
     members
         .into_iter()
         .map(|member| of_member(&document, member))
@@ -152,7 +152,7 @@ fn chosen(
         (None, None) => Err(document
             .error(0..0, "the file has no tag")
             .expected("a bundle or a tag")
-            .help(MANNER.written)),
+            .help(MESSAGES.written)),
         (_, None) => Err(document
             .error(
                 0..0,
@@ -197,7 +197,7 @@ fn of_member(document: &Document<'_>, member: Member) -> Result<Found, SiteError
                     format!("{key} of tag {} is {}", id.value, given.value),
                 )
                 .expected("a finite number")
-                .help(MANNER.not_finite));
+                .help(MESSAGES.not_finite));
         }
         *value = given.value;
     }

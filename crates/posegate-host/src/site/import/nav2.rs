@@ -8,7 +8,7 @@ use crate::site::error::{SiteError, Source};
 use crate::site::yaml::{Document, FormatMessages};
 use posegate::shape::PoseDeg;
 
-const MANNER: FormatMessages = FormatMessages {
+const MESSAGES: FormatMessages = FormatMessages {
     what: "a dock database of Nav2",
     written: "write `docks:` and below it `dock1: {type: \"charging_dock\", frame: map, pose: [1.0, 2.0, 1.57]}`",
     numbers: "write `pose: [x, y, theta]` in metres, metres and radians, as [1.0, 2.0, 1.57]",
@@ -25,13 +25,13 @@ pub(super) fn read(
     source: Source<'_>,
     is_placed: bool,
 ) -> Result<Vec<(String, Placed<PoseDeg>)>, SiteError> {
-    let document = Document::new(source, &MANNER)?;
+    let document = Document::new(source, &MESSAGES)?;
     let root = document.parse()?;
     let file = document.map(&root)?;
     let docks = file.get("docks").ok_or_else(|| {
         document
             .error(0..0, "the file has no `docks`")
-            .expected(MANNER.what)
+            .expected(MESSAGES.what)
             .help(
                 "name the file of the docking server's parameter `dock_database`; docks in the server's own \
                  parameters must be moved into that file",
@@ -43,7 +43,8 @@ pub(super) fn read(
         let at = node.at.clone();
         let key = |key: &str| format!("docks.{name}.{key}");
         let dock = document.map(node)?;
-        let kind = document.required(dock.get("type"), at.clone(), &key("type"), MANNER.written)?;
+        let kind =
+            document.required(dock.get("type"), at.clone(), &key("type"), MESSAGES.written)?;
         document.text(kind)?;
         let (frame, frame_at) = match dock.get("frame") {
             None => (DEFAULT_FRAME, at.clone()),
@@ -72,7 +73,8 @@ pub(super) fn read(
                 .expected("one frame for all docks: there is one `pose`")
                 .help("write a dock database for each frame, and import each with its `pose`"));
         }
-        let list = document.required(dock.get("pose"), at.clone(), &key("pose"), MANNER.written)?;
+        let list =
+            document.required(dock.get("pose"), at.clone(), &key("pose"), MESSAGES.written)?;
         let [x, y, theta] = document.numbers(list, &key("pose"))?;
         if theta.abs() > TAU + 1e-3 {
             return Err(document

@@ -28,7 +28,7 @@ const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
 /// The text of a YAML file, checked for tab indents.
 pub(super) struct Document<'a> {
     source: Source<'a>,
-    manner: &'static FormatMessages,
+    messages: &'static FormatMessages,
 }
 
 /// The entries of a map in the file.
@@ -67,7 +67,7 @@ impl<'a> Document<'a> {
     /// ignores OpenCV's `%YAML:1.0`.)
     pub(super) fn new(
         source: Source<'a>,
-        manner: &'static FormatMessages,
+        messages: &'static FormatMessages,
     ) -> Result<Self, SiteError> {
         let mut start = 0;
         for line in source.text.split_inclusive('\n') {
@@ -81,7 +81,7 @@ impl<'a> Document<'a> {
             }
             start += line.len();
         }
-        Ok(Self { source, manner })
+        Ok(Self { source, messages })
     }
 
     /// Parses the file.
@@ -103,7 +103,7 @@ impl<'a> Document<'a> {
     }
 
     /// Returns the error of a value of another kind than expected.
-    fn another(&self, node: &Node, expected: &str, help: &'static str) -> SiteError {
+    fn wrong_kind(&self, node: &Node, expected: &str, help: &'static str) -> SiteError {
         let found = match &*node.value {
             Value::List(_) => "a list".to_owned(),
             Value::Map(_) => "a map of keys".to_owned(),
@@ -119,7 +119,7 @@ impl<'a> Document<'a> {
     pub(super) fn map<'n>(&self, node: &'n Node) -> Result<Map<'n>, SiteError> {
         match &*node.value {
             Value::Map(entries) => Ok(Map { entries }),
-            _ => Err(self.another(node, self.manner.what, self.manner.written)),
+            _ => Err(self.wrong_kind(node, self.messages.what, self.messages.written)),
         }
     }
 
@@ -135,7 +135,7 @@ impl<'a> Document<'a> {
     pub(super) fn list<'n>(&self, node: &'n Node) -> Result<&'n [Node], SiteError> {
         match &*node.value {
             Value::List(nodes) => Ok(nodes),
-            _ => Err(self.another(node, "a list", self.manner.written)),
+            _ => Err(self.wrong_kind(node, "a list", self.messages.written)),
         }
     }
 
@@ -143,7 +143,7 @@ impl<'a> Document<'a> {
     pub(super) fn text<'n>(&self, node: &'n Node) -> Result<&'n str, SiteError> {
         match &*node.value {
             Value::Scalar { text, .. } if !node.value.is_null() => Ok(text),
-            _ => Err(self.another(node, "a text", self.manner.written)),
+            _ => Err(self.wrong_kind(node, "a text", self.messages.written)),
         }
     }
 
@@ -151,14 +151,14 @@ impl<'a> Document<'a> {
     pub(super) fn number(&self, node: &Node) -> Result<f64, SiteError> {
         scalar(node)
             .and_then(number)
-            .ok_or_else(|| self.another(node, "a number", self.manner.numbers))
+            .ok_or_else(|| self.wrong_kind(node, "a number", self.messages.numbers))
     }
 
     /// Returns a whole number from 0 to 2^32 - 1.
     pub(super) fn whole(&self, node: &Node) -> Result<u32, SiteError> {
         scalar(node)
             .and_then(whole)
-            .ok_or_else(|| self.another(node, "a whole number", self.manner.numbers))
+            .ok_or_else(|| self.wrong_kind(node, "a whole number", self.messages.numbers))
     }
 
     /// Returns the numbers of a list, all of which must be finite. `name` is the list's name in errors.
@@ -171,7 +171,7 @@ impl<'a> Document<'a> {
             Err(self
                 .error(node.at.clone(), format!("{name}[{index}] is {number}"))
                 .expected("a finite number")
-                .help(self.manner.not_finite))
+                .help(self.messages.not_finite))
         };
         self.list(list)?.iter().enumerate().map(finite).collect()
     }
@@ -186,7 +186,7 @@ impl<'a> Document<'a> {
         numbers.try_into().map_err(|all: Vec<f64>| {
             self.error(list.at.clone(), format!("{name} has {} numbers", all.len()))
                 .expected(format!("{N} numbers"))
-                .help(self.manner.length)
+                .help(self.messages.length)
         })
     }
 
@@ -227,7 +227,7 @@ impl<'a> Document<'a> {
                     format!("unknown key `{}`", self.source.quote(entry.key_at.clone())),
                 )
                 .expected(format!("one of {}", suggest::list(known.iter().copied())))
-                .help(self.manner.written)),
+                .help(self.messages.written)),
         }
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 
-const MANNER: FormatMessages = FormatMessages {
+const MESSAGES: FormatMessages = FormatMessages {
     what: "a test file",
     written: "write it otherwise",
     numbers: "write numbers plainly",
@@ -13,7 +13,7 @@ fn document(text: &str) -> Document<'_> {
         file: "t.yaml",
         text,
     };
-    Document::new(source, &MANNER).expect("no tab")
+    Document::new(source, &MESSAGES).expect("no tab")
 }
 
 fn fault(text: &str) -> SiteError {

@@ -96,8 +96,8 @@ fn not_read(document: &Document<'_>, fault: &ScanError) -> SiteError {
         | ErrorKind::TabInIndentation
         | ErrorKind::TabInPlainScalar => error.expected("spaces").help(TABS),
         _ => error
-            .expected(document.manner.what)
-            .help(document.manner.written),
+            .expected(document.messages.what)
+            .help(document.messages.written),
     }
 }
 
@@ -339,7 +339,7 @@ impl<'a> Tree<'a> {
                             return Err(source
                                 .error(node.at, "a key is empty, a list or a map")
                                 .expected("a text as key")
-                                .help(self.document.manner.written));
+                                .help(self.document.messages.written));
                         }
                     };
                     let is_merge = is_plain && text == "<<";
@@ -357,7 +357,7 @@ impl<'a> Tree<'a> {
                                 format!("`{name}` is there twice, first in line {line}"),
                             )
                             .expected("each key once")
-                            .help(format!("remove one; {}", self.document.manner.written)));
+                            .help(format!("remove one; {}", self.document.messages.written)));
                     }
                     entries.push(Entry { key, key_at, node });
                 }
