@@ -326,7 +326,8 @@ impl Settings<'_> {
     }
 
     /// Returns the largest movement from the stamp of an estimate of this age until its permission ends: at the
-    /// maximum age at the latest, and when the permit hold time and the response time are over.
+    /// maximum age at the latest, and when the permit hold time and the response time are over. One millisecond is added: stamps and the
+    /// clock are whole milliseconds, both rounded down.
     #[must_use]
     pub fn movement(&self, motion: MotionBounds, age_ms: u32) -> Growth {
         if motion == MotionBounds::STANDS_STILL {
@@ -335,7 +336,7 @@ impl Settings<'_> {
         let ends = age_ms
             .saturating_add(self.permit_hold_ms)
             .saturating_add(self.response_ms);
-        motion.within(ends.min(self.maximum_age_ms))
+        motion.within(ends.min(self.maximum_age_ms).saturating_add(1))
     }
 
     /// Returns a digest of every setting that a step uses, to detect flipped bits in the settings or in the reference

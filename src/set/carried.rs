@@ -2,10 +2,8 @@
 //!
 //! No float is added or multiplied; floats are decoded from their bits and encoded into bits.
 
-use super::covariance::ScaledCovariance;
-use super::{InputError, PoseSet, RadiusSquared, Reach, Trust, Uncertainty};
-use crate::num::Float;
-use crate::pose::Pose;
+use super::covariance::{ScaledCovariance, target};
+use super::{InputError, RadiusSquared, Reach, Trust};
 
 /// The variances and covariances that a path adds: um^2, um times 2^-24 turn, squares of 2^-24 turn, in world axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,8 +31,8 @@ const LEVER_Q56: i128 = 26_986_075_409;
 /// The longest path, micrometres, and the largest variance of the yaw.
 const LONGEST: i64 = 1 << 26;
 const LARGEST: i64 = 1 << 56;
-/// Bound of the rounding of a product in an entry, with some slack.
-const ROUNDED: i64 = 8;
+/// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding.
+const ROUNDED: i64 = 9;
 
 /// Returns the covariance of an estimate after a path `[x, y]`, micrometres in world axes, with the trust in its source applied: `G P G'`
 /// with the path's noise.
@@ -48,16 +46,15 @@ pub(crate) fn carried(
     noise: &PathNoise,
 ) -> Result<[[f64; 3]; 3], InputError> {
     const ONE: RadiusSquared = RadiusSquared(1 << 16);
-    let given = Uncertainty::Gaussian(*covariance);
-    PoseSet::of_spread(Pose::default(), &given, ONE, trust)?;
-    let [[xx, xy, xt], [_, yy, yt], [_, _, tt]] = trust.cross_terms.of(*covariance);
-    let float = |value: f64| Float::of(value).ok_or(InputError::CovarianceNotFinite);
-    let square = ScaledCovariance::of(
-        [float(xx)?, float(yy)?, float(tt)?],
-        [float(xy)?, float(xt)?, float(yt)?],
-        Reach::of(ONE, trust),
-    );
-    let p = square.ok_or(InputError::CovarianceTooLarge)?;
+    let p = target(&trust.cross_terms.of(*covariance), Reach::of(ONE, trust))?;
+    // The entries beside the diagonal are within their slacks, also in the other half. Wider variances contain every such matrix.
+    let wider = |entry: i64, [a, b]: [i64; 2]| entry.saturating_add(a).saturating_add(b);
+    let p = ScaledCovariance {
+        xx: wider(p.xx, [p.xy_slack, p.xt_slack]),
+        yy: wider(p.yy, [p.xy_slack, p.yt_slack]),
+        tt: wider(p.tt, [p.xt_slack, p.yt_slack]),
+        ..p
+    };
     let is_small = dx.unsigned_abs().max(dy.unsigned_abs()) <= LONGEST.unsigned_abs();
     let entries = [p.xx, p.yy, p.tt, p.xy, p.xt, p.yt];
     let noises = [noise.xx, noise.yy, noise.tt, noise.xy, noise.xt, noise.yt];
@@ -74,10 +71,11 @@ pub(crate) fn carried(
         product as i64
     };
     let (att, btt) = (by(a, p.tt), by(b, p.tt));
+    // A product is rounded by less than a unit, and one of a product by less than a unit and the lever: with m the larger lever, xx, yy and
+    // xy are off by m + 3, the entries with the yaw by 1. So the errors of a row are at most 2 m + 7.
+    let longest = (a.unsigned_abs().max(b.unsigned_abs()) >> 56) as i64;
+    let slack = longest.wrapping_mul(2).wrapping_add(ROUNDED);
     // Twice the cross term and the square of the lever: each below 2^62 in magnitude, else the sum is refused.
-    let slack = [p.xy_slack, p.xt_slack, p.yt_slack]
-        .iter()
-        .fold(ROUNDED, |sum, slack| sum.saturating_add(*slack));
     let sum = |parts: [i64; 5]| {
         let sum = parts
             .iter()

@@ -4,7 +4,7 @@
 //! an ellipsoid. The decision keeps both parts apart: along any normal, the extent of the sum is the sum of the extents.
 
 use super::{Extent, Inflation, Q24_PER_RADIAN_Q52};
-use crate::num::{Float, Rounding, UM_PER_M};
+use crate::num::{Float, Rounding, UM_PER_M, wide};
 use crate::pose::REACH_UM;
 
 /// The largest offsets that a movement adds to a pose-set, in world axes.
@@ -90,6 +90,14 @@ impl Growth {
                 .unsigned_abs(),
             self.yaw_q24.wrapping_add(other.yaw_q24).unsigned_abs(),
         )
+    }
+
+    /// Returns the largest change of this movement, in any direction of the plane, if its axes are turned by up to `yaw_q24`: a chord, rounded up.
+    pub(crate) fn swung(self, yaw_q24: i32) -> Self {
+        let product = wide(self.translation_um.unsigned_abs(), yaw_q24.unsigned_abs());
+        // 2 pi / 2^24 from above, of at most 2^52.
+        let chord = product.wrapping_mul(1_609) >> 32;
+        Self::new(u32::try_from(chord.wrapping_add(1)).unwrap_or(u32::MAX), 0)
     }
 
     /// Returns the growth times the root of an inflation, rounded up.

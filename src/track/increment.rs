@@ -1,11 +1,15 @@
 //! One increment of the odometry.
 
 use crate::motion::MotionBounds;
-use crate::num::{BinaryAngle, Float, Rounding, sqrt_ceil};
+use crate::num::{BinaryAngle, Float, Rounding, sqrt_ceil, wide};
 use crate::set::Q24_PER_RADIAN_Q52;
 
 /// A movement since the previous increment, in the robot's axes at its start. It states its begin time, so that a lost increment is
 /// detected.
+///
+/// What the tracker's bounds need of an increment: the turn is at most an eighth of a turn, and between the two poses the direction of
+/// movement leaves the range between its directions at both ends by at most 0.014 rad in total. A robot that keeps its speeds
+/// ahead, to the left and of its turn (an arc) does so. A robot that drives to and fro within one increment does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Increment {
@@ -17,55 +21,58 @@ pub struct Increment {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Step {
-    /// Along the robot's axis, micrometres: from -4 m to 4 m.
-    pub x_um: i32,
-    /// To the robot's left, micrometres.
-    pub y_um: i32,
-    /// Counter-clockwise, 2^-32 turn.
+    /// Along the robot's axis, 2^-8 um: from -4 m to 4 m.
+    pub x_q8: i32,
+    /// To the robot's left, 2^-8 um.
+    pub y_q8: i32,
+    /// Counter-clockwise, 2^-32 turn: at most an eighth of a turn.
     pub turn: i32,
     /// The time at its end, milliseconds of the controller's clock.
     pub stamp_ms: u32,
 }
 
-/// Half a turn, 2^-24 turn.
-const HALF_TURN_Q24: u64 = 1 << 23;
-/// The largest entry of an increment on an axis, micrometres.
-const LONGEST: i32 = 1 << 22;
+/// The largest turn of an increment, 2^-32 turn.
+const LARGEST_TURN: u32 = 1 << 29;
+/// The largest entry of an increment on an axis, 2^-8 um.
+const LONGEST: u32 = 1 << 30;
 
 impl Increment {
-    /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit, and the times of
-    /// its beginning and its end: the end of one increment is the beginning of the next. `None` if a number is not finite, a length is
-    /// above 2^22 um (4.19 m), or the turn is half a turn or more.
+    /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit of
+    /// [`Increment::new`], and the times of its beginning and its end: the end of one increment is the beginning of the next. The
+    /// tracker counts this rounding for every increment.
+    /// `None` if a number is not finite, a length is above 4.19 m, or the turn is above an eighth of a turn.
     #[must_use]
     pub fn of(ahead_m: f64, left_m: f64, turn_rad: f64, span_ms: [u32; 2]) -> Option<Self> {
         let length = |value: f64| {
-            let um = Float::of(value)?.scaled(1_000_000, 0, Rounding::Nearest)?;
-            i32::try_from(um).ok()
+            let q8 = Float::of(value)?.scaled(256_000_000, 0, Rounding::Nearest)?;
+            i32::try_from(q8).ok()
         };
+        // The nearest angle of a large turn is that of its wrap.
         let q24 = Float::of(turn_rad)?.scaled(Q24_PER_RADIAN_Q52, 52, Rounding::AwayFromZero)?;
-        let is_turn = q24.unsigned_abs() < HALF_TURN_Q24;
+        let is_turn = q24.unsigned_abs() < 1 << 23;
         let turn = BinaryAngle::from_radians(turn_rad).filter(|_| is_turn)?;
         Self::new(length(ahead_m)?, length(left_m)?, turn.signed(), span_ms)
     }
 
-    /// Returns an increment from micrometres and units of 2^-32 turn, and the times of its beginning and its end. `None` if a length is
-    /// above 2^22 um (4.19 m).
+    /// Returns an increment from lengths in units of 2^-8 um and a turn in units of 2^-32 turn, and the times of its beginning and
+    /// its end. `None` if a length is above 2^30 units (4.19 m), or the turn is above an eighth of a turn.
     #[must_use]
     pub const fn new(
-        ahead_um: i32,
-        left_um: i32,
+        ahead_q8: i32,
+        left_q8: i32,
         turn: i32,
         [begins_ms, stamp_ms]: [u32; 2],
     ) -> Option<Self> {
-        let is_short = ahead_um.unsigned_abs() <= LONGEST.unsigned_abs()
-            && left_um.unsigned_abs() <= LONGEST.unsigned_abs();
-        if !is_short {
+        let is_small = ahead_q8.unsigned_abs() <= LONGEST
+            && left_q8.unsigned_abs() <= LONGEST
+            && turn.unsigned_abs() <= LARGEST_TURN;
+        if !is_small {
             return None;
         }
         Some(Self {
             step: Step {
-                x_um: ahead_um,
-                y_um: left_um,
+                x_q8: ahead_q8,
+                y_q8: left_q8,
                 turn,
                 stamp_ms,
             },
@@ -79,30 +86,42 @@ impl Increment {
         [self.begins_ms, self.step.stamp_ms]
     }
 
-    /// Returns the movement ahead and to the left, micrometres, and the turn counter-clockwise, 2^-32 turn. Axes are the
+    /// Returns the movement ahead and to the left, 2^-8 um, and the turn counter-clockwise, 2^-32 turn. Axes are the
     /// robot's at the beginning.
     #[must_use]
     pub const fn entries(&self) -> [i32; 3] {
-        [self.step.x_um, self.step.y_um, self.step.turn]
+        [self.step.x_q8, self.step.y_q8, self.step.turn]
     }
 }
 
 impl Step {
-    /// Returns the length of the movement, micrometres, rounded up.
-    pub fn length_um(&self) -> u32 {
-        if self.y_um == 0 {
-            return self.x_um.unsigned_abs();
-        }
-        sqrt_ceil(self.length_squared()) as u32
+    /// Returns an upper bound of the length that the robot drove, 2^-8 um: below 2^31.
+    ///
+    /// If the direction of movement stays within a range `r < pi`, the length is at most the chord over `cos(r / 2)`. With
+    /// `r = t + 0.014 rad` for a turn t of at most an eighth of a turn, that factor is at most `1 + 6 t^2 + 2^-12`, t in turns. The
+    /// length of an arc is the chord times `(t / 2) / sin(t / 2)`, about a quarter of this above 1.
+    pub fn driven_q8(&self) -> u32 {
+        let chord = if self.y_q8 == 0 {
+            self.x_q8.unsigned_abs()
+        } else {
+            sqrt_ceil(self.chord_squared()) as u32
+        };
+        let turn = self.turn_q24();
+        // Unit 2^-28: at most 2^22 and a unit.
+        let square = (wide(turn, turn) >> 20) as u32;
+        let longer = square.wrapping_add(1).wrapping_mul(6).wrapping_add(1 << 16);
+        chord
+            .wrapping_add((wide(chord, longer) >> 28) as u32)
+            .wrapping_add(1)
     }
 
-    /// Returns the square of the length of the movement, um^2: at most 2^45.
-    fn length_squared(&self) -> u64 {
-        let [x, y] = [self.x_um, self.y_um].map(|v| u64::from(v.unsigned_abs()));
-        x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y))
+    /// Returns the square of the distance between both ends, 2^-16 um^2: at most 2^61.
+    fn chord_squared(&self) -> u64 {
+        let [x, y] = [self.x_q8, self.y_q8].map(i32::unsigned_abs);
+        wide(x, x).wrapping_add(wide(y, y))
     }
 
-    /// Returns the magnitude of the turn, 2^-24 turn, rounded up.
+    /// Returns the magnitude of the turn, 2^-24 turn, rounded up: at most 2^21.
     pub fn turn_q24(&self) -> u32 {
         self.turn.unsigned_abs().wrapping_add(0xff) >> 8
     }
@@ -110,8 +129,8 @@ impl Step {
     /// Returns `true` if a robot can make this movement within `ms` and one millisecond for the rounding of both stamps.
     pub fn is_within(&self, bounds: MotionBounds, ms: u32) -> bool {
         let most = bounds.within(ms.saturating_add(1));
-        let length_um = u64::from(most.translation_um().unsigned_abs().saturating_add(2));
-        self.length_squared() <= length_um.wrapping_mul(length_um)
+        let length_um = most.translation_um().unsigned_abs().saturating_add(2);
+        self.chord_squared() >> 16 <= wide(length_um, length_um)
             && self.turn_q24() <= most.yaw_q24().unsigned_abs().saturating_add(2)
     }
 
@@ -122,8 +141,8 @@ impl Step {
             product.checked_div(i64::from(whole)).unwrap_or(0) as i32
         };
         Self {
-            x_um: share(self.x_um),
-            y_um: share(self.y_um),
+            x_q8: share(self.x_q8),
+            y_q8: share(self.y_q8),
             turn: share(self.turn),
             stamp_ms: self.stamp_ms,
         }

@@ -245,7 +245,7 @@ impl<const N: usize> Tracker<N> {
                 return Err(reason);
             }
         }
-        let mut way = Way::START;
+        let mut way = Way::new(&self.noise);
         let ahead = report.stamp_ms.wrapping_sub(newest);
         if ahead < 1 << 31 {
             // At the newest odometry or after it. The movement in between counts twice, in both directions: once as the
@@ -269,6 +269,13 @@ impl<const N: usize> Tracker<N> {
                         // The robot may have moved unevenly: back and forth within its bounds.
                         way.add(&increment.part([after, passed]), after, &self.noise);
                         way.leave_out(self.settings.bounds.within(unevenness([after, passed])));
+                        // The axes of the increment are those before the turn up to the fix.
+                        let turned = self
+                            .settings
+                            .bounds
+                            .within(passed.wrapping_sub(after).saturating_add(1));
+                        let driven = self.settings.bounds.within(after.saturating_add(1));
+                        way.leave_out(driven.swung(turned.yaw_q24()));
                     } else {
                         way.add(increment, passed, &self.noise);
                     }

@@ -3,7 +3,8 @@
 use crate::num::{Float, Rounding};
 
 /// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip
-/// is a bound: the share of every movement that may be wrong in the worst direction.
+/// is a bound: the share of every movement that may be wrong in the worst direction. A length is that of the path, not of the line between
+/// its ends. Lengths and turns may be those that the robot drove or those that the odometry reported: the bounds hold for the longer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OdometryErrors {
@@ -17,9 +18,9 @@ pub struct OdometryErrors {
     pub m_per_sqrt_s: f64,
     /// Standard deviation of the heading, radians per root of a second.
     pub rad_per_sqrt_s: f64,
-    /// The share of a driven length that may be wrong, in any direction.
+    /// The share of a driven length that may be wrong, in any direction; below 1.
     pub slip: f64,
-    /// The share of a turn that may be wrong, in either direction.
+    /// The share of a turn that may be wrong, in either direction; below 1.
     pub turn_slip: f64,
     /// The additional turn that may be wrong, radians per metre driven.
     pub turn_slip_per_m: f64,
@@ -61,6 +62,17 @@ fn square_q40(deviation: f64) -> Option<u128> {
     Some(u128::from(up).wrapping_mul(u128::from(up)))
 }
 
+/// One, as a share.
+const WHOLE: u64 = 1 << 16;
+
+/// Returns `value / (1 - share)`, the share with unit 2^-16, rounded up. `None` unless the share is below 1.
+fn of_the_rest(value: u64, share_q16: u64) -> Option<u64> {
+    let rest = u128::from(WHOLE.checked_sub(share_q16).filter(|rest| *rest > 0)?);
+    let product = u128::from(value).wrapping_mul(u128::from(WHOLE));
+    let up = product.wrapping_add(rest.wrapping_sub(1));
+    u64::try_from(up.checked_div(rest)?).ok()
+}
+
 /// A value times a factor, rounded up. `None` if it is below zero, not a number, or beyond 2^40.
 fn scaled(value: f64, factor: u128) -> Option<u64> {
     let up = Float::of(value)?.scaled(factor, 0, Rounding::AwayFromZero)?;
@@ -68,7 +80,10 @@ fn scaled(value: f64, factor: u128) -> Option<u64> {
 }
 
 impl Noise {
-    /// `None` if an error is below zero, not a number or beyond 1000.
+    /// `None` if an error is below zero, not a number or beyond 1000, or a share is 1 or more.
+    ///
+    /// With a share s a length L that is reported is at most `L / (1 - s)` as driven, so an error of `s` times the driven length is at
+    /// most `s / (1 - s)` times the reported one. Turns are alike, with the additional turn per metre.
     pub fn of(errors: &OdometryErrors) -> Option<Self> {
         let variance = |deviation: f64, per_unit: u128| {
             let product = square_q40(deviation)?.checked_mul(per_unit)?;
@@ -78,34 +93,49 @@ impl Noise {
                 .ok()
                 .filter(|v| *v < 1 << 50)
         };
+        let [slip, turn_slip] = [
+            scaled(errors.slip, WHOLE.into())?,
+            scaled(errors.turn_slip, WHOLE.into())?,
+        ];
+        let per_length = |value: u64| of_the_rest(value, slip);
+        let per_turn = |value: u64| of_the_rest(value, turn_slip);
+        // 2^24 / (2 pi) / 10^6 * 2^32, up.
+        let turn_slip_per_um_q32 = scaled(errors.turn_slip_per_m, 11_468_322_280)?;
+        let turn_slip_per_um_q32 = per_length(turn_slip_per_um_q32)?;
+        // m^2 per m is 10^6 um^2 per um; per s 10^9 um^2 per ms. Times 2^8. (2^24 / (2 pi))^2 is 7.13e12, and 2^24 / (2 pi) is
+        // 2,670,176.9.
+        let turn_per_um = per_length(variance(errors.rad_per_sqrt_m, 1_825_240_180)?)?;
+        let turn_per_q24 = per_turn(variance(errors.rad_per_sqrt_rad, 683_565_276)?)?;
+        // The turns that slip adds to a length have their own noise.
+        let slipping = u128::from(turn_per_q24).wrapping_mul(turn_slip_per_um_q32.into());
+        let slipping = u64::try_from(slipping.wrapping_add(u32::MAX.into()) >> 32).ok()?;
         Some(Self {
-            // m^2 per m is 10^6 um^2 per um; per s 10^9 um^2 per ms. Times 2^8.
-            plane_per_um: variance(errors.m_per_sqrt_m, 256_000_000)?,
+            plane_per_um: per_length(variance(errors.m_per_sqrt_m, 256_000_000)?)?,
             plane_per_ms: variance(errors.m_per_sqrt_s, 256_000_000_000)?,
-            // (2^24 / (2 pi))^2 is 7.13e12, and 2^24 / (2 pi) is 2,670,176.9. Times 2^8.
-            turn_per_um: variance(errors.rad_per_sqrt_m, 1_825_240_180)?,
-            turn_per_q24: variance(errors.rad_per_sqrt_rad, 683_565_276)?,
+            turn_per_um: turn_per_um.checked_add(slipping)?,
+            turn_per_q24,
             turn_per_ms: variance(errors.rad_per_sqrt_s, 1_825_240_179_586)?,
-            slip_q16: scaled(errors.slip, 1 << 16)?,
-            turn_slip_q16: scaled(errors.turn_slip, 1 << 16)?,
-            // 2^24 / (2 pi) / 10^6 * 2^32, up.
-            turn_slip_per_um_q32: scaled(errors.turn_slip_per_m, 11_468_322_280)?,
+            slip_q16: per_length(slip)?,
+            turn_slip_q16: per_turn(turn_slip)?,
+            turn_slip_per_um_q32: per_turn(turn_slip_per_um_q32)?,
         })
     }
 
-    /// Returns the variances that a movement adds: um^2 on each axis, and squares of 2^-24 turn; rounded up.
-    pub fn variances(&self, length_um: u32, turn_q24: u32, ms: u32) -> [i64; 2] {
+    /// Returns the variances that a movement adds: um^2 on each axis, and squares of 2^-24 turn; rounded up. The length has the unit
+    /// 2^-8 um.
+    pub fn variances(&self, length_q8: u32, turn_q24: u32, ms: u32) -> [i64; 2] {
         let part = |per: u64, of: u32| per.saturating_mul(u64::from(of));
         let up = |sum: u64| i64::try_from((sum >> 8).saturating_add(1)).unwrap_or(i64::MAX);
-        let plane = part(self.plane_per_um, length_um).saturating_add(part(self.plane_per_ms, ms));
-        let turn = part(self.turn_per_um, length_um)
+        let along = |per: u64| (part(per, length_q8) >> 8).saturating_add(1);
+        let plane = along(self.plane_per_um).saturating_add(part(self.plane_per_ms, ms));
+        let turn = along(self.turn_per_um)
             .saturating_add(part(self.turn_per_q24, turn_q24))
             .saturating_add(part(self.turn_per_ms, ms));
         [up(plane), up(turn)]
     }
 
-    /// Returns the bound of the slip on a path: micrometres and 2^-24 turn, rounded up.
-    pub fn slip(&self, length_um: u64, turned_q24: u64) -> [u64; 2] {
+    /// Returns the bound of the slip on a path whose length has the unit 2^-8 um: micrometres and 2^-24 turn, rounded up.
+    pub fn slip(&self, length_q8: u64, turned_q24: u64) -> [u64; 2] {
         let up = |per: u64, of: u64, down: u32| {
             let product = u128::from(per).wrapping_mul(u128::from(of));
             let whole = product.wrapping_shr(down) as u64;
@@ -117,10 +147,10 @@ impl Noise {
         };
         let turn = up(self.turn_slip_q16, turned_q24, 16).saturating_add(up(
             self.turn_slip_per_um_q32,
-            length_um,
-            32,
+            length_q8,
+            40,
         ));
-        [up(self.slip_q16, length_um, 16), turn]
+        [up(self.slip_q16, length_q8, 24), turn]
     }
 }
 
@@ -149,23 +179,28 @@ mod tests {
             (3.9, 3.0, 60.0),
         ] {
             let [plane, turn] = noise.variances(
-                (metres * 1e6) as u32,
+                (metres * 256e6) as u32,
                 (radians / q24) as u32,
                 (seconds * 1e3) as u32,
             );
+            let (metres, radians) = (metres / 0.95, radians / 0.9);
             let exact = (4e-4 * metres + 1e-6 * seconds) * 1e12;
             assert!(
                 plane as f64 >= exact * 0.99999 && (plane as f64) < exact * 1.001 + 100.0,
                 "{plane} {exact}"
             );
-            let exact = (25e-4 * radians + 9e-4 * metres + 4e-6 * seconds) / (q24 * q24);
+            let slipped = 0.01 * metres / 0.9;
+            let exact =
+                (25e-4 * (radians + slipped) + 9e-4 * metres + 4e-6 * seconds) / (q24 * q24);
             assert!(
                 turn as f64 >= exact * 0.99999 && (turn as f64) < exact * 1.001 + 3000.0,
                 "{turn} {exact}"
             );
-            let [length, turn] = noise.slip((metres * 1e6) as u64, (radians / q24) as u64);
-            assert!((length as f64 - 0.05e6 * metres).abs() < 0.001 * 0.05e6 * metres + 2.0);
-            let exact = (0.1 * radians + 0.01 * metres) / q24;
+            let (metres, radians) = (metres * 0.95, radians * 0.9);
+            let [length, turn] = noise.slip((metres * 256e6) as u64, (radians / q24) as u64);
+            let exact = 0.05 / 0.95 * 1e6 * metres;
+            assert!((length as f64 - exact).abs() < 0.001 * exact + 2.0);
+            let exact = (0.1 / 0.9 * radians + 0.01 / 0.9 / 0.95 * metres) / q24;
             assert!(
                 (turn as f64 - exact).abs() < 0.001 * exact + 3.0,
                 "{turn} {exact}"

@@ -53,8 +53,8 @@ mod tests {
     #[test]
     fn ring_keeps_newest_entries_in_order() {
         let of = |stamp_ms| Step {
-            x_um: 1,
-            y_um: 2,
+            x_q8: 1,
+            y_q8: 2,
             turn: 3,
             stamp_ms,
         };

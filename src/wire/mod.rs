@@ -47,9 +47,9 @@
 //! | odometry | type |
 //! |---|---|
 //! | version, 2 | u8 |
-//! | message, 3 | u8 |
+//! | message, 4 | u8 |
 //! | stamps of its beginning and its end, ms of the controller's clock | 2 u32 |
-//! | ahead, to the left (um) | 2 i32 |
+//! | ahead, to the left (2^-8 um) | 2 i32 |
 //! | turn, counter-clockwise (2^-32 turn) | i32 |
 //!
 //! ```

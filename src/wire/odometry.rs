@@ -4,8 +4,8 @@ use super::{Body, LONGEST_BODY, Reader, VERSION_2, WireError};
 use crate::track::Increment;
 use heapless::Vec;
 
-/// Type of the message.
-const ODOMETRY: u8 = 3;
+/// Type of the message. (3 was the same in whole micrometres: their rounding added up to millimetres in a second.)
+const ODOMETRY: u8 = 4;
 
 /// Returns the body of the message that carries an increment.
 #[must_use]
@@ -24,7 +24,7 @@ pub fn increment_body(increment: &Increment) -> Vec<u8, LONGEST_BODY> {
 /// Parses an increment from the body of a message.
 ///
 /// # Errors
-/// [`WireError::Content`] if the body is not an increment, or an entry is longer than 4 m.
+/// [`WireError::Content`] if the body is not an increment, an entry is longer than 4 m, or the turn is above an eighth of a turn.
 pub fn increment_from_body(body: &[u8]) -> Result<Increment, WireError> {
     read(body).ok_or(WireError::Content)
 }
@@ -37,10 +37,10 @@ fn read(body: &[u8]) -> Option<Increment> {
     let mut stamp = || Some(u32::from_le_bytes(rest.take()?));
     let span_ms = [stamp()?, stamp()?];
     let mut entry = || Some(i32::from_le_bytes(rest.take()?));
-    let [ahead_um, left_um, turn] = [entry()?, entry()?, entry()?];
+    let [ahead_q8, left_q8, turn] = [entry()?, entry()?, entry()?];
     rest.0
         .is_empty()
-        .then(|| Increment::new(ahead_um, left_um, turn, span_ms))?
+        .then(|| Increment::new(ahead_q8, left_q8, turn, span_ms))?
 }
 
 #[cfg(test)]
@@ -50,7 +50,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn increments_round_trip_bit_for_bit(ahead in -4_194_304i32..=4_194_304, left in -4_194_304i32..=4_194_304, turn: i32, span: [u32; 2]) {
+        fn increments_round_trip_bit_for_bit(ahead in -(1i32 << 30)..=1 << 30, left in -(1i32 << 30)..=1 << 30, turn in -(1i32 << 29)..=1 << 29, span: [u32; 2]) {
             let sent = Increment::new(ahead, left, turn, span).unwrap();
             let body = increment_body(&sent);
             prop_assert_eq!(increment_from_body(&body), Ok(sent));
@@ -70,13 +70,13 @@ mod tests {
     /// Checks the table of the module's documentation, byte by byte.
     #[test]
     fn an_increment_is_as_documented() {
-        let sent = Increment::new(5_000, -2, 0x0403_0201, [0x0807_0605, 0x0c0b_0a09]).unwrap();
+        let sent = Increment::new(5_000, -2, 0x0103_0201, [0x0807_0605, 0x0c0b_0a09]).unwrap();
         let expected = [
-            2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 0x88, 0x13, 0, 0, 0xfe, 0xff, 0xff, 0xff, 1, 2, 3, 4,
+            2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0x88, 0x13, 0, 0, 0xfe, 0xff, 0xff, 0xff, 1, 2, 3, 1,
         ];
         assert_eq!(increment_body(&sent)[..], expected);
         let mut long = increment_body(&sent);
-        long[12] = 0x41;
+        long[13] = 0x41;
         assert_eq!(increment_from_body(&long), Err(WireError::Content));
     }
 }

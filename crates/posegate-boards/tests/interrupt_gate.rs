@@ -140,7 +140,7 @@ fn odometry_keeps_the_gate_open_between_fixes() {
             }
             // Back and forth, so that the robot stays at the goal.
             let ahead_um = if cycle % 2 == 0 { ahead_um } else { -ahead_um };
-            controller.odometry(&Increment::new(ahead_um, 0, 0, [newest_ms, now_ms]).unwrap());
+            controller.odometry(&Increment::new(ahead_um << 8, 0, 0, [newest_ms, now_ms]).unwrap());
             newest_ms = now_ms;
             let last = controller.last().cycle;
             let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != last);
@@ -156,7 +156,7 @@ fn odometry_keeps_the_gate_open_between_fixes() {
     // A jump of 30 cm.
     let now_ms = controller.last().now_ms;
     let before_ms = now_ms.wrapping_sub(PERIOD_MS);
-    controller.odometry(&Increment::new(300_000, 0, 0, [before_ms, now_ms]).unwrap());
+    controller.odometry(&Increment::new(300_000 << 8, 0, 0, [before_ms, now_ms]).unwrap());
     let last = controller.last().cycle;
     let telemetry = controller.until("the next cycle", |telemetry| telemetry.cycle != last);
     assert_eq!(telemetry.state, State::Inhibited(Reason::OdometryJump));

@@ -31,7 +31,7 @@ unsafe impl Storage for posegate_tracker {
 }
 
 /// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
-/// a bound: the share of every movement that may be wrong in the worst direction. No value may be below zero.
+/// a bound: the share of every movement that may be wrong in the worst direction. Lengths are those of the path. No value may be below zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_odometry_errors {
@@ -45,9 +45,9 @@ pub struct posegate_odometry_errors {
     pub m_per_sqrt_s: f64,
     /// Standard deviation of the heading, radians per root of a second.
     pub rad_per_sqrt_s: f64,
-    /// The share of a driven length that may be wrong, in any direction.
+    /// The share of a driven length that may be wrong, in any direction; below 1.
     pub slip: f64,
-    /// The share of a turn that may be wrong, in either direction.
+    /// The share of a turn that may be wrong, in either direction; below 1.
     pub turn_slip: f64,
     /// The additional turn that may be wrong, radians per metre driven.
     pub turn_slip_per_m: f64,
@@ -69,7 +69,8 @@ pub struct posegate_tracker_settings {
     pub maximum_fix_age_ms: u32,
 }
 
-/// A movement of the odometry since the previous increment, in the robot's axes at its start.
+/// A movement of the odometry since the previous increment, in the robot's axes at its start. The robot keeps its speeds ahead, to the left and
+/// of its turn meanwhile; at least the direction of movement leaves the range between its directions at both ends by at most 0.014 rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_increment {
@@ -77,7 +78,7 @@ pub struct posegate_increment {
     pub ahead_m: f64,
     /// To the left, metres: from -4 to 4.
     pub left_m: f64,
-    /// Counter-clockwise, radians: less than half a turn.
+    /// Counter-clockwise, radians: at most an eighth of a turn, 0.785.
     pub turn_rad: f64,
     /// The time at which the movement begins, milliseconds of the controller's clock. If it is not the end of the previous
     /// increment, one was lost.

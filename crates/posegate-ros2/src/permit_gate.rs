@@ -436,7 +436,7 @@ impl Order {
 struct Carried {
     tracker: Tracker<INCREMENTS>,
     settings: TrackerSettings,
-    before: Option<(Pose, [FrameId; 2], u32)>,
+    before: Option<(Pose, [FrameId; 2], u32, Time)>,
     order: Order,
 }
 
@@ -473,31 +473,39 @@ impl Carried {
         // Increments are movements of one point of the robot: a pose of another point does not continue the path.
         let frames =
             [&message.header.frame_id, &message.child_frame_id].map(|name| FrameId::of(name));
-        if has_changed || self.before.is_some_and(|(_, before, _)| before != frames) {
+        if has_changed || self.before.is_some_and(|(_, before, ..)| before != frames) {
             return Err(Reason::OdometryJump);
         }
         let stamp_ms = now
             .stamp_ms(message.header.stamp)
             .ok_or(Reason::OdometryGap)?;
+        let stamp = message.header.stamp;
+        if self.before.is_some_and(|(.., before_ms, before)| {
+            before_ms == stamp_ms && before.nanosec < stamp.nanosec
+        }) {
+            // A later pose of the same millisecond: the next increment contains its movement.
+            return Ok(());
+        }
         let pose = estimate(&message.pose).mean()?;
-        let (from, _, begins_ms) = self.before.unwrap_or((pose, frames, stamp_ms));
+        let (from, _, begins_ms, _) = self.before.unwrap_or((pose, frames, stamp_ms, stamp));
         let increment = increment(from, pose, [begins_ms, stamp_ms]).ok_or(Reason::OdometryJump)?;
-        self.before = Some((pose, frames, stamp_ms));
+        self.before = Some((pose, frames, stamp_ms, stamp));
         self.tracker.odometry(increment)
     }
 }
 
 /// Returns the movement between two poses, in the robot's axes at its start.
 fn increment(from: Pose, to: Pose, span_ms: [u32; 2]) -> Option<Increment> {
-    let metres = |from: i32, to: i32| (f64::from(to) - f64::from(from)) * 1e-6;
-    let (dx, dy) = (metres(from.x_um, to.x_um), metres(from.y_um, to.y_um));
+    let um = |from: i32, to: i32| f64::from(to) - f64::from(from);
+    let (dx, dy) = (um(from.x_um, to.x_um), um(from.y_um, to.y_um));
     let yaw = f64::from(from.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
     let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
-    let um = |metres: f64| libm::round(metres * 1e6) as i32;
+    // The unit of an increment; a length that is too large stays too large.
+    let q8 = |um: f64| libm::round(um * 256.0) as i32;
     let turn = to.yaw.0.wrapping_sub(from.yaw.0) as i32;
     Increment::new(
-        um(cos * dx + sin * dy),
-        um(cos * dy - sin * dx),
+        q8(cos * dx + sin * dy),
+        q8(cos * dy - sin * dx),
         turn,
         span_ms,
     )

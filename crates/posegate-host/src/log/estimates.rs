@@ -236,11 +236,12 @@ impl<R: Read> Iterator for Rows<R> {
     }
 }
 
-/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. `None` if the number is
-/// not finite or too large; the caller treats the stamp as stale.
+/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. A time up to a microsecond below a
+/// whole millisecond is that millisecond: decimals such as 1.001 s are not floats. `None` if the number is not finite or too large; the
+/// caller treats the stamp as stale.
 #[must_use]
 pub fn clock_ms(seconds: f64) -> Option<u32> {
-    let ms = libm::floor(seconds * 1000.0);
+    let ms = libm::floor(seconds * 1000.0 + 1e-3);
     (ms.abs() < 9e15).then(|| ms.rem_euclid(4_294_967_296.0) as u32)
 }
 
@@ -323,6 +324,12 @@ mod tests {
     #[test]
     fn clock_wraps_at_2_pow_32_ms() {
         assert_eq!(clock_ms(1.2345), Some(1234));
+        for ms in (0..200_000).chain([1_700_000_000_001, 1_700_000_000_999]) {
+            let text = format!("{}.{:03}", ms / 1_000, ms % 1_000);
+            let seconds: f64 = text.parse().unwrap();
+            let expected = (ms % (1 << 32)) as u32;
+            assert_eq!(clock_ms(seconds), Some(expected), "{text}");
+        }
         assert_eq!(clock_ms(4_294_967.296), Some(0));
         assert_eq!(clock_ms(-0.001), Some(u32::MAX));
         assert_eq!(clock_ms_of_ns(1_234_999_999), 1234);

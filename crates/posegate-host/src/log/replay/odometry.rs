@@ -96,6 +96,8 @@ pub fn odometry_csv(input: impl Read, file: &str) -> Result<Vec<OdometryPose>, O
 pub struct Odometry {
     poses: Vec<OdometryPose>,
     next: usize,
+    /// The pose at which the newest increment ends.
+    before: Option<OdometryPose>,
 }
 
 impl Odometry {
@@ -108,6 +110,7 @@ impl Odometry {
         Self {
             poses: poses.into_iter().filter(is_finite).collect(),
             next: 0,
+            before: None,
         }
     }
 
@@ -146,18 +149,26 @@ impl Odometry {
     }
 
     /// Returns the next increment up to a time, with its stamp in seconds. The increment is `None` if it is not a
-    /// plausible movement, such as metres between two poses.
+    /// plausible movement, such as metres between two poses. Of several poses in one millisecond the first one is used: the next
+    /// increment contains the movement of the others.
     pub(super) fn next_until(&mut self, now_s: f64) -> Option<(f64, Option<Increment>)> {
+        let of_same_ms = |(t_s, _): &OdometryPose| {
+            self.before.is_some_and(|(before_s, _)| {
+                *t_s > before_s && clock_ms(*t_s) == clock_ms(before_s)
+            })
+        };
+        let rest = self.poses.get(self.next..)?;
+        self.next += rest.iter().take_while(|pose| of_same_ms(pose)).count();
         let (t_s, pose) = *self.poses.get(self.next).filter(|(t_s, _)| *t_s <= now_s)?;
-        let before = self.next.checked_sub(1).and_then(|at| self.poses.get(at));
-        let [x, y, yaw] = before.map_or(pose, |(_, before)| *before);
+        let before = self.before.replace((t_s, pose));
+        let [x, y, yaw] = before.map_or(pose, |(_, before)| before);
         self.next += 1;
         let (dx, dy) = (pose[0] - x, pose[1] - y);
         let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
         let turn = pose[2] - yaw;
         let turn = libm::atan2(libm::sin(turn), libm::cos(turn));
         let (ahead, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
-        let begins_s = before.map_or(t_s, |(before_s, _)| *before_s);
+        let begins_s = before.map_or(t_s, |(before_s, _)| before_s);
         let span_ms = [clock_ms(begins_s)?, clock_ms(t_s)?];
         Some((t_s, Increment::of(ahead, left, turn, span_ms)))
     }
@@ -185,5 +196,32 @@ mod tests {
         // A reset of almost five metres.
         assert_eq!(odometry.next_until(2.0), Some((1.06, None)));
         assert_eq!(odometry.next_until(2.0), None);
+    }
+
+    #[test]
+    fn poses_of_one_millisecond_become_one_increment() {
+        let poses = (0..=40).map(|k| {
+            let t_s = 1.0 + f64::from(k) * 2.5e-4;
+            (t_s, [f64::from(k) * 1e-5, 0.0, 0.0])
+        });
+        let mut odometry = Odometry::new(poses);
+        let mut spans = Vec::new();
+        while let Some((_, increment)) = odometry.next_until(2.0) {
+            spans.push(increment.unwrap());
+        }
+        let expected: Vec<Increment> = (0..=10u32)
+            .map(|ms| {
+                let ahead = if ms == 0 { 0.0 } else { 4e-5 };
+                let begins = (1_000 + ms).saturating_sub(u32::from(ms > 0));
+                Increment::of(ahead, 0.0, 0.0, [begins, 1_000 + ms]).unwrap()
+            })
+            .collect();
+        assert_eq!(spans, expected);
+        // A pose of the same time, and an earlier one, remain: they break the path.
+        let mut odometry = Odometry::new([(1.0, [0.0; 3]), (1.0, [0.0; 3]), (0.9, [0.0; 3])]);
+        let ends = |next: Option<(f64, Option<Increment>)>| next.map(|(t_s, _)| t_s);
+        assert_eq!(ends(odometry.next_until(2.0)), Some(1.0));
+        assert_eq!(ends(odometry.next_until(2.0)), Some(1.0));
+        assert_eq!(ends(odometry.next_until(2.0)), Some(0.9));
     }
 }
