@@ -20,6 +20,11 @@ use posegate_testkit::oracle::Rng;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
+/// A tool 3 m ahead and aside: where it is nearest to a wall, the circle of a wrong heading is farthest from its tangent.
+const TOOL: [[f64; 2]; 3] = [[1.5, 2.6], [1.4, 2.6], [1.5, 2.5]];
+/// A point, at every heading.
+const POINT: [[f64; 2]; 1] = [[0.0, 0.0]];
+
 /// Ticks of the simulation in a millisecond, and a tick in seconds.
 const TICKS_PER_MS: u64 = 10;
 const TICK_S: f64 = 1e-4;
@@ -121,8 +126,9 @@ impl Scene {
                 sizes = [0.002, 0.003];
             }
             Cause::WideHeading => {
-                sizes = [0.02, 3.1];
-                speed = rng.within(0.2, 0.6);
+                sizes = [0.02, 2.8];
+                (speed, rate) = (rng.within(0.2, 0.6), 0.0);
+                fix_s = 10.0;
                 errors = OdometryErrors {
                     m_per_sqrt_m: 1e-4,
                     ..OdometryErrors::NONE
@@ -134,10 +140,11 @@ impl Scene {
                     slip: rng.within(0.05, 0.25),
                     ..OdometryErrors::NONE
                 };
-                reading = 500 + rng.below(1_500) as u64;
-                rate = rng.within(0.5, 1.0) * (FRACTION * TAU / 8.0) / (reading as f64 * TICK_S);
-                (speed, fix_s) = (rng.within(0.5, 1.2), rng.within(1.0, 4.0));
-                oldest_s = 5.0;
+                // Slow turns, so that a millisecond of a stamp is little beside the length of the arcs.
+                reading = 5_000 + rng.below(15_000) as u64;
+                rate = FRACTION * TAU / 8.0 / (reading as f64 * TICK_S);
+                (speed, fix_s) = (rng.within(0.2, 0.6), rng.within(5.0, 20.0));
+                oldest_s = 30.0;
                 sizes = [0.002, 0.003];
             }
         }
@@ -152,7 +159,7 @@ impl Scene {
             cycle,
             fix_s,
             oldest_fix_ms: (oldest_s * 1e3) as u32,
-            latency_ms: if rng.chance(0.3) {
+            latency_ms: if rng.chance(0.3) || cause == Cause::WideHeading {
                 0
             } else {
                 rng.below(300) as u32
@@ -161,7 +168,7 @@ impl Scene {
             is_aligned: cause != Cause::Mixed || rng.chance(0.3),
             response_ms: (cycle / TICKS_PER_MS) as u32 + 2 + rng.below(5) as u32,
             // For one reading, or from one to the next.
-            permit_hold_ms: if rng.chance(0.3) {
+            permit_hold_ms: if cause != Cause::WideHeading && rng.chance(0.3) {
                 1
             } else {
                 ((reading + cycle) / TICKS_PER_MS) as u32 + 2
@@ -190,7 +197,7 @@ impl Scene {
         } else {
             rng.chance(0.3)
         };
-        let rate = rng.within(-1.0, 1.0) * self.rate;
+        let rate = rng.within(0.3, 1.0) * self.rate * if rng.chance(0.5) { 1.0 } else { -1.0 };
         if let Driver::Adverse { unit } = self.driver {
             // What a reading adds is just below a half above a whole unit.
             let step = (speed * self.reading as f64 * TICK_S / unit).round();
@@ -427,27 +434,58 @@ impl Found {
 }
 
 /// The largest distance of any corner of any robot beyond any wall, after a movement at the largest speeds for a time.
-fn beyond(poses: &[[f64; 3]], corners: &[[f64; 2]], [speed, rate]: [f64; 2], seconds: f64) -> f64 {
+fn beyond(poses: &[[f64; 3]], hall: &Hall, [speed, rate]: [f64; 2], seconds: f64) -> f64 {
     let mut most = f64::NEG_INFINITY;
     for pose in poses {
-        // A robot far from every wall is not looked at closely.
-        if pose[0].abs().max(pose[1].abs()) + 0.5 + speed * seconds < TO_WALL_M - 0.05 {
-            continue;
-        }
         for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
             let (s, c) = (pose[2] + share * rate * seconds).sin_cos();
-            for [vx, vy] in corners {
+            for [vx, vy] in hall.corners {
                 let tip = [pose[0] + c * vx - s * vy, pose[1] + s * vx + c * vy];
                 let out = tip[0].abs().max(tip[1].abs());
-                most = most.max(out + speed * seconds - TO_WALL_M);
+                most = most.max(out + speed * seconds - hall.to_wall_m);
             }
         }
     }
     most
 }
 
+/// A robot in a hall, and its table.
+struct Hall {
+    bytes: Vec<u8>,
+    corners: &'static [[f64; 2]],
+    to_wall_m: f64,
+}
+
+impl Hall {
+    fn of(cause: Cause) -> Self {
+        let (success, corners, to_wall_m): (_, &[_], _) = match cause {
+            Cause::Mixed | Cause::Rounding => (hall::SUCCESS, &CORNERS, TO_WALL_M),
+            Cause::WideHeading => (
+                "{ shape = \"footprint\", footprint = [[1.5, 2.6], [1.4, 2.6], [1.5, 2.5]], region = [[8, 8], [-8, 8], [-8, -8], [8, -8]] }",
+                &TOOL,
+                8.0,
+            ),
+            Cause::Arcs => (
+                "{ shape = \"box\", x = [-2.0, 2.0], y = [-2.0, 2.0], yaw_deg = [-180.0, 180.0] }",
+                &POINT,
+                TO_WALL_M,
+            ),
+        };
+        let text = format!(
+            "\n[task.hall]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\nsuccess = {success}\n"
+        );
+        let site = Site::parse(&text, "site.toml").expect("a site");
+        Self {
+            bytes: hall::facets(&site, "hall", to_wall_m + 1.0),
+            corners,
+            to_wall_m,
+        }
+    }
+}
+
 /// Simulates one scene.
-fn simulate(rng: &mut Rng, cause: Cause, bytes: &[u8], corners: &[[f64; 2]], found: &mut Found) {
+fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
+    let bytes = &hall.bytes;
     let table = Table::parse(bytes).expect("a table");
     let q16 = table.radius_squared().q16();
     let radius = (f64::from(q16) / 65_536.0).sqrt();
@@ -493,21 +531,28 @@ fn simulate(rng: &mut Rng, cause: Cause, bytes: &[u8], corners: &[[f64; 2]], fou
         wheels: [0.0; 2],
     };
     // A robot that drives little starts near a wall.
-    let off = if matches!(cause, Cause::Arcs | Cause::WideHeading) {
-        1.9
-    } else {
-        1.0
-    };
+    let off = if cause == Cause::Arcs { 1.9 } else { 1.0 };
     let mut at = [
         rng.within(-off, off),
         rng.within(-off, off),
         rng.within(-PI, PI),
     ];
+    if cause == Cause::WideHeading {
+        // Away from a wall that the tool nearly reaches.
+        let wall = WALLS[rng.below(4)];
+        let way = hall.to_wall_m - 3.0 - rng.within(0.0, 1.5);
+        let heading = wall[1].atan2(wall[0]) - rng.within(3.2, 3.8);
+        at = [way * wall[0], way * wall[1], heading];
+    }
     let mut twist = scene.command(rng, at);
     let (mut now, mut read_at) = (first, first);
     let still = Increment::of(0.0, 0.0, 0.0, [clock(first); 2]).expect("no movement");
     let _ = tracker.odometry(still);
-    let ends = first + (scene.fix_s * rng.within(3.0, 40.0) / TICK_S).min(1_200_000.0) as u64;
+    let lasts_s = match cause {
+        Cause::WideHeading => 2.6,
+        _ => scene.fix_s * rng.within(3.0, 40.0),
+    };
+    let ends = first + (lasts_s.min(120.0) / TICK_S) as u64;
     let mut next_fix = first + rng.below(200) as u64;
     let mut next_cycle = first + 1;
     let (mut coming, mut current): (Option<Fix>, Option<Fix>) = (None, None);
@@ -537,9 +582,10 @@ fn simulate(rng: &mut Rng, cause: Cause, bytes: &[u8], corners: &[[f64; 2]], fou
                 fix.newest = now;
             }
             let seconds = scene.reading as f64 * TICK_S;
-            if rng.chance((seconds * 1.5).min(0.5))
-                || at[0].abs().max(at[1].abs()) > TO_WALL_M + 0.3
-            {
+            // A wrong heading on a straight path needs no other command.
+            let is_free = cause == Cause::WideHeading;
+            let is_off = at[0].abs().max(at[1].abs()) > TO_WALL_M + 0.3;
+            if !is_free && (is_off || rng.chance((seconds * 1.5).min(0.5))) {
                 twist = scene.command(rng, at);
             }
         }
@@ -547,7 +593,7 @@ fn simulate(rng: &mut Rng, cause: Cause, bytes: &[u8], corners: &[[f64; 2]], fou
         if is_due && coming.is_none() {
             let mut set = Believed::drawn(rng, scene.sizes);
             if cause == Cause::WideHeading {
-                set.turn = rng.within(1.5, scene.sizes[1]);
+                set.turn = rng.within(2.0, scene.sizes[1]);
             }
             // The pose that the odometry's path passes is one of the set.
             let off = [0; 3].map(|_| rng.within(-0.5, 0.5));
@@ -623,7 +669,7 @@ fn simulate(rng: &mut Rng, cause: Cause, bytes: &[u8], corners: &[[f64; 2]], fou
         let (poses, stamp) = permitted.as_ref().expect("an open gate has permitted");
         // Valid until the output has followed the next answer.
         let seconds = (now - stamp) as f64 * TICK_S + f64::from(scene.response_ms) * 1e-3;
-        let beyond = beyond(poses, corners, scene.fastest(), seconds);
+        let beyond = beyond(poses, hall, scene.fastest(), seconds);
         found.least_um = found.least_um.min((-beyond * 1e6).min(1e9) as i64);
         if beyond > 1e-9 {
             found.outside += 1;
@@ -637,26 +683,8 @@ fn simulate(rng: &mut Rng, cause: Cause, bytes: &[u8], corners: &[[f64; 2]], fou
     }
 }
 
-/// A point in the same hall, at every heading.
-fn open_hall() -> Vec<u8> {
-    let text = "\n[task.hall]\nkind = \"work\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\nsuccess = { shape = \"box\", x = [-2.0, 2.0], y = [-2.0, 2.0], yaw_deg = [-180.0, 180.0] }\n";
-    hall::facets(
-        &Site::parse(text, "site.toml").expect("a site"),
-        "hall",
-        2.5,
-    )
-}
-
 fn driven(cause: Cause, openings: u64, seed: u64) -> Found {
-    let narrow = matches!(cause, Cause::Mixed | Cause::Rounding);
-    let (bytes, corners) = if narrow {
-        (
-            hall::facets(&hall::site([0.0; 3]), "hall", 2.5),
-            CORNERS.to_vec(),
-        )
-    } else {
-        (open_hall(), vec![[0.0; 2]])
-    };
+    let hall = Hall::of(cause);
     let streams = Rng::streams(seed);
     let each = openings.div_ceil(streams.len() as u64);
     let found = streams
@@ -664,7 +692,7 @@ fn driven(cause: Cause, openings: u64, seed: u64) -> Found {
         .map(|mut rng| {
             let mut found = Found::NONE;
             while found.openings < each {
-                simulate(&mut rng, cause, &bytes, &corners, &mut found);
+                simulate(&mut rng, cause, &hall, &mut found);
             }
             found
         })
@@ -678,10 +706,8 @@ fn holds(cause: Cause, openings: u64, near_um: i64) {
     let openings = if is_deep() { openings } else { openings / 400 };
     let found = driven(cause, openings, first_seed());
     assert_eq!(found.outside, 0, "{found:?}");
-    assert!(
-        found.late > 0 && found.moments > found.openings,
-        "{found:?}"
-    );
+    assert!(found.moments > found.openings, "{found:?}");
+    assert!(found.late > 0 || cause == Cause::Arcs, "{found:?}");
     assert!(found.least_um < near_um, "{found:?}");
 }
 
