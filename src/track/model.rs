@@ -1,6 +1,6 @@
 //! The errors of an odometry, as numbers that a controller can add up.
 
-use crate::num::{Float, Rounding};
+use crate::num::{Float, Rounding, wide};
 
 /// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip
 /// is a bound: the share of every movement that may be wrong in the worst direction. A length is that of the path, not of the line between
@@ -124,7 +124,11 @@ impl Noise {
     /// Returns the variances that a movement adds: um^2 on each axis, and squares of 2^-24 turn; rounded up. The length has the unit
     /// 2^-8 um.
     pub fn variances(&self, length_q8: u32, turn_q24: u32, ms: u32) -> [i64; 2] {
-        let part = |per: u64, of: u32| per.saturating_mul(u64::from(of));
+        // The usual rates have 32 bits: one product.
+        let part = |per: u64, of: u32| match u32::try_from(per) {
+            Ok(per) => wide(per, of),
+            Err(_) => per.saturating_mul(u64::from(of)),
+        };
         let up = |sum: u64| i64::try_from((sum >> 8).saturating_add(1)).unwrap_or(i64::MAX);
         let along = |per: u64| (part(per, length_q8) >> 8).saturating_add(1);
         let plane = along(self.plane_per_um).saturating_add(part(self.plane_per_ms, ms));

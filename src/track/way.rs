@@ -20,13 +20,13 @@
 use super::increment::Step;
 use super::model::Noise;
 use super::turned;
-use crate::num::{BinaryAngle, Float, Rounding, wide};
+use crate::num::{BinaryAngle, Float, Rounding, product, wide};
 use crate::set::{Growth, PathNoise, RadiusSquared};
 
 /// 2 pi times 2^32, a 2^-24 turn in radians with the unit 2^-56, without its whole 6 * 2^32.
 const LEVER_Q56: u32 = 1_216_271_633;
 /// The fraction of 2 pi times 2^32, unit 2^-32.
-const LEVER_REST: u32 = 189_141_414;
+const LEVER_REST: i32 = 189_141_414;
 /// Most by which roundings lower the entries on the diagonal in one increment. A product is off by less than 1.8 units; one of a product,
 /// for a movement of 4 m on each axis, by less than 5.6. So the entries of x and y, and the one between them, are off by 9.2, and those with
 /// the yaw by 1.8; half of an odd variance is off by 1.2 and 2.5 more. A symmetric matrix does not get smaller if each entry on its diagonal
@@ -75,7 +75,8 @@ fn along_arc(length_q8: u32, turn_q24: u32, q: i64) -> [i64; 2] {
 /// Returns an entry, below 2^60, times 2 pi, off by less than two.
 #[inline(always)]
 fn lever(entry: i64) -> i64 {
-    let rest = scaled(LEVER_Q56, entry).wrapping_add(scaled(LEVER_REST, entry >> 32));
+    let rest = product(LEVER_REST, (entry >> 32) as i32) >> 32;
+    let rest = scaled(LEVER_Q56, entry).wrapping_add(rest);
     entry.wrapping_mul(6).wrapping_add(rest)
 }
 
