@@ -76,6 +76,9 @@ pub(crate) fn test_share(all: u32, interpreted: u32) -> u32 {
     test_iterations(if is_deep { all } else { all / 5 }, interpreted)
 }
 
+#[cfg(test)]
+mod error_budget;
+
 mod messages;
 
 mod parts;

@@ -60,6 +60,8 @@ use self::model::Noise;
 use self::ring::Ring;
 use self::way::Way;
 
+#[cfg(test)]
+mod error_budget;
 mod increment;
 mod model;
 mod ring;

@@ -42,7 +42,7 @@ fn settings(errors: OdometryErrors) -> TrackerSettings {
     }
 }
 
-fn fix(pose: [f64; 3], covariance: [[f64; 3]; 3], stamp_ms: u32) -> Report {
+pub(super) fn fix(pose: [f64; 3], covariance: [[f64; 3]; 3], stamp_ms: u32) -> Report {
     let [x_m, y_m, yaw_rad] = pose;
     Report {
         source: 3,

@@ -27,11 +27,11 @@ use crate::set::{Growth, PathNoise, RadiusSquared};
 const LEVER_Q56: u32 = 1_216_271_633;
 /// The fraction of 2 pi times 2^32, unit 2^-32.
 const LEVER_REST: i32 = 189_141_414;
-/// Most by which roundings lower the entries on the diagonal in one increment. A product is off by less than 1.8 units; one of a product,
-/// for a movement of 4 m on each axis, by less than 5.6. So the entries of x and y, and the one between them, are off by 9.2, and those with
-/// the yaw by 1.8; half of an odd variance is off by 1.2 and 2.5 more. A symmetric matrix does not get smaller if each entry on its diagonal
-/// grows by the errors in its row: 28.
-const ROUNDED: i64 = 32;
+/// Most by which roundings lower the entries on the diagonal in one increment. A product is off by less than 1.7 units; one of a product,
+/// for a movement of 4 m on each axis, by less than 5.5. Half of an odd variance is off by a half, which gives 1.1 and 2.5 more. So the entries of
+/// x and y, and the one between them, are off by 11.4, and those with the yaw by 2.8. A symmetric matrix does not get smaller if each entry on its
+/// diagonal grows by the errors in its row: 25.6.
+pub(super) const ROUNDED: i64 = 28;
 /// The largest noise that is carried: an error of two turns in the heading, of 500 m in the position.
 const WIDEST_TURN: i64 = 1 << 50;
 const WIDEST_PLANE: i64 = 1 << 58;
@@ -57,7 +57,7 @@ pub(super) struct Way {
 
 /// Returns the variances that an arc of a length, 2^-8 um, and a turn adds to those of a straight line: p on each axis of the plane and h on the
 /// heading, um^2 and squares of 2^-24 turn, for a variance q of its heading; rounded up.
-fn along_arc(length_q8: u32, turn_q24: u32, q: i64) -> [i64; 2] {
+pub(super) fn along_arc(length_q8: u32, turn_q24: u32, q: i64) -> [i64; 2] {
     let length_um = (length_q8 >> 8).wrapping_add(1);
     // The length times the turn: below 2^20.
     let across = ((wide(length_um, turn_q24) >> 24) as u32).wrapping_add(1);
@@ -180,6 +180,21 @@ impl Way {
         self.left_out = self.left_out.plus(growth);
     }
 
+    #[cfg(test)]
+    pub const fn with_noise(self, noise: PathNoise) -> Self {
+        Self { noise, ..self }
+    }
+
+    #[cfg(test)]
+    pub const fn noise_of_path(&self) -> PathNoise {
+        self.noise
+    }
+
+    #[cfg(test)]
+    pub const fn place_q8(&self) -> [i64; 2] {
+        [self.x, self.y]
+    }
+
     pub const fn turn(&self) -> u32 {
         self.turn
     }
@@ -214,7 +229,7 @@ impl Way {
             .saturating_add(u64::from(self.left_out.yaw_q24().unsigned_abs()))
             .saturating_add(u64::from(self.count >> 9))
             .saturating_add(2);
-        let rounded = u64::from(self.count >> 7)
+        let rounded = (u64::from(self.count).wrapping_mul(3) >> 9)
             .saturating_add(self.length_q8 >> 36)
             .saturating_add(5);
         let length = length

@@ -1,0 +1,67 @@
+//! Rows of the error budgets, measured: a search for the largest true error of a row, against exact numbers, must come near its bound and
+//! never above. `cargo xtask error_budgets` prints all rows.
+
+mod exact;
+
+pub(crate) use exact::Exact;
+
+/// A row of an error budget.
+pub(crate) struct Row<'a> {
+    /// The module, and the error.
+    pub name: &'a str,
+    /// The unit of the bound and of the error.
+    pub unit: &'a str,
+    /// The reason why the error stays below 0.3 of the bound, if it does.
+    pub looseness: Option<&'a str>,
+}
+
+/// The largest error of a row that a search has found, relative to the bound that holds for it.
+pub(crate) struct Search {
+    ratio: f64,
+    bound: f64,
+    found: f64,
+    count: u64,
+}
+
+impl Search {
+    pub fn new() -> Self {
+        Self {
+            ratio: f64::NEG_INFINITY,
+            bound: 0.0,
+            found: 0.0,
+            count: 0,
+        }
+    }
+
+    /// Adds a case: its bound, and its true error.
+    pub fn case(&mut self, bound: f64, found: f64) {
+        let ratio = found / bound;
+        self.count += 1;
+        // An error that is not a number counts as the largest one.
+        if !(ratio <= self.ratio) {
+            (self.ratio, self.bound, self.found) = (ratio, bound, found);
+        }
+    }
+
+    /// Prints the row, and checks the largest ratio.
+    pub fn report(&self, row: &Row<'_>) {
+        let Self {
+            ratio,
+            bound,
+            found,
+            count,
+        } = self;
+        let why = row.looseness.unwrap_or_default();
+        std::println!(
+            "{{\"name\":\"{}\",\"value\":{ratio:.4},\"unit\":\"of the bound\",\"goal\":1,\"bound\":{bound:e},\"found\":{found:e},\"error_unit\":\"{}\",\"cases\":{count},\"looseness\":\"{why}\"}}",
+            row.name,
+            row.unit
+        );
+        assert!(*ratio <= 1.0, "{}: {found} above {bound}", row.name);
+        assert!(
+            *ratio >= 0.3 || row.looseness.is_some() || cfg!(miri),
+            "{}: {found} is far below {bound}: tighten the bound, or state why it is loose",
+            row.name
+        );
+    }
+}
