@@ -328,7 +328,7 @@ impl Reason {
                 "Increments of the odometry are missing: one came too long after the one before, or the newest is too old."
             }
             Self::OdometryJump => {
-                "An increment of the odometry is larger than the robot's bounds of movement allow: a reset, a wrong unit, or a wheel that spins."
+                "An increment of the odometry is larger than the robot's bounds of movement allow, or turns by more than 45 degrees: a reset, a wrong unit, a wheel that spins, or readings that are too rare."
             }
             Self::OdometryBackwards => {
                 "A stamp of the odometry is not newer than that of the increment before."

@@ -92,6 +92,12 @@ const JOBS: &[Job] = &[
         jobs::test::deep,
     ),
     job(
+        "error_budgets",
+        "",
+        "every row of every error budget: the largest error that a search finds, over its bound",
+        jobs::test::error_budgets,
+    ),
+    job(
         "no_panic",
         "",
         "no panic can be reached in the firmware",

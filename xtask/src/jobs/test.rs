@@ -66,7 +66,7 @@ pub fn peers(_: &Arguments) -> Result {
 /// Runs the tests with random cases with all of their cases; the fast suite runs a part of them.
 pub fn deep(_: &Arguments) -> Result {
     cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib")
-        .words("--test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot")
+        .words("--test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot --test driven_robot")
         .words("--test cheapest_chains --test other_tags --test pose_set_proofs --test stricter_sets --test worst_pose")
         .words("--test large_sites --test table_faults")
         .env("POSEGATE_DEEP", "1")
@@ -98,6 +98,17 @@ pub fn deep(_: &Arguments) -> Result {
             .print()?;
     }
     Ok(())
+}
+
+/// Measures every row of every error budget with its full counts: the largest error that a search finds, over its bound. A ratio above 1
+/// fails, and one below 0.3 without a stated reason.
+pub fn error_budgets(_: &Arguments) -> Result {
+    // The rows of two tests would share a line of one thread.
+    cmd("cargo test --release -p posegate --features std --lib error_budget --")
+        .words("--nocapture --test-threads 2")
+        .env("POSEGATE_DEEP", "1")
+        .json()
+        .map(|_| ())
 }
 
 /// Compares N random and searched pose-sets with the exact oracle. The seed `today` is another one on each day of the year.
