@@ -5,7 +5,7 @@
 //! [LAYOUT]` a long one. Prints one JSON line, and fails at the first kind of failure.
 //!
 //! Each world is a random success set with a random goal, baked to a table that is proven. Half
-//! of its pose-sets come in bursts ([`burst`]), the others singly ([`singles`]). The oracle checks every
+//! of its pose-sets come in bursts ([`burst`]), the others singly ([`singles`]); some are carried by a tracker ([`carried`]). The oracle checks every
 //! permit, by the least slack over the pose-set or a border that it found before. Permits of a grid are also checked
 //! at the poses of the set that would leave the covered cells first. The test decodes these cells from the bytes.
 //!
@@ -16,6 +16,7 @@
 mod oracle;
 
 mod burst;
+mod carried;
 mod sets;
 mod singles;
 mod stage;
@@ -100,6 +101,7 @@ fn try_world(rng: &mut Rng, cases: usize, layout: Layout) -> Tally {
         },
         stage: &stage,
     };
+    carried::robots(rng, &mut trial, cases / 50);
     while trial.tally.cases < cases {
         let before = trial.tally.cases;
         burst::bursts(rng, &mut trial, cases - before);

@@ -23,6 +23,8 @@ pub struct Tally {
     /// Pose-sets that turn by more than 0.05 rad, on visibility sets.
     pub bend_cases: usize,
     pub bend_permits: usize,
+    /// Permits of sets that a tracker carried.
+    pub carried: usize,
     pub ratios: Vec<f64>,
     pub cell_ratios: Vec<f64>,
 }
@@ -43,6 +45,7 @@ impl Tally {
         self.burst_cases += other.burst_cases;
         self.bend_cases += other.bend_cases;
         self.bend_permits += other.bend_permits;
+        self.carried += other.carried;
         self.ratios.extend(other.ratios);
         self.cell_ratios.extend(other.cell_ratios);
     }
@@ -74,6 +77,7 @@ impl Tally {
             ("burst_cases", self.burst_cases),
             ("bend_cases", self.bend_cases),
             ("bend_permits", self.bend_permits),
+            ("carried_permits", self.carried),
         ]
         .map(|(name, count)| format!("\"{name}\": {count}"))
         .join(", ");
