@@ -201,7 +201,7 @@ mod tests {
             let found = f64::from(growth.translation_um());
             // Both speeds and their root are rounded up: by less than 1 + sqrt(2) of a unit, 2^-10 um per ms.
             prop_assert!(found >= length - 1e-6 && found <= length + 2.0 + 2.36e-3 * f64::from(ms), "{found} {length}");
-            let angle = (turn * seconds / TAU * 16_777_216.0).min(16_777_216.0);
+            let angle = turn * seconds / TAU * 16_777_216.0;
             let found = f64::from(growth.yaw_q24());
             prop_assert!(found >= angle - 1e-6 && found <= angle + 2.0 + 2e-5 * f64::from(ms), "{found} {angle}");
         }

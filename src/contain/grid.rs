@@ -14,9 +14,8 @@ use super::{SLACK_Q24, SLACK_UM};
 use crate::num::Divisor;
 use crate::table::{Cells, Grid, Run, Slab};
 
-/// Half a turn and the slack, 2^-32 turn: a pose-set reaches no farther in yaw, because the yaw error
-/// wraps.
-const FARTHEST: i64 = (1 << 31) + SLACK_Q24 * crate::num::ANGLE_UNITS_PER_Q24;
+/// The largest yaw offset of a set that is walked, 2^-24 turn: one turn.
+pub(super) const WIDEST_Q24: i32 = 1 << 24;
 const TURN: i64 = 1 << 32;
 
 /// The reason why a walk does not show that a set is covered.
@@ -37,7 +36,7 @@ impl From<Offset> for Stop {
 /// Returns `Ok` if every pose of the set lies in a covered cell.
 ///
 /// `mean` is the estimate relative to the cells' lower corner: micrometres, micrometres, 2^-32 turn. The walk reads at most
-/// `most_runs` runs; a row without a run counts as one.
+/// `most_runs` runs; a row without a run counts as one. The set turns by at most [`WIDEST_Q24`].
 pub(super) fn covers<S: Section>(
     grid: &Grid<'_>,
     cells: &Cells,
@@ -50,8 +49,7 @@ pub(super) fn covers<S: Section>(
     let reach = section
         .yaw_q24()
         .wrapping_add(SLACK_Q24)
-        .wrapping_mul(crate::num::ANGLE_UNITS_PER_Q24)
-        .min(FARTHEST);
+        .wrapping_mul(crate::num::ANGLE_UNITS_PER_Q24);
     let (low, high) = (yaw.wrapping_sub(reach), yaw.wrapping_add(reach));
     if !cells.is_whole_circle() {
         if low < 0 {
@@ -62,11 +60,11 @@ pub(super) fn covers<S: Section>(
         }
     }
     let mut shared = S::Shared::default();
-    // On the whole circle the range may begin one turn early or end one turn late.
-    let mut turns = if low < 0 { TURN.wrapping_neg() } else { 0 };
+    // On the whole circle the range may begin one or two turns early.
+    let mut turns = (low >> 32).wrapping_mul(TURN);
     let mut k = cells.slab_of(low.wrapping_sub(turns));
-    // A range of one turn and the slack may meet two slabs at both of its ends.
-    for _ in 0..u32::from(cells.slabs).saturating_add(2) {
+    // A range of two turns and the slack may meet two slabs at both of its ends.
+    for _ in 0..u32::from(cells.slabs).saturating_add(1).wrapping_mul(2) {
         let from = cells.slab_edge(k).wrapping_add(turns);
         let to = cells.slab_edge(k.saturating_add(1)).wrapping_add(turns);
         if from > high {

@@ -382,7 +382,12 @@ impl Sweep {
                 let whole = fine(broad as i32).wrapping_add(2);
                 Movement {
                     length: fine(by.translation_um()).wrapping_add(1),
-                    turn: (i64::from(by.yaw_q24()).wrapping_mul(TAU) >> 20).wrapping_add(1) as i32,
+                    // From a turn on, every heading is reached.
+                    turn: (i64::from(by.yaw_q24())
+                        .min(i64::from(ONE_TURN))
+                        .wrapping_mul(TAU)
+                        >> 20)
+                        .wrapping_add(1) as i32,
                     broad: whole.wrapping_add(whole >> 1),
                     by,
                 }

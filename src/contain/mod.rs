@@ -50,7 +50,7 @@
 
 use crate::num::ANGLE_UNITS_PER_Q24;
 use crate::pose::Pose;
-use crate::set::{Extent, PoseSet};
+use crate::set::{Extent, Growth, PoseSet};
 use crate::table::{Cells, Grid, Table};
 
 use self::grid::Stop;
@@ -383,6 +383,13 @@ impl<'s> GoalFramePoseSet<'s> {
     /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, by a walk within the table's limit.
     fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
         let (cells, most_runs) = (table.cells(), table.most_runs());
+        let extent = match extent {
+            // It has every heading, with the places of several of its offsets: those of the cylinder that contains it are walked.
+            Extent::Gaussian(factor) if factor.yaw > grid::WIDEST_Q24 => {
+                Disc::around(&factor, Growth::NONE).extent()
+            }
+            _ => extent,
+        };
         if cfg!(small_code) {
             return self.walk(grid, cells, &EitherSection::of(extent), most_runs);
         }

@@ -103,7 +103,8 @@ fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth
         trust,
         radius_q16: word32(table, 64)?,
         moved_um: movement.translation_um().unsigned_abs(),
-        swing: i64::from(movement.yaw_q24()) << 8,
+        // From a turn on, every heading is reached.
+        swing: i64::from(movement.yaw_q24().min(1 << 24)) << 8,
     };
     if !(trust.is_valid() && (1 << 16..1 << 24).contains(&question.radius_q16)) {
         return None;

@@ -5,7 +5,7 @@
 use super::support::{SupportPoint, dot, held, reach, squared_length, wide_square};
 use crate::num::{ANGLE_UNITS_PER_Q24, BinaryAngle, Divisor, clamped, sqrt_floor};
 use crate::pose::Pose;
-use crate::set::{Extent, Growth, SqrtFactor, broad_um};
+use crate::set::{Extent, Growth, SqrtFactor, broad_um, scaled_yaw};
 
 /// A side of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +80,11 @@ pub trait Section {
     fn row_end(&self, side: Side, window: &Window) -> Offset;
 }
 
-/// A bounded set: a disc in the plane, an interval in yaw. A rotation does not change it.
+/// Half a turn, 2^-24 turn.
+const HALF_TURN: i64 = 1 << 23;
+
+/// A bounded set: a disc in the plane, an interval in yaw. A rotation does not change it. From half a turn on, the interval is every
+/// heading.
 pub struct Disc {
     radius: i64,
     yaw: i64,
@@ -98,13 +102,10 @@ impl Disc {
     pub fn around(factor: &SqrtFactor, by: Growth) -> Self {
         let radius = i64::from(broad_um(factor)).wrapping_add(i64::from(by.translation_um()));
         let yaw = i64::from(factor.yaw).wrapping_add(i64::from(by.yaw_q24()));
-        Self {
-            radius,
-            yaw: yaw.min(1 << 23),
-        }
+        Self { radius, yaw }
     }
 
-    /// Returns the disc as an extent. The radius is below 2^29, the yaw at most half a turn.
+    /// Returns the disc as an extent. The radius is below 2^29, the yaw at most 2^30.
     pub fn extent(&self) -> Extent {
         Extent::Bounded {
             translation_um: self.radius as i32,
@@ -112,14 +113,14 @@ impl Disc {
         }
     }
 
-    /// Returns both extents times `scale_q16 / 65536`, rounded up, the yaw at most half a turn.
-    /// `None` if the radius reaches 2^29.
+    /// Returns both extents times `scale_q16 / 65536`, rounded up, the yaw as [`scaled_yaw`]. `None` if the radius reaches
+    /// 2^29.
     pub fn scaled(&self, scale_q16: u32) -> Option<Self> {
         let scaled = |v: i64| v.wrapping_mul(i64::from(scale_q16)).wrapping_add(0xffff) >> 16;
         let radius = scaled(self.radius);
         (radius < 1 << 29).then_some(Self {
             radius,
-            yaw: scaled(self.yaw).min(1 << 23),
+            yaw: i64::from(scaled_yaw(self.yaw as i32, scale_q16)),
         })
     }
 
@@ -139,7 +140,7 @@ impl Section for Disc {
     type Shared = ();
 
     fn yaw_q24(&self) -> i64 {
-        self.yaw
+        self.yaw.min(HALF_TURN)
     }
 
     fn cut(&self, _yaw: [i64; 2]) -> Cut {
@@ -162,9 +163,9 @@ impl Section for Disc {
             0,
             0,
             if high {
-                self.yaw
+                self.yaw_q24()
             } else {
-                self.yaw.wrapping_neg()
+                self.yaw_q24().wrapping_neg()
             },
         ])
     }

@@ -79,8 +79,11 @@ fn discs_are_scaled_up() {
     let (half_turn, limit) = (1 << 23, 1 << 29);
     assert_eq!(
         scaled(1, half_turn / 2, 4 << 16),
-        Some(bounded(4, half_turn))
+        Some(bounded(4, 2 * half_turn))
     );
+    // From 32 turns on, every heading at every scale.
+    assert_eq!(scaled(1, half_turn, 65 << 16), Some(bounded(65, limit)));
+    assert_eq!(scaled(1, limit, 1), Some(bounded(1, limit)));
     assert_eq!(scaled(limit - 1, 1, 1 << 16), Some(bounded(limit - 1, 1)));
     assert_eq!(scaled(limit, 1, 1 << 16), None);
     assert_eq!(scaled(limit / 2, 1, 2 << 16), None);
@@ -734,25 +737,33 @@ fn a_set_touches_the_ends_of_slabs() {
 
 /// A set of more than a turn is walked half a turn and the slack to either side: its x grows with its
 /// yaw, and the last slab has only cells of smaller x.
+/// The yaw error is a real number: a set that leans with its heading is farthest out beyond half a turn, where the heading is that of a
+/// smaller error of the other side.
 #[test]
-fn a_set_reaches_half_a_turn_to_either_side() {
+fn a_set_is_walked_beyond_half_a_turn() {
     let cells = Cells {
         x_lo_um: -50_000,
         columns: 100,
         ..WHOLE
     };
+    let section = |yaw: i32| {
+        Ellipsoid::new(SqrtFactor {
+            yaw,
+            x: [40_000, 10, 0],
+            y: [0, 0, 10],
+        })
+    };
+    let bytes = bytes_of(&cells, full(&cells));
+    assert_eq!(walk(&bytes, [50_000, 5_000, 0], &section(1 << 24)), Ok(()));
     let mut slabs = full(&cells);
+    // Headings from three quarters of a turn: a quarter to one side, or three to the other.
     slabs[3] = vec![vec![(0, 55)]; 10];
     let bytes = bytes_of(&cells, slabs);
-    let section = Ellipsoid::new(SqrtFactor {
-        yaw: 1 << 24,
-        x: [40_000, 10, 0],
-        y: [0, 0, 10],
-    });
-    // The slab begins at 3 quarters of a turn: half a turn and 256 units further.
-    let at = (1 << 30) - 256;
-    assert!(walk(&bytes, [50_000, 5_000, at], &section).is_err());
-    assert_eq!(walk(&bytes, [50_000, 5_000, at - 1], &section), Ok(()));
+    let at = 0;
+    // With half a turn at most, x is at most that of the estimate there.
+    let to_the_left = |yaw: i32| walk(&bytes, [45_000, 5_000, at], &section(yaw));
+    assert_eq!(to_the_left(1 << 23), Ok(()));
+    assert!(to_the_left((1 << 24) - 1).is_err());
 }
 
 /// Cells of 10 cm: 2 m by 2 m, and 9 degrees in 4 slabs.
@@ -861,7 +872,16 @@ fn a_set_is_too_large_or_off_the_table_on_each_axis() {
         Decision::Inside
     );
     assert_eq!(
-        decide(&table, &gaussian_at(centre, 0, [0.01, 0.3, 3.0])),
+        decide(&table, &gaussian_at(centre, 0, [0.01, 0.3, 1.8])),
+        Decision::Inside
+    );
+    // Of more than a turn, the cylinder that contains it is walked.
+    for (sigma_y, expected) in [(0.01, Decision::Inside), (0.3, OUT)] {
+        let set = gaussian_at(centre, 0, [0.01, sigma_y, 3.0]);
+        assert_eq!(decide(&table, &set), expected);
+    }
+    assert_eq!(
+        decide(&table, &gaussian_at(centre, 0, [0.01, 0.3, 0.01])),
         Decision::Inside
     );
     assert_eq!(

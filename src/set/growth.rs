@@ -15,8 +15,21 @@ pub struct Growth {
     yaw_q24: i32,
 }
 
-/// One turn, 2^-24 turn: every heading, from anywhere.
-const ONE_TURN: i32 = 1 << 24;
+/// The largest turn that is told apart, 2^-24 turn: 32 turns, as of a covariance. From this on, a turn is every heading at every scale.
+pub(crate) const WIDEST_YAW: i32 = 1 << 29;
+
+/// Returns a turn, 2^-24 turn, times `q16 / 2^16`, rounded up: at most [`WIDEST_YAW`], and that if the turn is.
+pub(crate) const fn scaled_yaw(yaw_q24: i32, q16: u32) -> i32 {
+    if yaw_q24 >= WIDEST_YAW {
+        return WIDEST_YAW;
+    }
+    let product = wide(yaw_q24.unsigned_abs(), q16).wrapping_add(0xffff) >> 16;
+    if product < WIDEST_YAW as u64 {
+        product as i32
+    } else {
+        WIDEST_YAW
+    }
+}
 
 impl Growth {
     /// No movement.
@@ -25,8 +38,8 @@ impl Growth {
         yaw_q24: 0,
     };
 
-    /// Returns a growth of a length in micrometres and a turn in units of 2^-24 turn. Lengths are limited to 268 m and turns to one
-    /// turn: no table contains a set of that size, and one turn is every heading.
+    /// Returns a growth of a length in micrometres and a turn in units of 2^-24 turn. Lengths are limited to 268 m: no table contains a set of
+    /// that size. Turns are limited to 32 turns.
     #[must_use]
     pub const fn new(translation_um: u32, yaw_q24: u32) -> Self {
         let translation_um = if translation_um < REACH_UM.unsigned_abs() {
@@ -34,10 +47,10 @@ impl Growth {
         } else {
             REACH_UM
         };
-        let yaw_q24 = if yaw_q24 < ONE_TURN.unsigned_abs() {
+        let yaw_q24 = if yaw_q24 < WIDEST_YAW.unsigned_abs() {
             yaw_q24 as i32
         } else {
-            ONE_TURN
+            WIDEST_YAW
         };
         Self {
             translation_um,
@@ -70,7 +83,7 @@ impl Growth {
         self.translation_um
     }
 
-    /// Returns the largest turn to either side, 2^-24 turn: at most one turn.
+    /// Returns the largest turn to either side, 2^-24 turn: at most 32 turns. From half a turn on, every heading is reached.
     #[must_use]
     pub const fn yaw_q24(self) -> i32 {
         self.yaw_q24
@@ -111,16 +124,14 @@ impl Growth {
 
     /// Returns the growth times `q16 / 2^16`, rounded up. `None` if that is out of range.
     pub(crate) fn scaled(self, q16: u32) -> Option<Self> {
-        let up = |value: i32, most: i32| {
-            let scaled = u64::from(value.unsigned_abs())
-                .wrapping_mul(u64::from(q16))
-                .wrapping_add(0xffff)
-                >> 16;
-            i32::try_from(scaled).ok().filter(|v| *v <= most)
+        let up = |value: i32| {
+            let product = u64::from(value.unsigned_abs()).wrapping_mul(u64::from(q16));
+            product.wrapping_add(0xffff) >> 16
         };
-        Some(Self {
-            translation_um: up(self.translation_um, REACH_UM)?,
-            yaw_q24: up(self.yaw_q24, ONE_TURN << 5)?.min(ONE_TURN),
+        let translation_um = i32::try_from(up(self.translation_um)).ok()?;
+        (translation_um <= REACH_UM).then_some(Self {
+            translation_um,
+            yaw_q24: scaled_yaw(self.yaw_q24, q16),
         })
     }
 
@@ -139,7 +150,7 @@ impl Growth {
                 yaw_q24,
             } => Extent::Bounded {
                 translation_um: translation_um.wrapping_add(self.translation_um),
-                yaw_q24: yaw_q24.wrapping_add(self.yaw_q24).min(ONE_TURN >> 1),
+                yaw_q24: yaw_q24.wrapping_add(self.yaw_q24).min(WIDEST_YAW << 1),
             },
         }
     }
@@ -177,7 +188,7 @@ mod tests {
             if let Some(scaled) = growth.scaled(q16) {
                 let scale = f64::from(q16) / 65_536.0;
                 prop_assert!(f64::from(scaled.translation_um()) >= um * scale);
-                prop_assert!(f64::from(scaled.yaw_q24()) >= (q24 * scale).min(16_777_216.0));
+                prop_assert!(f64::from(scaled.yaw_q24()) >= (q24 * scale).min(f64::from(WIDEST_YAW)));
             }
         }
     }

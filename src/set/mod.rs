@@ -6,6 +6,11 @@
 //! cannot be rounded outwards; its rounding is in the error budget of `contain`. There is no floating-point
 //! operation; floats are decoded from their bits.
 //!
+//! # Headings beyond half a turn
+//! The error of the heading is a real number, and the heading of a pose is its wrap: a set that turns by more than half a turn has poses at
+//! every heading, each with the place that belongs to its error. A bounded set keeps the bound that was given, so a margin
+//! below 1 is the share of this bound that is inside. Facets, cells, batches and the second evaluation use this meaning.
+//!
 //! ```
 //! use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared};
 //!
@@ -38,6 +43,7 @@ pub use self::trust::{CrossTerms, Inflation, SplitWeight, Trust};
 pub(crate) use self::carried::{PathNoise, carried, metres, radians};
 pub(crate) use self::common::{Common, Turn, broad_um};
 pub(crate) use self::covariance::ScaledCovariance;
+pub(crate) use self::growth::scaled_yaw;
 
 mod aging;
 mod carried;
@@ -170,7 +176,7 @@ pub enum Extent {
     Bounded {
         /// Micrometres, rounded up.
         translation_um: i32,
-        /// 2^-24 turn, rounded up; at most half a turn.
+        /// 2^-24 turn, rounded up; at most 2^30, 64 turns.
         yaw_q24: i32,
     },
     /// An ellipsoid grown by a movement: the Minkowski sum of both.
@@ -196,7 +202,8 @@ pub struct PoseSet {
 }
 
 impl PoseSet {
-    /// Returns the Gaussian set `{ p : e' P^-1 e <= r2 }` about an estimate (Definition 1).
+    /// Returns the Gaussian set `{ (x + e_x, y + e_y, wrap(yaw + e_yaw)) : e' P^-1 e <= r2 }` about an estimate (Definition 1); e_yaw is any real
+    /// number.
     ///
     /// `covariance` is P of `(x, y, yaw)` in world axes: m^2, m rad, rad^2, by rows; a
     /// `nalgebra::Matrix3<f64>` is accepted. The two halves may differ by rounding (2^-20 of the diagonal);
@@ -216,7 +223,8 @@ impl PoseSet {
 
     /// Returns the bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
     ///
-    /// `translation_m` is at most 268 m, `yaw_rad` is any angle (half a turn is every heading).
+    /// `translation_m` is at most 268 m, `yaw_rad` is any angle: from half a turn on, it is every heading. From 32 turns on, it
+    /// is every heading at every scale, so margins are lower bounds there, too.
     ///
     /// # Errors
     /// [`InputError::BoundInvalid`] unless both extents are finite and above zero, and the errors of the
@@ -398,7 +406,8 @@ fn cylinder(
 ) -> Result<(Extent, Given), InputError> {
     let limit = i64::from(crate::pose::REACH_UM);
     let translation = extent_of(translation_m, u128::from(UM_PER_M), 0, limit, inflation);
-    let yaw = extent_of(yaw_rad, Q24_PER_RADIAN_Q52, 52, 1 << 23, inflation);
+    let widest = i64::from(growth::WIDEST_YAW);
+    let yaw = extent_of(yaw_rad, Q24_PER_RADIAN_Q52, 52, widest, inflation);
     let (Some(translation), Some(yaw)) = (translation, yaw) else {
         return Err(InputError::BoundInvalid);
     };

@@ -501,12 +501,9 @@ fn bounds_are_rounded_up() {
         yaw_q24,
         (0.1 / core::f64::consts::TAU * 16_777_216.0_f64).ceil() as i32
     );
-    let all = PoseSet::bounded(HERE, 0.05, 4.0).unwrap();
-    assert!(matches!(
-        all.extent(),
-        Extent::Bounded {
-            yaw_q24: 8_388_608,
-            ..
-        }
-    ));
+    // As given, also beyond half a turn; up to 32 turns.
+    for (given, q24) in [(4.0, 10_680_708), (1e3, 1 << 29)] {
+        let all = PoseSet::bounded(HERE, 0.05, given).unwrap();
+        assert!(matches!(all.extent(), Extent::Bounded { yaw_q24, .. } if yaw_q24 == q24));
+    }
 }

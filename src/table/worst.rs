@@ -31,10 +31,10 @@ pub struct WorstCase {
     /// Slabs of headings at which facets are evaluated. With several pieces, also the steps of their union, at three slabs each. Zero
     /// for one piece with no point that turns with the heading.
     pub heading_slabs: u32,
-    /// Slabs of cells that are walked. A range of headings over the whole circle meets its first two slabs again.
+    /// Slabs of cells that are walked. On the whole circle a set of one turn to either side meets each slab twice, and two of them again.
     pub slabs: u32,
-    /// Runs of cells, and rows without a run, of all slabs. For a whole circle of headings, the runs of the
-    /// fullest slab count twice more.
+    /// Runs of cells, and rows without a run, of all slabs. For a whole circle of headings they count twice,
+    /// and the runs of the fullest slab twice more.
     pub runs: u32,
 }
 
@@ -147,8 +147,15 @@ impl Table<'_> {
                 worst.runs = worst.runs.saturating_add(runs);
                 fullest = runs.max(fullest);
             }
-            let again = if cells.is_whole_circle() { 2 } else { 0 };
-            worst.slabs = u32::from(cells.slabs).saturating_add(again);
+            let (times, again) = if cells.is_whole_circle() {
+                (2, 2)
+            } else {
+                (1, 0)
+            };
+            worst.slabs = u32::from(cells.slabs)
+                .saturating_mul(times)
+                .saturating_add(again);
+            worst.runs = worst.runs.saturating_mul(times);
             worst.runs = worst.runs.saturating_add(fullest.saturating_mul(again));
             worst.runs = worst.runs.min(self.most_runs());
         }
@@ -218,13 +225,13 @@ mod tests {
         };
         assert_eq!(worst, expected);
 
-        // Headings over the whole circle meet two slabs twice, one of them the slab with five runs.
+        // Headings over the whole circle meet each slab twice, and two of them again, one of them the slab with five runs.
         let circle = Cells {
             yaw_span: 1 << 32,
             ..cells
         };
         let bytes = table_of(&circle, &slabs, true);
         let worst = Table::parse(&bytes).unwrap().worst_case();
-        assert_eq!((worst.slabs, worst.runs), (4, 16));
+        assert_eq!((worst.slabs, worst.runs), (6, 22));
     }
 }

@@ -4,6 +4,8 @@
 //! `cargo test -p posegate --features std --test adversarial` runs a short campaign; `ci.sh adversarial N SEED
 //! [LAYOUT]` a long one. Prints one JSON line, and fails at the first kind of failure.
 //!
+//! Pose-sets across narrow gaps and notches are tried apart ([`unions`]).
+//!
 //! Each world is a random success set with a random goal, baked to a table that is proven. Half
 //! of its pose-sets come in bursts ([`burst`]), the others singly ([`singles`]); some are carried by a tracker ([`carried`]). The oracle checks every
 //! permit, by the least slack over the pose-set or a border that it found before. Permits of a grid are also checked
@@ -22,6 +24,7 @@ mod singles;
 mod stage;
 mod tally;
 mod trial;
+mod unions;
 mod voxels;
 
 use oracle::Rng;
@@ -85,6 +88,10 @@ fn main() -> ExitCode {
     for (_, tally) in tallies {
         all.add(tally);
     }
+    // Of facets: cells would be as coarse as the gaps are narrow.
+    let gaps = unions::gaps_and_notches(&mut Rng::new(seed), (cases / 20).max(1_000));
+    all.false_permits += gaps.false_permits;
+    all.gaps = (gaps.cases, gaps.permits);
     println!("{}", all.line(seed, layout));
     ExitCode::from(u8::from(!(all.is_sound() & all.is_meaningful())))
 }

@@ -1,10 +1,10 @@
 //! Random pose-sets, three decisions on an estimate.
 
 use crate::oracle::{
-    Effort, Rng, pose_from_deg, random_estimate, random_pose_set, random_pose_set_near, scale_with,
-    to_goal,
+    Effort, PoseSet, Rng, pose_from_deg, random_estimate, random_pose_set, random_pose_set_near,
+    scale_with, to_goal,
 };
-use crate::trial::{PriorKnowledge, SCALE_ERROR, Trial, core_set, scaled, size};
+use crate::trial::{PriorKnowledge, SCALE_ERROR, Trial, core_set, scaled, size, yaw};
 use posegate::contain::{decide_with_margin, examine};
 
 /// One random set per this number has its margin compared with s*.
@@ -16,7 +16,9 @@ const RATIO_EVERY: usize = 20;
 pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     let world = &trial.stage.world;
     let estimate = pose_from_deg(random_estimate(rng, world));
-    let random = if rng.chance(0.1) {
+    let random = if rng.chance(0.05) {
+        wide_or_thin(rng)
+    } else if rng.chance(0.1) {
         random_pose_set(rng).pose_set
     } else {
         random_pose_set_near(rng, world, estimate).pose_set
@@ -66,8 +68,47 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     }
     for (by, near) in scales.into_iter().take(most) {
         let set = scaled(&random, by);
+        // 32 turns are the widest covariance.
+        if yaw(&set) > 190.0 {
+            continue;
+        }
         let inside = by <= exact;
         trial.case(estimate, &set, PriorKnowledge { inside, near });
+    }
+}
+
+/// Returns a set that turns by more than a radian, up to more than a turn, or whose axes differ by a factor of a thousand.
+fn wide_or_thin(rng: &mut Rng) -> PoseSet {
+    let length = rng.log_within(1e-4, 0.3);
+    let yaw = rng.within(1.0, 7.0);
+    let r2 = 11.4;
+    let ratio = rng.log_within(1e-3, 1.0);
+    let rho = if rng.chance(0.5) {
+        0.0
+    } else {
+        rng.within(-0.95, 0.95)
+    };
+    match rng.below(3) {
+        0 => PoseSet::Bounded {
+            translation: length,
+            yaw,
+        },
+        1 => {
+            let [x, y, t] = [length, length * ratio, yaw].map(|v| v / f64::sqrt(r2));
+            let xt = rho * x * t;
+            PoseSet::Gaussian {
+                cov: [[x * x, 0.0, xt], [0.0, y * y, 0.0], [xt, 0.0, t * t]],
+                r2,
+            }
+        }
+        _ => {
+            let [x, y, t] = [length, length * 1e-3, 0.1 * ratio].map(|v| v / f64::sqrt(r2));
+            let xy = rho * x * y;
+            PoseSet::Gaussian {
+                cov: [[x * x, xy, 0.0], [xy, y * y, 0.0], [0.0, 0.0, t * t]],
+                r2,
+            }
+        }
     }
 }
 

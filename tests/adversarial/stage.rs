@@ -32,6 +32,13 @@ pub fn stage(rng: &mut Rng, layout: Layout) -> Stage {
         if rng.chance(0.5) {
             off_the_raster(rng, &mut random);
         }
+        if rng.chance(0.05) && !matches!(random.set_deg, SetDeg::Visibility { .. }) {
+            // Far from the world's origin. (A tag would stay where it is.)
+            for axis in [0, 1] {
+                random.goal_deg[axis] += if rng.chance(0.5) { 1_200.0 } else { -1_200.0 };
+            }
+            random.world.goal = pose_from_deg(random.goal_deg);
+        }
         let success = success_set(&random);
         let spec = spec(rng, &random, layout);
         let cell = spec.step.xy;

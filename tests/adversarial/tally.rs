@@ -25,6 +25,8 @@ pub struct Tally {
     pub bend_permits: usize,
     /// Permits of sets that a tracker carried.
     pub carried: usize,
+    /// Pose-sets about gaps and notches, and permits of them.
+    pub gaps: (usize, usize),
     pub ratios: Vec<f64>,
     pub cell_ratios: Vec<f64>,
 }
@@ -78,6 +80,8 @@ impl Tally {
             ("bend_cases", self.bend_cases),
             ("bend_permits", self.bend_permits),
             ("carried_permits", self.carried),
+            ("gap_cases", self.gaps.0),
+            ("gap_permits", self.gaps.1),
         ]
         .map(|(name, count)| format!("\"{name}\": {count}"))
         .join(", ");

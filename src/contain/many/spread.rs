@@ -31,7 +31,7 @@ const YAW: [f64; 2] = [1e-8, 36.0];
 const LEAST_DETERMINANT: f64 = 5e-6;
 /// A pose of the set is nearer to the estimate by this share than the rounding of the filter could place it outside of the set.
 const WITHIN: f64 = 1.0 - 1e-6;
-/// A pose that turns farther than this is not named: offsets in yaw wrap at half a turn.
+/// A pose that turns farther than this is not named, so that its heading's rounding is known.
 const MOST_TURN: f64 = 3.1;
 
 /// A symmetric matrix over x, y and yaw: um^2, um rad, rad^2.

@@ -22,7 +22,7 @@ const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 15);
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
 const MICRO_TURN: (i32, i32) = (1_303_797_293, 22);
 /// Half a turn.
-const HALF_TURN: u64 = 1 << 31;
+const ONE_TURN: u64 = 1 << 32;
 /// Upper bound of the effect of rounding the scaled covariance on the level of an outermost pose. Its
 /// entries are off by less than 2.5 each, and its least eigenvalue is above 12 (the first evaluation
 /// accepts no other).
@@ -260,7 +260,7 @@ impl Scaled {
     }
 
     /// Returns the offset of the pose of the set that is farthest along a direction of the scaled
-    /// variables. `None` if it is at least half a turn away, and so not in the set.
+    /// variables. `None` if it is at least a turn away: the first evaluation denies such a set.
     #[inline(never)]
     fn outermost(&self, direction: [i64; 3]) -> Option<[i64; 3]> {
         let along = self.covariance.map(|row| dot(row, direction));
@@ -274,7 +274,7 @@ impl Scaled {
             *offset = unscaled(scaled, power.wrapping_add(14));
         }
         let [.., turn] = offset;
-        (turn.unsigned_abs() < HALF_TURN).then_some(offset)
+        (turn.unsigned_abs() < ONE_TURN).then_some(offset)
     }
 }
 

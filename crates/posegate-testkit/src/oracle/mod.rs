@@ -65,13 +65,22 @@ pub fn to_world(goal: Pose, q: Pose) -> Pose {
     [goal[0] + x, goal[1] + y, goal[2] + q[2]]
 }
 
-/// Returns the factor by which `pose_set` must be scaled for `pose` to lie on its border: at most 1 inside.
+/// Returns the factor by which `pose_set` must be scaled for `pose` to lie on its border: at most 1 inside. The yaw error is a real number of
+/// which the pose is the wrap: the least over up to four turns.
 pub fn level(pose_set: &PoseSet, estimate: Pose, pose: Pose) -> f64 {
-    let e = [
-        pose[0] - estimate[0],
-        pose[1] - estimate[1],
-        wrap(pose[2] - estimate[2]),
-    ];
+    let apart = wrap(pose[2] - estimate[2]);
+    let turns = (-4..=4).map(|k| apart + TAU * f64::from(k));
+    turns
+        .map(|turned| {
+            level_of(
+                pose_set,
+                [pose[0] - estimate[0], pose[1] - estimate[1], turned],
+            )
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn level_of(pose_set: &PoseSet, e: [f64; 3]) -> f64 {
     match pose_set {
         PoseSet::Bounded { translation, yaw } => {
             (e[0].hypot(e[1]) / translation).max(e[2].abs() / yaw)

@@ -64,11 +64,8 @@ fn slices(goal: Pose, estimate: Pose, pose_set: &PoseSet, scale: f64) -> Slices 
                 radius,
                 round: true,
                 reach,
-                half: if reach > PI {
-                    (PI / reach).asin()
-                } else {
-                    0.5 * PI
-                },
+                // The yaw error is a real number, also beyond half a turn.
+                half: 0.5 * PI,
             }
         }
     }
