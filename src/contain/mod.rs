@@ -147,10 +147,9 @@ pub struct Examination {
     /// The largest scale found at which the set is inside: at least 1 with `Inside`, below 1 otherwise. Within 2^-10
     /// of the largest scale that the table allows, and at most 2^15.
     pub margin: Margin,
-    /// With `Outside`: the pose, in the world frame, that leaves the table first as the set grows from the estimate.
-    /// The set that is decided on is rounded outwards; a pose beyond the given set is moved into the given set. If the
-    /// estimate itself is outside, or the set is thinner than some micrometres, this is the estimate to the
-    /// micrometre.
+    /// With `Outside`: a pose of the given set, in the world frame, that the table does not cover, far outside of what it covers. `None` if none
+    /// is found: then the set is denied since it is not proven to be inside. If the estimate is not on the table, or the set is thinner than some
+    /// micrometres, this is the estimate to the micrometre.
     pub worst_pose: Option<Pose>,
 }
 
@@ -206,13 +205,13 @@ fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
 /// (`ci.sh budgets` prints both). For reports and telemetry, not for every control cycle.
 pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     let decision = decide(table, set);
-    let none = Examination {
+    let at_estimate = Examination {
         decision,
         margin: Margin(0),
         worst_pose: Some(set.mean()),
     };
     let Some(placed) = GoalFramePoseSet::at(table, set, turned(table, set.extent())) else {
-        return none;
+        return at_estimate;
     };
     if decision == Decision::Inside {
         let mut low = Margin::ONE;
@@ -230,13 +229,15 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
             worst_pose: None,
         };
     }
-    // Only a table of the whole circle, and only a rounding, can cover a set that is too large for the table. No pose can
-    // be named then, so the estimate is returned.
-    if decision == Decision::Outside(Cause::OffTable)
-        || !placed.is_covered(table, Margin(0))
-        || placed.is_covered(table, Margin::ONE)
-    {
-        return none;
+    if decision == Decision::Outside(Cause::OffTable) {
+        return at_estimate;
+    }
+    if !placed.is_covered(table, Margin(0)) || placed.is_covered(table, Margin::ONE) {
+        // The estimate is outside. Or the set is too large for a table of the whole circle, of which only a rounding covers it.
+        return Examination {
+            worst_pose: placed.worst_pose(table, Margin::ONE),
+            ..at_estimate
+        };
     }
     // The set is outside at scale 1 by the decision; search downwards for a scale that is inside.
     let mut high = Margin::ONE;
@@ -252,7 +253,7 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
     Examination {
         decision,
         margin,
-        worst_pose: Some(placed.worst_pose(table, high)),
+        worst_pose: placed.worst_pose(table, high),
     }
 }
 

@@ -30,7 +30,7 @@
 //! numbers of a facet's section are linear in its normal, its offset and its point. Two numbers are not: the part of G in robot axes and
 //! the part of `along` in world axes. They are carried separately from the sum, the latter rounded up.
 
-use super::heading::{Root, Section, Slab, Sweep, Width, in_arc};
+use super::heading::{Root, Section, Slab, Sweep, Width};
 use crate::num::{Divisor, product, sqrt_ceil, towards_zero};
 use crate::parts;
 use crate::pose::Pose;
@@ -74,8 +74,8 @@ pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<
     search(facets, set, goal)?.err()
 }
 
-/// Returns the depth of a pose in the piece where it is deepest: length units times 2^28, below zero outside of every piece. A pose
-/// beyond [`FARTHEST`] is treated as at it. For reports.
+/// Returns the depth of a pose in the piece where it is deepest: length units times 2^28, below zero outside of every piece. A radian from the
+/// end of a piece's arc of headings counts as a metre. A pose beyond [`FARTHEST`] is treated as at it. For reports.
 pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
     let unit = u32::from(facets.unit());
     let fine = |at: i32, goal: i32| {
@@ -91,13 +91,35 @@ pub(super) fn depth(facets: &Facets<'_>, pose: Pose, goal: Pose) -> i64 {
     let turn = pose.yaw.cos_sin_q30();
     let mut most = i64::MIN;
     for piece in facets.pieces() {
-        if in_arc(&piece, above_goal, 0)
+        let in_arc = depth_in_arc(&piece, above_goal, unit);
+        if in_arc > most
             && let Some(depth) = depth_in(&piece, at, turn, most)
         {
-            most = depth;
+            most = depth.min(in_arc);
         }
     }
     most
+}
+
+/// Returns the depth of a heading, 2^-32 turn above the goal's, in a piece's arc, as [`depth`]; below zero within [`ARC_SLACK`] of its ends.
+fn depth_in_arc(piece: &Piece<'_>, above_goal: u32, unit: u32) -> i64 {
+    if piece.is_whole_circle() {
+        return i64::MAX;
+    }
+    let above = i64::from(above_goal.wrapping_sub(piece.from));
+    let width = i64::from(piece.width);
+    let beyond = above.wrapping_sub(width);
+    // Outside of the arc the nearer end counts.
+    let depth = if beyond <= 0 {
+        above.min(beyond.wrapping_neg())
+    } else {
+        beyond.min((1i64 << 32).wrapping_sub(above)).wrapping_neg()
+    };
+    // 2 pi 10^6 2^28 / 2^32.
+    depth
+        .wrapping_sub(ARC_SLACK)
+        .wrapping_mul(392_699)
+        .wrapping_shr(unit)
 }
 
 /// Returns `Ok` if the pieces together contain the set, or the offset of a pose for which no piece was found. `None` without a

@@ -1,10 +1,11 @@
 //! The worst pose of a denied set, for reports: a pose of the set that the table does not cover.
 
+use super::section::Offset;
 use super::{GoalFramePoseSet, Margin, union};
-use crate::num::{BinaryAngle, sqrt_ceil};
+use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil};
 use crate::parts;
 use crate::pose::Pose;
-use crate::set::Extent;
+use crate::set::{Extent, PoseSet};
 use crate::table::Table;
 
 /// One of each pair of opposite directions in which outermost poses are looked up.
@@ -24,51 +25,160 @@ const DIRECTIONS: [[i8; 3]; 13] = [
     [1, -1, -1],
 ];
 
+/// Cells between the covered ones and an uncovered pose that is named.
+const CLEAR_CELLS: i64 = 2;
+
 /// One, in the unit of a direction.
 const ONE: i64 = 1 << 12;
 
 impl GoalFramePoseSet<'_> {
-    /// Returns the pose that leaves the table first as the set grows, where `high` is a scale at which the set is no longer covered.
+    /// Returns a pose of the set that the table does not cover, at the border of the set, or `None` if none is found. `high` is a scale at which
+    /// the set is no longer covered.
     ///
-    /// With several pieces, a proof ends at that scale, and the pose found there may be covered. So it is compared with the poses
-    /// at larger scales and with the result of a search among the outermost poses. Returns the pose that is farthest out of all
-    /// pieces.
-    pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Pose {
-        let first = self.witness_pose(table, high);
-        let pieces = table
-            .facets()
-            .filter(|layout| parts::UNIONS && layout.pieces().nth(1).is_some());
-        let Some(layout) = pieces.filter(|_| table.grid().is_none()) else {
-            return first;
-        };
-        let goal = table.goal().pose;
-        let depth = |pose: Pose| union::depth(layout, pose, goal);
-        let middle = Margin(
-            high.0
-                .wrapping_add(Margin::ONE.0.saturating_sub(high.0) >> 1),
-        );
-        let others = [
-            self.witness_pose(table, middle),
-            self.witness_pose(table, Margin::ONE),
-            self.set.nearest_of(self.farthest_out(depth)),
-        ];
-        others.into_iter().fold(first, |best, pose| {
-            if depth(pose) < depth(best) {
-                pose
-            } else {
-                best
+    /// Candidates are poses where the set leaves first as it grows, where the whole set is farthest out, and its largest headings, since an
+    /// interval of headings is a border without a facet. If they are covered, or if several pieces cover the set together, the outermost poses are
+    /// searched as well. Of all that are not covered, the one is returned that leaves first on the way from the estimate.
+    pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Option<Pose> {
+        let outside = |pose: Pose| self.depth(table, pose);
+        let mut worst: Option<([i64; 2], Pose)> = None;
+        let mut consider = |offset: [i64; 3]| {
+            let offset = self.set.farthest_towards(offset);
+            let pose = self.set.at_offset(offset);
+            let depth = outside(pose);
+            let order = (depth < 0)
+                .then(|| self.order(table, offset, depth))
+                .flatten();
+            if let Some(order) = order {
+                if worst.is_none_or(|(least, _)| order < least) {
+                    worst = Some((order, pose));
+                }
             }
-        })
+            worst.is_some()
+        };
+        let scale = i64::from(high.0).max(1);
+        let outwards = |v: i64| v.wrapping_mul(Margin::ONE.0.into()).wrapping_div(scale);
+        consider(self.witness_offset(table, high).map(outwards));
+        consider(self.witness_offset(table, Margin::ONE));
+        for end in self.ends_of_heading() {
+            consider(end);
+            consider(end.map(i64::wrapping_neg));
+        }
+        let has_pieces = table
+            .facets()
+            .is_some_and(|layout| parts::UNIONS && layout.pieces().nth(1).is_some());
+        // The estimate itself last: a set may be too thin for another pose.
+        let is_found = consider([0; 3]);
+        if has_pieces || !is_found {
+            consider(self.farthest_out(outside));
+        }
+        worst.map(|(_, pose)| pose)
     }
 
-    fn witness_pose(&self, table: &Table<'_>, scale: Margin) -> Pose {
+    /// Returns the order in which uncovered poses at an offset are preferred, the least first: of facets the share of the offset at which the way
+    /// leaves the table, then the depth. Of cells the way beyond those that are covered; `None` if that is less than [`CLEAR_CELLS`], since cells do not
+    /// fill their set.
+    fn order(&self, table: &Table<'_>, offset: [i64; 3], depth: i64) -> Option<[i64; 2]> {
+        let share = self.leaves_at(offset, |pose| self.depth(table, pose));
+        if table.facets().is_some() {
+            return Some([share, depth]);
+        }
+        if offset == [0; 3] {
+            // The estimate itself is outside.
+            return Some([i64::MIN, 0]);
+        }
+        let cells = table.cells();
+        let slab = (cells.yaw_span / u64::from(cells.slabs).max(1)) as i64;
+        let step = i64::from(cells.step_um);
+        let [x, y, yaw] = offset.map(i64::saturating_abs);
+        // 256ths of a cell.
+        let of = |way: i64, cell: i64| {
+            let beyond = way.wrapping_mul(256i64.wrapping_sub(share));
+            beyond.checked_div(cell).unwrap_or(0)
+        };
+        let beyond = of(x, step).max(of(y, step)).max(of(yaw, slab));
+        (beyond >= CLEAR_CELLS << 8).then_some([beyond.wrapping_neg(), 0])
+    }
+
+    /// Returns the largest share of an offset, in 256ths, up to which the way from the estimate is inside; 0 if the estimate is outside.
+    fn leaves_at(&self, offset: [i64; 3], outside: impl Fn(Pose) -> i64) -> i64 {
+        let at = |share: i64| {
+            let offset = offset.map(|v| v.wrapping_mul(share).wrapping_div(256));
+            outside(self.set.at_offset(offset))
+        };
+        let (mut inside, mut out) = (0i64, 256i64);
+        while out.wrapping_sub(inside) > 1 {
+            let middle = inside.wrapping_add(out) >> 1;
+            if at(middle) < 0 {
+                out = middle;
+            } else {
+                inside = middle;
+            }
+        }
+        inside
+    }
+
+    /// Returns the depth of a pose in the table: below zero outside, in units of the facets if there are any.
+    fn depth(&self, table: &Table<'_>, pose: Pose) -> i64 {
+        let depth = table
+            .facets()
+            .map(|layout| union::depth(layout, pose, table.goal().pose));
+        if table.grid().is_none() {
+            return depth.unwrap_or(-1);
+        }
+        let point = Extent::Bounded {
+            translation_um: 0,
+            yaw_q24: 0,
+        };
+        let is_covered = GoalFramePoseSet::at(table, &PoseSet::of(pose, point), point)
+            .is_some_and(|point| point.is_covered(table, Margin(0)));
+        match depth {
+            _ if is_covered => 0,
+            Some(depth) => depth.min(-1),
+            None => -1,
+        }
+    }
+
+    /// Returns the offset of a witness at a scale ([`Self::witness`]) in world axes: um, um, 2^-32 turn.
+    fn witness_offset(&self, table: &Table<'_>, scale: Margin) -> [i64; 3] {
         let offset = self.witness(table, scale);
+        let Offset([.., yaw]) = offset;
         let pose = table.goal().pose_to_world(offset.applied_to(self.mean));
-        self.set.nearest_of(pose)
+        let mean = self.set.mean();
+        let length = |to: i32, from: i32| i64::from(to).wrapping_sub(i64::from(from));
+        [
+            length(pose.x_um, mean.x_um),
+            length(pose.y_um, mean.y_um),
+            yaw.wrapping_mul(ANGLE_UNITS_PER_Q24),
+        ]
     }
 
-    /// Searches the outermost pose of least depth: from each of 26 directions by smaller and smaller steps.
-    fn farthest_out(&self, depth: impl Fn(Pose) -> i64) -> Pose {
+    /// Returns the offsets of the poses that turn farthest to one side, and of that at half a turn on the way: um, um, 2^-32 turn.
+    fn ends_of_heading(&self) -> [[i64; 3]; 2] {
+        let (x, y, yaw_q24) = match self.set.extent() {
+            Extent::Gaussian(factor) => (factor.x[0], factor.y[0], factor.yaw),
+            Extent::Grown { factor, by } => (
+                factor.x[0],
+                factor.y[0],
+                factor.yaw.wrapping_add(by.yaw_q24()),
+            ),
+            Extent::Bounded { yaw_q24, .. } => (0, 0, yaw_q24),
+        };
+        let end = [
+            x.into(),
+            y.into(),
+            i64::from(yaw_q24).wrapping_mul(ANGLE_UNITS_PER_Q24),
+        ];
+        let at_half = |v: i64| {
+            v.wrapping_mul(1 << 23)
+                .wrapping_div(i64::from(yaw_q24).max(1 << 23))
+        };
+        [end, end.map(at_half)]
+    }
+
+    /// Returns the offset of the outermost pose of least depth, um, um, 2^-32 turn: searched from each of 26 directions by smaller and smaller
+    /// steps.
+    fn farthest_out(&self, depth: impl Fn(Pose) -> i64) -> [i64; 3] {
+        let depth = |offset: [i64; 3]| depth(self.set.at_offset(offset));
         let mut best = [ONE, 0, 0];
         let mut least = i64::MAX;
         for start in &DIRECTIONS {
@@ -84,7 +194,7 @@ impl GoalFramePoseSet<'_> {
     }
 
     /// Returns the least depth found near a direction, and where.
-    fn climbed(&self, start: [i64; 3], depth: &impl Fn(Pose) -> i64) -> (i64, [i64; 3]) {
+    fn climbed(&self, start: [i64; 3], depth: &impl Fn([i64; 3]) -> i64) -> (i64, [i64; 3]) {
         let mut best = start;
         let mut least = depth(self.outermost(start));
         let mut step = ONE >> 2;
@@ -109,8 +219,8 @@ impl GoalFramePoseSet<'_> {
         (least, best)
     }
 
-    /// Returns the pose of the set farthest in a direction of its own axes, unit 2^-12.
-    fn outermost(&self, direction: [i64; 3]) -> Pose {
+    /// Returns the offset of the pose of the set farthest in a direction of its own axes, unit 2^-12: um, um, 2^-32 turn.
+    fn outermost(&self, direction: [i64; 3]) -> [i64; 3] {
         let (x, y, turn) = match self.set.extent() {
             Extent::Gaussian(factor) | Extent::Grown { factor, .. } => {
                 let along = |row: [i32; 3]| {
@@ -156,13 +266,7 @@ impl GoalFramePoseSet<'_> {
             }
             _ => (x, y, turn),
         };
-        let mean = self.set.mean();
-        let length = |at: i32, by: i64| i64::from(at).saturating_add(by) as i32;
-        Pose {
-            x_um: length(mean.x_um, x),
-            y_um: length(mean.y_um, y),
-            yaw: mean.yaw.plus(BinaryAngle((turn << 8) as u32)),
-        }
+        [x, y, turn.wrapping_mul(ANGLE_UNITS_PER_Q24)]
     }
 }
 

@@ -7,8 +7,7 @@
 use super::covariance::{Correlations, ScaledCovariance, is_positive_definite, target};
 use super::trust::Reach;
 use super::{Extent, Growth, Inflation, InputError, SqrtFactor};
-use crate::num::{BinaryAngle, sqrt_ceil};
-use crate::pose::Pose;
+use crate::num::sqrt_ceil;
 
 /// A set that is contained in the given one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,47 +200,41 @@ impl Given {
         }
     }
 
-    /// Returns `true` if a pose is certain to be a pose of the set, moved by up to `by`: if one of some movements back leads
-    /// into the set. A pose that is in it may be missed.
-    pub(super) fn holds_moved(&self, mean: Pose, by: Growth, pose: Pose) -> bool {
+    /// Returns `true` if an offset (um, um, 2^-32 turn) is certain to lead to a pose of the set, moved by up to `by`: if one of some movements back
+    /// leads into the set. A pose that is in it may be missed.
+    pub(super) fn holds_moved(&self, by: Growth, [dx, dy, apart]: [i64; 3]) -> bool {
         let radius = i64::from(by.translation_um());
         let turn = i64::from(by.yaw_q24()) << 8;
-        let apart = i64::from(pose.yaw.minus(mean.yaw).signed());
         let turn = apart.min(turn).max(turn.wrapping_neg());
-        let (dx, dy) = (
-            i64::from(pose.x_um).wrapping_sub(i64::from(mean.x_um)),
-            i64::from(pose.y_um).wrapping_sub(i64::from(mean.y_um)),
-        );
         let length = sqrt_ceil(
             dx.wrapping_mul(dx)
                 .wrapping_add(dy.wrapping_mul(dy))
                 .unsigned_abs(),
         )
         .max(1);
-        let back = |x: i64, y: i64| Pose {
-            x_um: i64::from(pose.x_um).wrapping_sub(x) as i32,
-            y_um: i64::from(pose.y_um).wrapping_sub(y) as i32,
-            yaw: pose.yaw.minus(BinaryAngle(turn as u32)),
+        let back = |x: i64, y: i64| {
+            [
+                dx.wrapping_sub(x),
+                dy.wrapping_sub(y),
+                apart.wrapping_sub(turn),
+            ]
         };
         let towards = |v: i64| {
             let share = v.wrapping_mul(radius.min(length)).checked_div(length);
             share.unwrap_or(0)
         };
         let straight = back(towards(dx), towards(dy));
-        self.holds(mean, straight)
+        self.holds(straight)
             || DIRECTIONS_Q10.iter().any(|[x, y]| {
                 let of = |v: i64| v.wrapping_mul(radius) >> 10;
-                self.holds(mean, back(of(*x), of(*y)))
+                self.holds(back(of(*x), of(*y)))
             })
     }
 
-    /// Returns `true` if a pose is certain to be in the set about an estimate that was rounded to the nearest
-    /// `mean`: by at most half a micrometre on each axis, and half of 2^-32 turn and a little.
-    pub(super) fn holds(&self, mean: Pose, pose: Pose) -> bool {
-        let twice =
-            |at: i32, mean: i32| i64::from(at).wrapping_sub(i64::from(mean)).wrapping_mul(2);
-        let (x, y) = (twice(pose.x_um, mean.x_um), twice(pose.y_um, mean.y_um));
-        let yaw = i64::from(pose.yaw.minus(mean.yaw).signed());
+    /// Returns `true` if an offset (um, um, 2^-32 turn; a real number of turns) from an estimate that was rounded is certain to lead to a pose of the
+    /// set. The estimate was rounded by at most half a micrometre on each axis, and half of 2^-32 turn and a little.
+    pub(super) fn holds(&self, [dx, dy, yaw]: [i64; 3]) -> bool {
+        let (x, y) = (dx.wrapping_mul(2), dy.wrapping_mul(2));
         // The sets are convex: if the corners of the estimate's rounding box are inside, all of it is.
         let ends = |v: i64| [v.wrapping_sub(1), v.wrapping_add(1)];
         ends(x).into_iter().all(|x| {

@@ -28,7 +28,7 @@
 //! ```
 
 use crate::num::{
-    BinaryAngle, Float, FloatUnit, NotConverted, Rounding, UM_PER_M, converted, is_finite,
+    BinaryAngle, Float, FloatUnit, NotConverted, Rounding, UM_PER_M, clamped, converted, is_finite,
 };
 use crate::pose::Pose;
 
@@ -339,45 +339,49 @@ impl PoseSet {
         self.common.grow(self.extent, by);
     }
 
-    /// Returns `true` if a pose is certain to be in the given set, before outward rounding. For reports.
-    fn surely_holds(&self, pose: Pose) -> bool {
+    /// Returns `true` if an offset from the estimate (um, um, 2^-32 turn; a real number of turns) is certain to lead to a pose of the given set,
+    /// before outward rounding. For reports.
+    fn surely_holds(&self, offset: [i64; 3]) -> bool {
         let given = self.given.unwrap_or_else(|| Given::of(self.extent));
         match self.extent {
-            Extent::Grown { by, .. } => given.holds_moved(self.mean, by, pose),
-            _ => given.holds(self.mean, pose),
+            Extent::Grown { by, .. } => given.holds_moved(by, offset),
+            _ => given.holds(offset),
         }
     }
 
-    /// Returns the pose farthest from the estimate, in 256 steps towards `pose`, that is certain to be in the
-    /// given set. Returns the estimate, to the micrometre, if the set is too thin to decide.
-    pub(crate) fn nearest_of(&self, pose: Pose) -> Pose {
+    /// Returns the largest of 256 shares of an offset from the estimate (um, um, 2^-32 turn) that is certain to lead to a pose of the given set.
+    /// Returns no offset if the set is too thin to decide.
+    pub(crate) fn farthest_towards(&self, offset: [i64; 3]) -> [i64; 3] {
         const STEPS: i64 = 256;
-        let mean = self.mean;
-        let at = |steps: i64| {
-            let share = |by: i64| by.wrapping_mul(steps).wrapping_div(STEPS);
-            let length = |to: i32, from: i32| {
-                let by = i64::from(to).wrapping_sub(i64::from(from));
-                i64::from(from).wrapping_add(share(by)) as i32
-            };
-            let turn = share(i64::from(pose.yaw.minus(mean.yaw).signed()));
-            Pose {
-                x_um: length(pose.x_um, mean.x_um),
-                y_um: length(pose.y_um, mean.y_um),
-                yaw: mean.yaw.plus(BinaryAngle(turn as u32)),
-            }
-        };
+        // Beyond every set.
+        const MOST_UM: i64 = 1 << 30;
+        const MOST_TURN: i64 = 1 << 40;
+        let [x, y, turn] = offset;
+        let [x, y] = [x, y].map(|v| clamped(v, -MOST_UM, MOST_UM));
+        let turn = clamped(turn, -MOST_TURN, MOST_TURN);
+        let share = |steps: i64| [x, y, turn].map(|v| v.wrapping_mul(steps).wrapping_div(STEPS));
         let (mut inside, mut outside) = (0, STEPS.wrapping_add(1));
         // The last step first: most poses need no more.
         let mut next = STEPS;
         while outside.wrapping_sub(inside) > 1 {
-            if self.surely_holds(at(next)) {
+            if self.surely_holds(share(next)) {
                 inside = next;
             } else {
                 outside = next;
             }
             next = inside.wrapping_add(outside) >> 1;
         }
-        at(inside)
+        share(inside)
+    }
+
+    /// Returns the pose at an offset from the estimate: um, um, 2^-32 turn.
+    pub(crate) fn at_offset(&self, [x, y, turn]: [i64; 3]) -> Pose {
+        let length = |from: i32, by: i64| i64::from(from).saturating_add(by) as i32;
+        Pose {
+            x_um: length(self.mean.x_um, x),
+            y_um: length(self.mean.y_um, y),
+            yaw: self.mean.yaw.plus(BinaryAngle(turn as u32)),
+        }
     }
 
     /// Returns the values that every decision about the set needs.

@@ -74,6 +74,9 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
         }
         let inside = by <= exact;
         trial.case(estimate, &set, PriorKnowledge { inside, near });
+        if rng.chance(0.1) {
+            trial.check_worst_pose(estimate, &set, exact / by);
+        }
     }
 }
 

@@ -27,6 +27,11 @@ pub struct Tally {
     pub carried: usize,
     /// Pose-sets about gaps and notches, and permits of them.
     pub gaps: (usize, usize),
+    /// Denials whose worst pose was checked; those without one; those whose worst pose is in the success set; and wrong worst poses.
+    pub denials: usize,
+    pub unnamed: usize,
+    pub worst_inside: usize,
+    pub wrong_poses: usize,
     pub ratios: Vec<f64>,
     pub cell_ratios: Vec<f64>,
 }
@@ -48,6 +53,10 @@ impl Tally {
         self.bend_cases += other.bend_cases;
         self.bend_permits += other.bend_permits;
         self.carried += other.carried;
+        self.denials += other.denials;
+        self.unnamed += other.unnamed;
+        self.worst_inside += other.worst_inside;
+        self.wrong_poses += other.wrong_poses;
         self.ratios.extend(other.ratios);
         self.cell_ratios.extend(other.cell_ratios);
     }
@@ -80,6 +89,10 @@ impl Tally {
             ("bend_cases", self.bend_cases),
             ("bend_permits", self.bend_permits),
             ("carried_permits", self.carried),
+            ("denials", self.denials),
+            ("unnamed", self.unnamed),
+            ("worst_inside", self.worst_inside),
+            ("wrong_poses", self.wrong_poses),
             ("gap_cases", self.gaps.0),
             ("gap_permits", self.gaps.1),
         ]
@@ -97,6 +110,7 @@ impl Tally {
             && self.false_margins == 0
             && self.escapes == 0
             && self.unproven == 0
+            && self.wrong_poses == 0
     }
 
     /// Returns `true` if the campaign has enough permits and enough cases near a border to be meaningful.

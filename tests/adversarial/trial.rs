@@ -1,10 +1,10 @@
 //! One decision, and the check of a permit.
 
-use crate::oracle::{Effort, Pose, PoseSet, below, min_slack_over, to_goal};
+use crate::oracle::{Effort, Pose, PoseSet, below, level, min_slack_over, to_goal};
 use crate::stage::Stage;
 use crate::tally::Tally;
 use crate::voxels::Voxels;
-use posegate::contain::{Decision, decide};
+use posegate::contain::{Cause, Decision, decide, examine};
 use posegate::set::{Estimate, InputError, RadiusSquared};
 use posegate::shape::Shape;
 use posegate::table::Table;
@@ -77,6 +77,47 @@ impl Trial<'_> {
             if self.tally.false_permits <= 3 {
                 eprintln!(
                     "FALSE PERMIT: slack {slack:e} at {pose:?}: {estimate:?} {set:?} in {:?}",
+                    self.stage.success
+                );
+            }
+        }
+    }
+
+    /// Checks the worst pose of a denial: it is a pose of the set, and not of the success set. `exact` is s* of the set.
+    pub fn check_worst_pose(&mut self, estimate: Pose, set: &PoseSet, exact: f64) {
+        let Ok(core) = core_set(estimate, set) else {
+            return;
+        };
+        let found = examine(&self.table, &core);
+        if found.decision != Decision::Outside(Cause::NotContained) || exact >= 1.0 {
+            return;
+        }
+        self.tally.denials += 1;
+        let Some(worst) = found.worst_pose else {
+            self.tally.unnamed += 1;
+            return;
+        };
+        let turn = std::f64::consts::TAU / 4_294_967_296.0;
+        let pose = [
+            f64::from(worst.x_um) * 1e-6,
+            f64::from(worst.y_um) * 1e-6,
+            f64::from(worst.yaw.signed()) * turn,
+        ];
+        let level = level(set, estimate, pose);
+        // A set thinner than micrometres has no other pose than the estimate, which is rounded.
+        let is_thin = worst == core.mean();
+        let is_inside = self.stage.world.slack(pose) >= 0.0;
+        self.tally.worst_inside += usize::from(is_inside && !is_thin);
+        // Facets are tighter than their set by a sagitta: a set that leaves by little may leave the table alone. Cells do not fill their
+        // set, and may end within it.
+        let least = || min_slack_over(&self.stage.world, estimate, set, 1.0, Effort::Fast).0;
+        let is_clear = || self.voxels.is_none() && least() < -2.0 * self.stage.cell;
+        let is_wrong = !is_thin && (level > 1.0 || is_inside && is_clear());
+        if is_wrong {
+            self.tally.wrong_poses += 1;
+            if self.tally.wrong_poses <= 3 {
+                eprintln!(
+                    "WRONG POSE {pose:?}, level {level}, inside {is_inside}, s* {exact}: {estimate:?} {set:?} in {:?}",
                     self.stage.success
                 );
             }
