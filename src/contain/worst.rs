@@ -48,15 +48,18 @@ impl GoalFramePoseSet<'_> {
             let order = (depth < 0)
                 .then(|| self.order(table, offset, depth))
                 .flatten();
-            if let Some(order) = order {
-                if worst.is_none_or(|(least, _)| order < least) {
-                    worst = Some((order, pose));
-                }
+            if let Some(order) = order
+                && worst.is_none_or(|(least, _)| order < least)
+            {
+                worst = Some((order, pose));
             }
             worst.is_some()
         };
         let scale = i64::from(high.0).max(1);
-        let outwards = |v: i64| v.wrapping_mul(Margin::ONE.0.into()).wrapping_div(scale);
+        let outwards = |v: i64| {
+            let scaled = v.wrapping_mul(Margin::ONE.0.into()).checked_div(scale);
+            scaled.unwrap_or(v)
+        };
         consider(self.witness_offset(table, high).map(outwards));
         consider(self.witness_offset(table, Margin::ONE));
         for end in self.ends_of_heading() {
@@ -87,7 +90,7 @@ impl GoalFramePoseSet<'_> {
             return Some([i64::MIN, 0]);
         }
         let cells = table.cells();
-        let slab = (cells.yaw_span / u64::from(cells.slabs).max(1)) as i64;
+        let slab = cells.yaw_span.checked_div(cells.slabs.into()).unwrap_or(0) as i64;
         let step = i64::from(cells.step_um);
         let [x, y, yaw] = offset.map(i64::saturating_abs);
         // 256ths of a cell.
@@ -168,10 +171,8 @@ impl GoalFramePoseSet<'_> {
             y.into(),
             i64::from(yaw_q24).wrapping_mul(ANGLE_UNITS_PER_Q24),
         ];
-        let at_half = |v: i64| {
-            v.wrapping_mul(1 << 23)
-                .wrapping_div(i64::from(yaw_q24).max(1 << 23))
-        };
+        let whole = i64::from(yaw_q24).max(1 << 23);
+        let at_half = |v: i64| v.wrapping_mul(1 << 23).checked_div(whole).unwrap_or(v);
         [end, end.map(at_half)]
     }
 
