@@ -5,6 +5,36 @@ mod exact;
 
 pub(crate) use exact::Exact;
 
+/// A small generator.
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + self.unit() * (high - low)
+    }
+
+    /// A magnitude, as likely in each octave.
+    pub fn log_within(&mut self, low: f64, high: f64) -> f64 {
+        (self.within(low.ln(), high.ln())).exp()
+    }
+
+    pub fn sign(&mut self) -> f64 {
+        if self.unit() < 0.5 { -1.0 } else { 1.0 }
+    }
+}
+
 /// A row of an error budget.
 pub(crate) struct Row<'a> {
     /// The module, and the error.

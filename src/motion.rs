@@ -206,4 +206,55 @@ mod tests {
             prop_assert!(found >= angle - 1e-6 && found <= angle + 2.0 + 2e-5 * f64::from(ms), "{found} {angle}");
         }
     }
+
+    /// The rows of the error budget of movements: what a robot at its bounds moves in a time, from a stamp that is rounded down to a clock that is
+    /// rounded down.
+    #[test]
+    fn error_budget_of_movements() {
+        use crate::error_budget::{Exact, Random, Row, Search};
+        use crate::gate::Settings;
+        let mut random = Random::new(31);
+        let mut searches = [(); 4].map(|()| Search::new());
+        let metre = Exact::int(1_000_000);
+        let radian = Exact::int(1 << 23).div(&Exact::pi());
+        for _ in 0..crate::test_share(50_000, 20) {
+            let [length, turn, rounded, later] = &mut searches;
+            let (speed, rate) = (random.log_within(1e-3, 10.0), random.log_within(1e-3, 20.0));
+            let ms = random.log_within(1.0, 5e3) as u32;
+            let bounds = MotionBounds::new(speed, 0.0, rate).unwrap();
+            let growth = bounds.within(ms);
+            let seconds = Exact::int(ms).div(&Exact::int(1_000));
+            let exact = &(&Exact::float(speed) * &seconds) * &metre;
+            length.case(growth.translation_um().into(), exact.to_f64());
+            let exact = &(&Exact::float(rate) * &seconds) * &radian;
+            turn.case(growth.yaw_q24().into(), exact.to_f64());
+            let [mm, mrad] = [speed, rate].map(|v| (v * 1e3) as u32);
+            let constant = MotionBounds::of_mm_mrad(mm, 0, mrad).within(ms);
+            let exact = &Exact::int(u64::from(mm) * u64::from(ms)) * &Exact::int(1);
+            if mm > 0 {
+                rounded.case(constant.translation_um().into(), exact.to_f64());
+            }
+            // True times within their milliseconds.
+            let settings = Settings::for_source(50, 20);
+            let age_ms = (random.unit() * 40.0) as u32;
+            let ends_ms = (age_ms + settings.permit_hold_ms + settings.response_ms)
+                .min(settings.maximum_age_ms);
+            let seconds = (f64::from(ends_ms) + 0.999 - 0.001 * random.unit()) * 1e-3;
+            let bound = settings.movement(bounds, age_ms).translation_um();
+            later.case(bound.into(), speed * seconds * 1e6);
+        }
+        let names = [
+            "motion: a length within a time",
+            "motion: a turn within a time",
+            "motion: a length by whole numbers",
+            "motion: a movement until a permission ends",
+        ];
+        for (search, name) in searches.iter().zip(names) {
+            search.report(&Row {
+                name,
+                unit: "um, 2^-24 turn",
+                looseness: None,
+            });
+        }
+    }
 }

@@ -49,6 +49,8 @@ mod aging;
 mod carried;
 mod common;
 mod covariance;
+#[cfg(test)]
+mod error_budget;
 mod factor;
 mod given;
 mod grown;

@@ -315,7 +315,7 @@ impl Cylinder {
 
 /// Returns an upper bound: floating-point errors are far below 2^-40 of the value.
 #[allow(clippy::float_arithmetic)]
-fn outwards(value: f64) -> f64 {
+pub(super) fn outwards(value: f64) -> f64 {
     value * (1.0 + 1.0 / 1_099_511_627_776.0)
 }
 
@@ -337,7 +337,7 @@ fn length([x, y]: [i32; 2]) -> i64 {
 
 /// Returns the chord `2 L sin(yaw / 2)` of a path below 2^31 um that is turned by `yaw`, micrometres, rounded up. For
 /// half a turn and more it is the diameter.
-fn chord(length_um: i64, yaw_q24: i64) -> i64 {
+pub(super) fn chord(length_um: i64, yaw_q24: i64) -> i64 {
     let half = crate::num::clamped(yaw_q24, 0, 1 << 23) as u32;
     // 2^-24 turn is 2^8 units of an angle; half of it 2^7.
     let [_, sin] = BinaryAngle(half << 7).cos_sin_q30();

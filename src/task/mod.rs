@@ -42,6 +42,8 @@ pub use self::model::{BoundedDriveModel, ModelError, Odometry};
 pub use self::path::wrapped;
 pub use self::path::{Ends, Leg, Motion, Travel, travel};
 
+#[cfg(test)]
+mod error_budget;
 mod growth;
 mod knowledge;
 mod model;

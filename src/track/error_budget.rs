@@ -4,38 +4,13 @@ use super::increment::{Increment, Step};
 use super::model::Noise;
 use super::way::{Way, along_arc};
 use super::*;
-use crate::error_budget::{Exact, Row, Search};
+use crate::error_budget::{Exact, Random, Row, Search};
 use crate::test_share;
 use core::f64::consts::{PI, TAU};
 use std::vec::Vec;
 
 /// Radians of 2^-24 turn.
 const Q24: f64 = TAU / 16_777_216.0;
-
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + self.unit() * (high - low)
-    }
-
-    /// A magnitude, as likely in each octave.
-    fn log_within(&mut self, low: f64, high: f64) -> f64 {
-        (self.within(low.ln(), high.ln())).exp()
-    }
-
-    fn sign(&mut self) -> f64 {
-        if self.unit() < 0.5 { -1.0 } else { 1.0 }
-    }
-}
 
 fn increment(by: [f64; 3]) -> Increment {
     Increment::of(by[0], by[1], by[2], [0, 1]).expect("a short movement")
@@ -44,7 +19,7 @@ fn increment(by: [f64; 3]) -> Increment {
 /// One increment of floats: each entry to the nearest unit.
 #[test]
 fn rounding_of_an_increment() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let (mut length, mut turn) = (Search::new(), Search::new());
     let units_per_radian = Exact::int(1u64 << 32).div(&(&Exact::pi() + &Exact::pi()));
     for _ in 0..test_share(50_000, 20) {
@@ -127,7 +102,7 @@ fn many(round: u32) -> u32 {
 /// Many short increments whose roundings, before and after the turn to the axes of the fix, all err to the same side.
 #[test]
 fn rounding_of_short_increments() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let mut search = Search::new();
     let noise = Noise::of(&OdometryErrors::NONE).unwrap();
     for round in 0..test_share(15, 1) {
@@ -187,7 +162,7 @@ fn rounding_of_short_increments() {
 /// Many turns on the spot that all err to the same side, then a long way.
 #[test]
 fn rounding_of_turns() {
-    let mut random = Random(9);
+    let mut random = Random::new(9);
     let (mut place, mut heading) = (Search::new(), Search::new());
     let noise = Noise::of(&OdometryErrors::NONE).unwrap();
     let unit = &Exact::pi() * &Exact::dyadic(1, 31);
@@ -237,7 +212,7 @@ fn rounding_of_turns() {
 /// The length of a path whose direction leaves the range between its ends by 0.014 rad: what it is longer than its chord.
 #[test]
 fn length_of_an_increment() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let (mut other, mut arc) = (Search::new(), Search::new());
     for _ in 0..test_share(20_000, 20) {
         let turn = random.log_within(1e-4, PI / 4.0) * random.sign();
@@ -278,7 +253,7 @@ fn length_of_an_increment() {
 /// The noise of the heading along an arc, of which the model adds less for a straight line: the variance that is needed in the plane.
 #[test]
 fn noise_along_an_arc() {
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let mut search = Search::new();
     for _ in 0..test_share(20_000, 20) {
         let turn = random.log_within(1e-3, PI / 4.0);
@@ -322,7 +297,7 @@ fn noise_along_an_arc() {
 /// Products and sums of the carried noise: the errors of a row of the matrix.
 #[test]
 fn rounding_of_carried_noise() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let mut search = Search::new();
     let noise = Noise::of(&OdometryErrors::NONE).unwrap();
     let turn = &Exact::pi() + &Exact::pi();
@@ -413,7 +388,7 @@ fn rounding_of_carried_noise() {
 /// The circle of a wrong heading leaves its tangent, for every heading's error.
 #[test]
 fn curvature_of_a_heading_error() {
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     let mut search = Search::new();
     let radius_squared = RadiusSquared::from_q16(743_499).unwrap();
     let noise = Noise::of(&OdometryErrors::NONE).unwrap();
@@ -453,7 +428,7 @@ fn curvature_of_a_heading_error() {
 /// A bounded error of the heading swings the whole path.
 #[test]
 fn swing_of_a_heading_error() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let mut search = Search::new();
     let noise = Noise::of(&OdometryErrors::NONE).unwrap();
     for _ in 0..test_share(20_000, 20) {
@@ -479,7 +454,7 @@ fn swing_of_a_heading_error() {
 /// The part of an increment after a fix, if the robot moved as unevenly as its bounds allow.
 #[test]
 fn part_of_an_increment_after_a_fix() {
-    let mut random = Random(8);
+    let mut random = Random::new(8);
     let (mut place, mut heading) = (Search::new(), Search::new());
     for _ in 0..test_share(100_000, 20) {
         let whole = 2 + (random.unit() * 400.0) as u32;
