@@ -189,7 +189,7 @@ fn lengths_and_turns() {
     for _ in 0..test_share(50_000, 20) {
         let [length, swung, inflated, scaled, turn] = &mut searches;
         let (metres, radians) = (
-            random.log_within(1e-6, 200.0),
+            random.log_within(1e-6, 40.0),
             random.log_within(1e-7, 100.0),
         );
         let growth = Growth::of(metres, radians).unwrap();

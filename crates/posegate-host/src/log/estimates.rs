@@ -324,7 +324,7 @@ mod tests {
     #[test]
     fn clock_wraps_at_2_pow_32_ms() {
         assert_eq!(clock_ms(1.2345), Some(1234));
-        for ms in (0..200_000).chain([1_700_000_000_001, 1_700_000_000_999]) {
+        for ms in (0..200_000i64).chain([1_700_000_000_001, 1_700_000_000_999]) {
             let text = format!("{}.{:03}", ms / 1_000, ms % 1_000);
             let seconds: f64 = text.parse().unwrap();
             let expected = (ms % (1 << 32)) as u32;
