@@ -1,8 +1,10 @@
 //! Chooses the extent of a table if the site does not state it.
 
-use super::parts::{Ranges, lattice};
+use super::parts::lattice;
 use super::{Extent, reach_m};
-use crate::shape::{Parts, PoseDeg, Resolved, Shape, SuccessSet, Tolerance, is_whole_circle};
+use crate::shape::{
+    Parts, PoseDeg, Ranges, Resolved, Shape, SuccessSet, Tolerance, is_whole_circle,
+};
 use core::f64::consts::PI;
 
 /// How much wider than the expected pose-set a table is: estimates lie around the goal, not at it.
@@ -115,8 +117,7 @@ fn hull(shape: &Shape, goal: PoseDeg) -> Option<Ranges> {
         }
         Shape::Footprint(set) => {
             // At least one point of the robot is in the region.
-            let arm = set.footprint().iter().map(|[x, y]| libm::hypot(*x, *y));
-            let arm = arm.fold(0.0, f64::max);
+            let arm = set.lever();
             let ends = |axis: usize| {
                 let values = set.region().iter().map(|corner| corner[axis]);
                 values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| {

@@ -42,6 +42,7 @@ use crate::table::Cells;
 pub use self::export::{Language, source};
 pub use self::extent::{extent, wide_extent};
 pub use self::facets::{Effort, FacetPlan, FramePlan, PiecePlan};
+pub(crate) use self::parts::ranges;
 pub use self::runs::Rows;
 pub use self::sight::sight_record;
 pub use self::spec::{Extent, Layout, Step, TableSpec};

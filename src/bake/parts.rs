@@ -1,15 +1,12 @@
 //! Chooses the convex parts of a success set from which a table is made.
 
 use super::{Nearest, slab_start};
-use crate::shape::{ConvexPart, Parts, SuccessSet};
+use crate::shape::{ConvexPart, Parts, Ranges, SuccessSet};
 use crate::table::Cells;
 use core::f64::consts::TAU;
 
-/// A range of poses in the goal frame: x, y, yaw, each with lower and upper end, m, m, rad.
-pub(super) type Ranges = [[f64; 2]; 3];
-
 /// Returns the poses that a table covers.
-pub(super) fn ranges(cells: &Cells) -> Ranges {
+pub(crate) fn ranges(cells: &Cells) -> Ranges {
     let metres = |um: i32| f64::from(um) * 1e-6;
     let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
     let start = slab_start(cells);
@@ -23,14 +20,8 @@ pub(super) fn ranges(cells: &Cells) -> Ranges {
 /// Returns the pose within the ranges that violates a set least, from lattices that are refined around
 /// the best pose.
 pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
-    let goal = set.goal;
-    let (sin, cos) = goal.yaw_deg.to_radians().sin_cos();
-    let look = |[x, y, yaw]: [f64; 3]| {
-        let world = [
-            goal.x + cos * x - sin * y,
-            goal.y + sin * x + cos * y,
-            yaw + goal.yaw_deg.to_radians(),
-        ];
+    let look = |pose: [f64; 3]| {
+        let world = set.to_world(pose);
         let slacks = set.membership(world).slack;
         let [x, y, yaw] = world;
         let world = [x, y, yaw - TAU * libm::round(yaw / TAU)];

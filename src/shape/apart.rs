@@ -6,11 +6,13 @@
 //! ([`SeparatingHalfPlane`]): two convex bodies whose interiors do not meet have a plane between them.
 
 use super::clear::Clear;
+use super::footprint::farthest;
 use super::scalar::dot;
 use super::side::SeparatingHalfPlane;
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
 use super::{Planar, PoseDeg, Scalar};
+use std::sync::Arc;
 
 /// A set that is the outside of something convex.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +20,12 @@ pub enum Exclusion {
     /// The robot does not overlap an obstacle.
     Obstacle(Clear),
     /// The robot does not reach into a convex piece of the space that a union of regions does not cover.
-    Gap(Clear),
+    Gap {
+        /// The robot and the piece.
+        clear: Clear,
+        /// The regions.
+        regions: Arc<[Vec<[f64; 2]>]>,
+    },
     /// The camera is at least `d_min` from the tag's centre.
     Near {
         /// The camera and the tag.
@@ -51,7 +58,7 @@ impl Exclusion {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Obstacle(_) => "obstacle",
-            Self::Gap(_) => "region",
+            Self::Gap { .. } => "region",
             Self::Near { .. } => "d_min",
             Self::Square { .. } => "psi_min",
             Self::Hidden { .. } => "wall",
@@ -61,7 +68,28 @@ impl Exclusion {
     /// Returns `true` if its slack is exactly the largest of its sides' slacks: the excluded region has no
     /// curved border.
     pub const fn is_polyhedral(&self) -> bool {
-        matches!(self, Self::Obstacle(_) | Self::Gap(_) | Self::Hidden { .. })
+        matches!(
+            self,
+            Self::Obstacle(_) | Self::Gap { .. } | Self::Hidden { .. }
+        )
+    }
+
+    /// Returns the distance from the robot's reference point of the farthest point that must not reach into the region, metres.
+    pub(super) fn lever(&self) -> f64 {
+        match self {
+            Self::Obstacle(clear) | Self::Gap { clear, .. } => farthest(clear.footprint()),
+            Self::Near { view, .. } | Self::Square { view, .. } | Self::Hidden { view, .. } => {
+                libm::hypot(view.mount.x, view.mount.y)
+            }
+        }
+    }
+
+    /// Returns the required distance from an obstacle, metres.
+    pub(super) const fn gap(&self) -> f64 {
+        match self {
+            Self::Obstacle(clear) | Self::Gap { clear, .. } => clear.gap(),
+            Self::Near { .. } | Self::Square { .. } | Self::Hidden { .. } => 0.0,
+        }
     }
 
     /// Returns the slack of a pose in the goal frame: at least 0 in the set, roughly in metres. Exact
@@ -80,7 +108,7 @@ impl Exclusion {
                 let ray = [0, 1, 2].map(|i| plain[i] + back * normal[i]);
                 f64::cos_sin_deg(psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
             }
-            Self::Obstacle(_) | Self::Gap(_) | Self::Hidden { .. } => self
+            Self::Obstacle(_) | Self::Gap { .. } | Self::Hidden { .. } => self
                 .sides(goal)
                 .iter()
                 .map(|side| side.resolve::<f64>(goal).room(pose))
@@ -93,7 +121,7 @@ impl Exclusion {
     pub fn sides(&self, goal: PoseDeg) -> Vec<SeparatingHalfPlane> {
         let around = |k: u32| f64::from(k) / f64::from(DIRECTIONS) * core::f64::consts::TAU;
         match self {
-            Self::Obstacle(clear) | Self::Gap(clear) => {
+            Self::Obstacle(clear) | Self::Gap { clear, .. } => {
                 let (footprint, obstacle) = (clear.footprint(), clear.obstacle());
                 let theirs = edges(obstacle).map(|edge| SeparatingHalfPlane::OfObstacle {
                     points: footprint.to_vec(),

@@ -1,7 +1,7 @@
 //! Obstacles: the robot's outline does not overlap a convex obstacle.
 
 use super::Tolerance;
-use super::footprint::{Footprint, PolygonError};
+use super::footprint::{Footprint, PolygonError, farthest};
 
 /// The poses at which the interiors of a convex footprint and of a convex obstacle do not meet; touching is
 /// allowed. A footprint of one point is that point itself.
@@ -33,8 +33,7 @@ impl Clear {
     /// that one of the obstacle's points can move, metres.
     #[must_use]
     pub fn within(mut self, tolerance: Tolerance) -> Self {
-        let farthest = self.obstacle.iter().map(|[x, y]| libm::hypot(*x, *y));
-        self.gap += tolerance.reach(farthest.fold(0.0, f64::max));
+        self.gap += tolerance.reach(farthest(&self.obstacle));
         self
     }
 

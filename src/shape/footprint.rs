@@ -88,6 +88,12 @@ impl Footprint {
         &self.footprint
     }
 
+    /// Returns the distance of the farthest corner of the footprint from the robot's reference point, metres.
+    #[must_use]
+    pub fn lever(&self) -> f64 {
+        farthest(&self.footprint)
+    }
+
     /// Returns the region in the goal frame, metres, counter-clockwise.
     #[must_use]
     pub fn region(&self) -> &[[f64; 2]] {
@@ -98,8 +104,7 @@ impl Footprint {
     /// the region's points can move, metres.
     #[must_use]
     pub fn within(mut self, tolerance: Tolerance) -> Self {
-        let farthest = self.region.iter().map(|[x, y]| libm::hypot(*x, *y));
-        self.inset += tolerance.reach(farthest.fold(0.0, f64::max));
+        self.inset += tolerance.reach(farthest(&self.region));
         self
     }
 
@@ -107,6 +112,17 @@ impl Footprint {
     #[must_use]
     pub const fn inset(&self) -> f64 {
         self.inset
+    }
+
+    /// Returns for each vertex its distance from the nearest edge of the region, positive inside.
+    pub(super) fn depths(&self, pose: &Planar<f64>) -> Vec<f64> {
+        let count = self.footprint.len();
+        let mut depths = std::vec![f64::INFINITY; count];
+        self.slacks(pose, super::ALL, 0, &mut |index, _, slack| {
+            let depth = &mut depths[index % count];
+            *depth = depth.min(slack);
+        });
+        depths
     }
 
     /// Computes the distance of every vertex from every edge of the region, positive inside. For fixed yaw each is
@@ -142,6 +158,12 @@ impl Footprint {
         }
         index
     }
+}
+
+/// Returns the distance of the farthest corner from the origin, metres.
+pub(super) fn farthest(corners: &[[f64; 2]]) -> f64 {
+    let distances = corners.iter().map(|[x, y]| libm::hypot(*x, *y));
+    distances.fold(0.0, f64::max)
 }
 
 /// Why a list of points is not a polygon that a footprint set can use.

@@ -61,7 +61,7 @@ fn each_view(shape: &mut Shape, change: &mut dyn FnMut(&mut Visibility)) {
         }
         Shape::Box(_)
         | Shape::Footprint(_)
-        | Shape::Apart(Exclusion::Obstacle(_) | Exclusion::Gap(_)) => {}
+        | Shape::Apart(Exclusion::Obstacle(_) | Exclusion::Gap { .. }) => {}
     }
 }
 

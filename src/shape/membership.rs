@@ -30,6 +30,18 @@ impl SuccessSet {
         [c * dx + s * dy, c * dy - s * dx, yaw - yaw_deg.to_radians()]
     }
 
+    /// Transforms a pose of the goal frame to the world: m, m, rad, yaw not wrapped.
+    #[must_use]
+    pub fn to_world(&self, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
+        let goal = self.goal;
+        let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
+        [
+            goal.x + c * x - s * y,
+            goal.y + s * x + c * y,
+            yaw + goal.yaw_deg.to_radians(),
+        ]
+    }
+
     /// Returns `true` if the set is convex in (x, y) at every heading.
     #[must_use]
     pub fn is_convex(&self) -> bool {

@@ -32,8 +32,10 @@ pub use self::camera::Camera;
 pub(crate) use self::camera::Edge;
 pub use self::clear::Clear;
 pub use self::error_model::{ErrorLimit, ErrorModel};
+pub use self::evaluator::{PoseBlock, SetEvaluator};
 pub use self::family::Family;
 pub use self::footprint::{Footprint, PolygonError};
+pub use self::groups::{GroupName, PoseGroup, Ranges};
 pub use self::lens::{Lens, Optic};
 pub use self::membership::{Membership, is_seen, seen};
 pub(crate) use self::part::Parts;
@@ -49,7 +51,6 @@ pub use self::union::hull;
 pub use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
-pub use self::watch::ViewEvaluator;
 pub use self::window::Window;
 
 mod along;
@@ -58,8 +59,10 @@ mod boxed;
 mod camera;
 mod clear;
 mod error_model;
+mod evaluator;
 mod family;
 mod footprint;
+mod groups;
 mod hang;
 mod lens;
 mod membership;
@@ -72,7 +75,6 @@ mod tolerance;
 mod union;
 mod visibility;
 mod wall;
-mod watch;
 mod window;
 
 /// A planar pose as a site file writes it: metres, degrees.
@@ -171,7 +173,10 @@ impl Shape {
             Self::Apart(Exclusion::Obstacle(set)) => {
                 Self::Apart(Exclusion::Obstacle(set.within(tolerance)))
             }
-            Self::Apart(Exclusion::Gap(set)) => Self::Apart(Exclusion::Gap(set.within(tolerance))),
+            Self::Apart(Exclusion::Gap { clear, regions }) => {
+                let clear = clear.within(tolerance);
+                Self::Apart(Exclusion::Gap { clear, regions })
+            }
             Self::Visibility(_) | Self::Bounded { .. } | Self::Apart(_) => self,
             Self::Any(sets) => Self::Any(each_within(sets, tolerance)),
             Self::All(sets) => Self::All(each_within(sets, tolerance)),
@@ -216,7 +221,7 @@ impl Shape {
             Self::Footprint(_) => "footprint",
             Self::Visibility(_) | Self::Bounded { .. } => "visibility",
             Self::Apart(Exclusion::Obstacle(_)) => "clear",
-            Self::Apart(Exclusion::Gap(_)) => "footprint",
+            Self::Apart(Exclusion::Gap { .. }) => "footprint",
             Self::Apart(_) => "visibility",
             Self::Any(_) => "any",
             Self::All(_) => "all",

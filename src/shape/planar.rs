@@ -15,6 +15,14 @@ pub struct Planar<S> {
     pub sin: S,
 }
 
+impl From<[f64; 3]> for Planar<f64> {
+    /// Returns a pose from x, y and yaw: m, m, rad.
+    fn from([x, y, yaw]: [f64; 3]) -> Self {
+        let (sin, cos) = libm::sincos(yaw);
+        Self { x, y, cos, sin }
+    }
+}
+
 impl<S: Scalar> Planar<S> {
     /// Transforms a point of the goal frame to the robot frame: `T_g_r^-1 p`.
     pub(crate) fn to_robot(self, [px, py, pz]: Vector<S>) -> Vector<S> {

@@ -6,6 +6,7 @@
 
 use super::footprint::orientation;
 use super::{Clear, Exclusion, Footprint, Shape};
+use std::sync::Arc;
 
 /// Cells narrower than this are rounding gaps between touching regions, metres.
 const CRACK: f64 = 1e-10;
@@ -57,9 +58,11 @@ impl Shape {
         let mut all = std::vec![Self::Footprint(
             Footprint::new(footprint.to_vec(), about).ok()?
         )];
+        let regions: Arc<[Vec<[f64; 2]>]> = regions.into();
         for cell in free {
-            let gap = Clear::new(footprint.to_vec(), hull(cell)).ok()?;
-            all.push(Self::Apart(Exclusion::Gap(gap)));
+            let clear = Clear::new(footprint.to_vec(), hull(cell)).ok()?;
+            let regions = regions.clone();
+            all.push(Self::Apart(Exclusion::Gap { clear, regions }));
         }
         Some(Self::All(all))
     }

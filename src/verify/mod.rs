@@ -42,6 +42,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod coverage;
 mod facets;
 mod family;
 mod sight;
@@ -49,6 +50,7 @@ mod sight;
 mod tests;
 mod volume;
 
+pub use self::coverage::{Coverage, GroupCoverage, coverage};
 pub use self::facets::UnprovenFacet;
 pub use self::family::{Member, family};
 pub use self::volume::{Volume, volume};

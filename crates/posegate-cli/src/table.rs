@@ -1,11 +1,12 @@
 //! `posegate table`: builds, shows, proves and exports tables.
 
 use crate::gate::not_a_table;
-use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use posegate::bake::{self, BakeError, BakeInput, Language, Layout, source};
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
 use posegate::verify::{
-    BuildError, ExpectedTable, Proof, VerifyError, build as build_table, verify, volume,
+    BuildError, Coverage, ExpectedTable, Proof, VerifyError, build as build_table, coverage,
+    verify, volume,
 };
 use posegate_host::doctor::{Warning, examine};
 use posegate_host::files::{Files, Input, Output};
@@ -165,8 +166,10 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         .as_ref()
         .filter(|_| !arguments.dry_run)
         .map(|output| output.display().to_string());
+    let covered = coverage(&table, &chosen.success);
     if arguments.json {
         let mut facts = facts(&table);
+        facts["covered"] = json!(covered.share);
         facts["file"] = json!(file);
         facts["proven"] = of_proof(proof);
         facts["build_s"] = json!(seconds);
@@ -190,6 +193,22 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
             worst.instructions_m4f(),
             worst.instructions_m0_plus(),
         ))?;
+        print(&format_args!(
+            "it holds {:.1} % of the success set, by {} poses of the extent",
+            100.0 * covered.share,
+            covered.poses,
+        ))?;
+    }
+    if covered.is_low() {
+        warn(&format_args!(
+            "warning: task `{}`: {covered}",
+            arguments.task
+        ));
+    } else if covered.poses < Coverage::POSES {
+        warn(&format_args!(
+            "warning: task `{}`: the success set is so thin that only {} of its poses were found: the share is uncertain",
+            arguments.task, covered.poses
+        ));
     }
     Ok(answer(true))
 }

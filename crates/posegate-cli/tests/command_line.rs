@@ -52,6 +52,52 @@ impl Folder {
 
 const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
 
+/// A table tells the share of the set that it holds, and what it lacks on stderr: of a union the set that it lacks.
+#[test]
+fn table_build_warns_of_what_table_lacks() {
+    let folder = Folder::new();
+    let build = |success: &str, xy: f64, options: &str| {
+        let site = format!(
+            "[task.t]\nkind = \"work\"\ngoal = {{ x = 1.0, y = 0.0, yaw_deg = 90.0 }}\nsuccess = {success}\n[confidence]\nepsilon = 0.99\n\
+             [table]\nextent = {{ x = [-1.0, 1.0], y = [-1.0, 1.0], yaw_deg = [-10.0, 10.0] }}\nstep = {{ xy = {xy:?}, yaw_deg = 1.0 }}\n"
+        );
+        std::fs::write(folder.path().join("t.toml"), site).unwrap();
+        folder.expect(
+            0,
+            &format!("table build t.toml --task t -o t.posegate {options}"),
+        )
+    };
+    let covered = |out: &str| {
+        let built: serde_json::Value = serde_json::from_str(out).unwrap();
+        built["covered"].as_f64().unwrap()
+    };
+    let large = "{ shape = \"box\", x = [-0.8, 0.4], y = [-0.53, 0.5], yaw_deg = [-8.0, 8.0] }";
+    let (out, err) = build(large, 0.02, "--json");
+    assert!(covered(&out) > 0.99 && err.is_empty(), "{out} {err}");
+    let (out, _) = build(large, 0.02, "");
+    assert!(out.contains("% of the success set, by 2"), "{out}");
+    // Cells of 10 cm: the strips of 3 cm and more at the border are lost.
+    let (out, err) = build(large, 0.1, "--json --layout grid");
+    assert!((covered(&out) - 1.0 / 1.03).abs() < 0.01, "{out}");
+    assert!(
+        err.contains("of the success set; most are missing at x "),
+        "{err}"
+    );
+    assert!(err.contains("y -0.53 to -0.2"), "{err}");
+    // A small set between the cells next to a large one.
+    let small = "{ shape = \"box\", x = [0.61, 0.69], y = [0.61, 0.69], yaw_deg = [-8.0, 8.0] }";
+    let aligned = "{ shape = \"box\", x = [-0.8, 0.4], y = [-0.5, 0.5], yaw_deg = [-8.0, 8.0] }";
+    let both = format!("{{ any = [{aligned}, {small}] }}");
+    let (out, err) = build(&both, 0.1, "--json --layout grid");
+    assert!(covered(&out) > 0.98, "{out}");
+    assert!(
+        err.contains("of the poses in set 2 of the union 0.0 %"),
+        "{err}"
+    );
+    let (out, err) = build(&both, 0.02, "--json");
+    assert!(covered(&out) > 0.98 && err.is_empty(), "{out} {err}");
+}
+
 #[test]
 fn site_becomes_a_table_that_decides() {
     let folder = Folder::new();

@@ -43,7 +43,7 @@ fn rate() -> Result<(), Box<dyn Error>> {
     let site = Site::parse(SAMPLE, "sample")?;
     let task = placement_task(&site, "see-t7")?;
     let cost = Cost::default();
-    let costs = task.set.watch();
+    let costs = task.set.evaluator();
     let mut sum = 0.0;
     let started = Instant::now();
     let count = 4_000_000_u32;

@@ -225,7 +225,7 @@ fn yaw_arcs_end_at_their_headings() {
 fn view_evaluator_agrees_with_membership() {
     let site = posegate_host::site::Site::parse(posegate_host::site::SAMPLE, "site.toml").unwrap();
     let set = &site.task("see-t7").unwrap().success;
-    let watch = set.watch();
+    let watch = set.evaluator();
     let mut both = [0; 2];
     for k in 0..20_000_u32 {
         let share = |base: u32| f64::from(k.wrapping_mul(base) >> 16 & 0xffff) / 65_536.0 - 0.5;

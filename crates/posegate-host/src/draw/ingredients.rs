@@ -34,7 +34,7 @@ impl Ingredients {
             }
             Shape::Any(sets) | Shape::All(sets) => sets.iter().for_each(|set| self.collect(set)),
         }
-        if let Shape::Apart(Exclusion::Obstacle(set) | Exclusion::Gap(set)) = shape {
+        if let Shape::Apart(Exclusion::Obstacle(set) | Exclusion::Gap { clear: set, .. }) = shape {
             add(&mut self.outlines, set.footprint().to_vec());
             add(&mut self.obstacles, set.obstacle().to_vec());
         }
