@@ -207,7 +207,7 @@ fn blocks(ranges: Ranges, excludes: &(dyn Fn(&PoseBlock) -> bool + Sync)) -> Vec
 }
 
 /// Returns the halves of a block along its longest side; a radian counts as a metre.
-fn halves(block: Ranges) -> [Ranges; 2] {
+pub(crate) fn halves(block: Ranges) -> [Ranges; 2] {
     let length = |axis: usize| block[axis][1] - block[axis][0];
     let longest = (1..3).fold(0, |best, axis| {
         if length(axis) > length(best) {

@@ -35,6 +35,7 @@ pub use self::error_model::{ErrorLimit, ErrorModel};
 pub use self::evaluator::{PoseBlock, SetEvaluator};
 pub use self::family::Family;
 pub use self::footprint::{Footprint, PolygonError};
+pub(crate) use self::groups::halves;
 pub use self::groups::{GroupName, PoseGroup, Ranges};
 pub use self::lens::{Lens, Optic};
 pub use self::membership::{Membership, is_seen, seen};
