@@ -7,31 +7,46 @@ use super::border::{Chord, HalfPlane, Region};
 use super::frames::{self, Draft};
 use super::{BakeError, BakeInput, parts, slab_start};
 use crate::contain::facet_clearance_q14;
-use crate::shape::{ConvexPart, Parts, SuccessSet, is_whole_circle};
+use crate::shape::{ConvexPart, SuccessSet, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
+use rayon::prelude::*;
 
 /// The loss of the set that is accepted so that its facets can be proven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {
-    /// Keeps facets that seem unnecessary.
-    pub all: bool,
+    /// The facets that are kept.
+    pub keep: Keep,
     /// Every facet is moved inwards by this number of length units: where the lines of two chords meet, rounding can
     /// push them over the curve.
     pub inset: u8,
 }
 
+/// The facets of a piece that are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// Those that are needed at one of a few headings.
+    #[default]
+    Needed,
+    /// Those that are needed at one of many headings, also to have no pose there: some pieces have poses at a few degrees only.
+    NeededAtMany,
+    /// All.
+    All,
+}
+
 impl Effort {
     /// The efforts to try, in this order.
-    pub const EACH: [Self; 4] = [
-        Self::new(false, 0),
-        Self::new(false, 2),
-        Self::new(true, 2),
-        Self::new(true, 12),
+    pub const EACH: [Self; 6] = [
+        Self::new(Keep::Needed, 0),
+        Self::new(Keep::Needed, 2),
+        Self::new(Keep::NeededAtMany, 0),
+        Self::new(Keep::NeededAtMany, 2),
+        Self::new(Keep::All, 2),
+        Self::new(Keep::All, 12),
     ];
 
-    const fn new(all: bool, inset: u8) -> Self {
-        Self { all, inset }
+    const fn new(keep: Keep, inset: u8) -> Self {
+        Self { keep, inset }
     }
 }
 
@@ -93,6 +108,10 @@ pub struct FramePlan {
 
 /// Number of headings at which a facet is evaluated.
 const HEADINGS: usize = 121;
+/// The larger number with which frames are chosen.
+const SOME_HEADINGS: usize = 361;
+/// The larger number with [`Keep::NeededAtMany`]: 0.2 degrees of a whole circle.
+const MANY_HEADINGS: usize = 1_801;
 /// Upper bound of the effect of a point's rounding between two of them (3 degrees of a whole circle), length units
 /// times 2^14.
 const BETWEEN_HEADINGS: f64 = 8.0;
@@ -117,7 +136,7 @@ pub(super) fn of_order(
     effort: Effort,
 ) -> Result<FacetPlan, BakeError> {
     let set = order.success;
-    let parts = parts::covering(&Parts::of(set), parts::ranges(cells), LOOKS, MOST_PARTS);
+    let parts = parts::covering(set, parts::ranges(cells), LOOKS, MOST_PARTS);
     // A part that is empty within the extent is skipped.
     let drafts: Vec<(ConvexPart, Vec<Draft>)> = parts
         .into_iter()
@@ -126,10 +145,11 @@ pub(super) fn of_order(
     if drafts.is_empty() {
         return Err(super::empty(order, cells));
     }
+    let drafts = finest(set, cells, drafts, order)?;
     let all_drafts = || drafts.iter().flat_map(|(_, drafts)| drafts);
     let scale = scale(set, cells, all_drafts)?;
     let lever = lever(all_drafts(), &scale);
-    let sagitta = (order.spec.step.xy / 2.0).clamp(1e-4, 0.05);
+    let sagitta = sagitta(order);
     let mut pieces = Vec::new();
     for (part, drafts) in &drafts {
         let arcs = arcs(part, cells);
@@ -141,10 +161,10 @@ pub(super) fn of_order(
             continue;
         };
         for (from, width) in arcs {
-            let mut frames = if effort.all {
-                frames.clone()
-            } else {
-                needed(&frames, (from, width), &scale)
+            let mut frames = match effort.keep {
+                Keep::Needed => needed(&frames, (from, width), &scale, HEADINGS, false),
+                Keep::NeededAtMany => needed(&frames, (from, width), &scale, MANY_HEADINGS, true),
+                Keep::All => frames.clone(),
             };
             frames.retain(|frame| !frame.facets.is_empty());
             pieces.push(PiecePlan {
@@ -162,6 +182,82 @@ pub(super) fn of_order(
         reach: scale.reach,
         pieces,
     })
+}
+
+/// Returns the largest distance of a chord from its curve, metres.
+fn sagitta(order: &BakeInput<'_>) -> f64 {
+    (order.spec.step.xy / 2.0).clamp(1e-4, 0.05)
+}
+
+/// Returns the frames of the parts of a set, without those that no heading needs if that allows a smaller length unit: the farthest points
+/// determine it, and the corners of what regions do not cover are far.
+fn finest(
+    set: &SuccessSet,
+    cells: &Cells,
+    drafts: Vec<(ConvexPart, Vec<Draft>)>,
+    order: &BakeInput<'_>,
+) -> Result<Vec<(ConvexPart, Vec<Draft>)>, BakeError> {
+    if drafts.len() == 1 {
+        return Ok(drafts);
+    }
+    fn all(drafts: &[(ConvexPart, Vec<Draft>)]) -> impl Iterator<Item = &Draft> {
+        drafts.iter().flat_map(|(_, drafts)| drafts)
+    }
+    let known = scale(set, cells, || all(&drafts))?;
+    let lever = lever(all(&drafts), &known);
+    let wanted: Vec<Vec<bool>> = drafts
+        .par_iter()
+        .map(|(part, drafts)| {
+            let arcs = arcs(part, cells);
+            let frames = drafts
+                .iter()
+                .map(|draft| {
+                    frame(
+                        draft,
+                        &known,
+                        lever,
+                        &arcs,
+                        sagitta(order),
+                        Effort::default(),
+                    )
+                })
+                .collect::<Option<Vec<FramePlan>>>();
+            let Some(frames) = frames else {
+                return vec![true; drafts.len()];
+            };
+            let mut wanted = vec![false; drafts.len()];
+            for arc in arcs {
+                let needed = needed(&frames, arc, &known, SOME_HEADINGS, true);
+                for (wanted, frame) in wanted.iter_mut().zip(needed) {
+                    *wanted |= !frame.facets.is_empty();
+                }
+            }
+            wanted
+        })
+        .collect();
+    let nearest = drafts
+        .iter()
+        .zip(&wanted)
+        .flat_map(|((_, drafts), wanted)| {
+            drafts
+                .iter()
+                .zip(wanted)
+                .filter_map(|(draft, wanted)| wanted.then_some(draft))
+        });
+    let nearest: Vec<&Draft> = nearest.collect();
+    let finer = scale(set, cells, || nearest.iter().copied())?;
+    if finer.unit >= known.unit {
+        return Ok(drafts);
+    }
+    let kept = drafts
+        .into_iter()
+        .zip(wanted)
+        .map(|((part, drafts), wanted)| {
+            let mut wanted = wanted.into_iter();
+            let drafts = drafts.into_iter().filter(|_| wanted.next().unwrap_or(true));
+            (part, drafts.collect())
+        });
+    Ok(kept.collect())
 }
 
 /// Returns the arcs of headings of a set within the table's, 2^-32 turn above the goal's.
@@ -304,7 +400,7 @@ fn frame(
     let turns = rounded != [0.0, 0.0] || !world;
     let turns_at: Vec<[f64; 2]> = arcs
         .iter()
-        .flat_map(|arc| headings(*arc, scale))
+        .flat_map(|arc| headings(*arc, scale, HEADINGS))
         .map(|yaw| [libm::cos(yaw), libm::sin(yaw)])
         .collect();
     let facet_of = |chord: &Chord| {
@@ -359,11 +455,11 @@ fn frame(
 }
 
 /// Returns headings of the robot in the world over an arc.
-fn headings((from, width): (u32, u32), scale: &Scale) -> impl Iterator<Item = f64> {
+fn headings((from, width): (u32, u32), scale: &Scale, count: usize) -> impl Iterator<Item = f64> {
     let radians = TAU / 4_294_967_296.0;
     let goal = libm::atan2(scale.goal[1], scale.goal[0]);
-    (0..HEADINGS).map(move |i| {
-        let part = i as f64 / (HEADINGS - 1) as f64;
+    (0..count).map(move |i| {
+        let part = i as f64 / (count - 1) as f64;
         goal + (f64::from(from) + part * f64::from(width)) * radians
     })
 }
@@ -391,35 +487,39 @@ struct Line {
     offset: f64,
 }
 
-/// Keeps the facets without which a piece would be larger at some heading.
-fn needed(frames: &[FramePlan], arc: (u32, u32), scale: &Scale) -> Vec<FramePlan> {
+/// Keeps the facets without which a piece would be larger at some heading. With `empty` also those without which it would have poses at a
+/// heading where it has none.
+fn needed(
+    frames: &[FramePlan],
+    arc: (u32, u32),
+    scale: &Scale,
+    count: usize,
+    empty: bool,
+) -> Vec<FramePlan> {
     let mut keep: Vec<Vec<bool>> = frames.iter().map(|f| vec![false; f.facets.len()]).collect();
-    for yaw in headings(arc, scale) {
-        let (s, c) = (libm::sin(yaw), libm::cos(yaw));
-        let mut lines = Vec::new();
-        for (number, frame) in frames.iter().enumerate() {
-            let [px, py] = frame.point.map(f64::from);
-            for (index, facet) in frame.facets.iter().enumerate() {
-                let [x, y] = [facet.x, facet.y].map(|v| f64::from(v) / 16_384.0);
-                let (normal, shift) = match frame.axes {
-                    Axes::World => ([x, y], -(x * (c * px - s * py) + y * (s * px + c * py))),
-                    Axes::Robot => {
-                        let normal = [c * x - s * y, s * x + c * y];
-                        (normal, normal[0] * px + normal[1] * py)
-                    }
-                };
-                lines.push(Line {
-                    frame: number,
-                    facet: index,
-                    normal,
-                    offset: f64::from(facet.b) + shift,
-                });
-            }
-        }
+    let far = 4.0 * f64::from(scale.reach);
+    for yaw in headings(arc, scale, count) {
+        let lines = lines(frames, yaw);
         for (i, line) in lines.iter().enumerate() {
             if !keep[line.frame][line.facet] && touches(line, i, &lines) {
                 keep[line.frame][line.facet] = true;
             }
+        }
+        if !empty || middle_within(lines.iter(), far).is_some() {
+            continue;
+        }
+        // The facet that cuts most off the middle of what the kept ones leave, until they leave nothing.
+        loop {
+            let kept = lines.iter().filter(|line| keep[line.frame][line.facet]);
+            let Some([x, y]) = middle_within(kept, far) else {
+                break;
+            };
+            let beyond = |line: &Line| line.normal[0] * x + line.normal[1] * y - line.offset;
+            let open = lines.iter().filter(|line| !keep[line.frame][line.facet]);
+            let Some(most) = open.max_by(|a, b| beyond(a).total_cmp(&beyond(b))) else {
+                break;
+            };
+            keep[most.frame][most.facet] = true;
         }
     }
     frames
@@ -435,6 +535,60 @@ fn needed(frames: &[FramePlan], arc: (u32, u32), scale: &Scale) -> Vec<FramePlan
             ..frame.clone()
         })
         .collect()
+}
+
+/// Returns the facets at a heading.
+fn lines(frames: &[FramePlan], yaw: f64) -> Vec<Line> {
+    let (s, c) = (libm::sin(yaw), libm::cos(yaw));
+    let mut lines = Vec::new();
+    for (number, frame) in frames.iter().enumerate() {
+        let [px, py] = frame.point.map(f64::from);
+        for (index, facet) in frame.facets.iter().enumerate() {
+            let [x, y] = [facet.x, facet.y].map(|v| f64::from(v) / 16_384.0);
+            let (normal, shift) = match frame.axes {
+                Axes::World => ([x, y], -(x * (c * px - s * py) + y * (s * px + c * py))),
+                Axes::Robot => {
+                    let normal = [c * x - s * y, s * x + c * y];
+                    (normal, normal[0] * px + normal[1] * py)
+                }
+            };
+            lines.push(Line {
+                frame: number,
+                facet: index,
+                normal,
+                offset: f64::from(facet.b) + shift,
+            });
+        }
+    }
+    lines
+}
+
+/// Returns the middle of the polygon that lines bound within a square of half width `far`, each moved outwards by two units; `None` if it
+/// is empty.
+fn middle_within<'a>(lines: impl Iterator<Item = &'a Line>, far: f64) -> Option<[f64; 2]> {
+    let mut polygon = vec![[far, far], [-far, far], [-far, -far], [far, -far]];
+    let mut rest = Vec::new();
+    for line in lines {
+        let room = |p: [f64; 2]| line.offset + 2.0 - line.normal[0] * p[0] - line.normal[1] * p[1];
+        rest.clear();
+        for (i, a) in polygon.iter().enumerate() {
+            let b = polygon[(i + 1) % polygon.len()];
+            let (ra, rb) = (room(*a), room(b));
+            if ra >= 0.0 {
+                rest.push(*a);
+            }
+            if (ra > 0.0 && rb < 0.0) || (ra < 0.0 && rb > 0.0) {
+                let t = ra / (ra - rb);
+                rest.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        if rest.is_empty() {
+            return None;
+        }
+        core::mem::swap(&mut polygon, &mut rest);
+    }
+    let count = polygon.len() as f64;
+    Some([0, 1].map(|axis| polygon.iter().map(|p| p[axis]).sum::<f64>() / count))
 }
 
 /// Returns `true` if a line bounds the polygon of all lines, with each of the others moved outwards by a unit.

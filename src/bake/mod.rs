@@ -41,7 +41,7 @@ use crate::table::Cells;
 
 pub use self::export::{Language, source};
 pub use self::extent::{extent, wide_extent};
-pub use self::facets::{Effort, FacetPlan, FramePlan, PiecePlan};
+pub use self::facets::{Effort, FacetPlan, FramePlan, Keep, PiecePlan};
 pub(crate) use self::parts::ranges;
 pub use self::runs::Rows;
 pub use self::sight::sight_record;

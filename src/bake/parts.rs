@@ -1,7 +1,7 @@
 //! Chooses the convex parts of a success set from which a table is made.
 
 use super::{Nearest, slab_start};
-use crate::shape::{ConvexPart, Parts, Ranges, SuccessSet};
+use crate::shape::{ConvexPart, Parts, PoseGroup, Ranges, SuccessSet};
 use crate::table::Cells;
 use core::f64::consts::TAU;
 
@@ -54,17 +54,30 @@ pub(super) fn nearest(set: &SuccessSet, mut ranges: Ranges) -> Nearest {
 }
 
 /// Returns at most `most` parts that cover the success set within the ranges, those that cover most
-/// first. Samples `looks` poses along each axis. If few of them are in the set, the ranges are narrowed
-/// to those that are.
+/// first.
+///
+/// If the set is a union, the poses of each of its groups count equally, however few they are ([`SuccessSet::groups`]).
 pub(super) fn covering(
-    parts: &Parts,
+    set: &SuccessSet,
     ranges: Ranges,
     looks: [u32; 3],
     most: usize,
 ) -> Vec<ConvexPart> {
+    let parts = Parts::of(set);
     if let Some(only) = parts.only() {
         return vec![only];
     }
+    let of_lattice = of_lattice(&parts, ranges, looks, most);
+    let groups = set.groups();
+    if groups.len() == 1 {
+        return of_lattice;
+    }
+    GroupPoses::new(&parts, &groups, ranges).chosen(of_lattice, most)
+}
+
+/// Returns parts that cover a lattice of `looks` poses along each axis. If few of them are in the set, the ranges are narrowed to
+/// those that are.
+fn of_lattice(parts: &Parts, ranges: Ranges, looks: [u32; 3], most: usize) -> Vec<ConvexPart> {
     let mut ranges = ranges;
     let mut found: Vec<([f64; 3], ConvexPart)> = Vec::new();
     // The ranges are narrowed at most twice.
@@ -135,6 +148,120 @@ fn chosen(found: &[([f64; 3], ConvexPart)], most: usize) -> Vec<ConvexPart> {
         parts.push(candidates[best].clone());
     }
     parts
+}
+
+/// Poses of a set's groups, with the parts that hold them.
+struct GroupPoses {
+    poses: Vec<[f64; 3]>,
+    /// The largest slack of a part at each pose.
+    slacks: Vec<f64>,
+    /// The weight of each pose: those of a group add up to 1.
+    weights: Vec<f64>,
+    /// The number of groups with a pose.
+    groups: f64,
+    /// Parts with the largest slack at one of the poses.
+    candidates: Vec<ConvexPart>,
+}
+
+/// Poses of each group.
+const POSES: usize = 400;
+/// Tried poses of each group.
+const TRIES: usize = 100 * POSES;
+/// The mean share of the largest slack that the parts of a lattice must give for every group.
+const GOOD: f64 = 0.97;
+/// The least gain of a part, in that share of one group.
+const GAIN: f64 = 0.004;
+
+impl GroupPoses {
+    fn new(parts: &Parts, groups: &[PoseGroup], ranges: Ranges) -> Self {
+        let mut all = Self {
+            poses: Vec::new(),
+            slacks: Vec::new(),
+            weights: Vec::new(),
+            groups: 0.0,
+            candidates: Vec::new(),
+        };
+        for group in groups {
+            let found = group.sample(ranges, POSES, TRIES);
+            let stride = (found.len() / POSES).max(1);
+            let first = all.poses.len();
+            for pose in found.into_iter().step_by(stride) {
+                let (part, slack) = parts.holding(&[pose]);
+                if slack > 1e-6 {
+                    all.poses.push(pose);
+                    all.slacks.push(slack);
+                    if !all.candidates.iter().any(|known| known.is_same(&part)) {
+                        all.candidates.push(part);
+                    }
+                }
+            }
+            let count = all.poses.len() - first;
+            all.weights
+                .extend(core::iter::repeat_n(1.0 / count as f64, count));
+            all.groups += f64::from(u8::from(count > 0));
+        }
+        all
+    }
+
+    /// Returns the share of the largest slack that each part gives at each pose, from 0 to 1.
+    fn shares(&self, parts: &[ConvexPart]) -> Vec<Vec<f64>> {
+        let mut all = ConvexPart::slacks(parts, &self.poses);
+        for slacks in &mut all {
+            for (slack, largest) in slacks.iter_mut().zip(&self.slacks) {
+                *slack = (*slack / largest).clamp(0.0, 1.0);
+            }
+        }
+        all
+    }
+
+    /// Returns the parts of a lattice if they are good for every group, or else other parts, chosen greedily.
+    fn chosen(&self, of_lattice: Vec<ConvexPart>, most: usize) -> Vec<ConvexPart> {
+        let mut best = vec![0.0; self.poses.len()];
+        for shares in self.shares(&of_lattice) {
+            raise(&mut best, &shares);
+        }
+        let mut at = 0;
+        let mut is_good = true;
+        while at < best.len() {
+            let count = libm::round(1.0 / self.weights[at]) as usize;
+            let sum: f64 = best[at..at + count].iter().sum();
+            is_good &= sum >= GOOD * count as f64;
+            at += count;
+        }
+        if is_good {
+            return of_lattice;
+        }
+        let shares = self.shares(&self.candidates);
+        // Cells may have as many parts as they like.
+        let mut parts = if most > FEW { of_lattice } else { Vec::new() };
+        if parts.is_empty() {
+            best.fill(0.0);
+        }
+        while parts.len() < most {
+            let gain = |shares: &Vec<f64>| -> f64 {
+                let gains = shares.iter().zip(&best).zip(&self.weights);
+                gains
+                    .map(|((own, best), weight)| weight * (own - best).max(0.0))
+                    .sum()
+            };
+            let gains = shares.iter().map(gain).enumerate();
+            // The first among equals.
+            let found = gains.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            let Some((number, _)) = found.filter(|(_, gain)| *gain > GAIN) else {
+                break;
+            };
+            raise(&mut best, &shares[number]);
+            parts.push(self.candidates[number].clone());
+        }
+        parts
+    }
+}
+
+/// Raises numbers to others that are larger.
+fn raise(best: &mut [f64], others: &[f64]) {
+    for (best, other) in best.iter_mut().zip(others) {
+        *best = best.max(*other);
+    }
 }
 
 /// Returns the ranges of the poses found, one step wider.

@@ -75,12 +75,11 @@ pub(super) fn of_set(
     cells: &Cells,
     progress: &(dyn Fn() + Sync),
 ) -> Vec<Vec<Row>> {
-    let parts = Parts::of(set);
-    let only = parts.only();
+    let only = Parts::of(set).only();
     let several = if only.is_some() {
         Vec::new()
     } else {
-        super::parts::covering(&parts, super::parts::ranges(cells), LOOKS, MOST_PARTS)
+        super::parts::covering(set, super::parts::ranges(cells), LOOKS, MOST_PARTS)
     };
     (0..cells.slabs)
         .into_par_iter()

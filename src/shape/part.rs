@@ -13,6 +13,7 @@ use super::{
     BoxSet, Exclusion, Footprint, PoseDeg, Resolved, SeparatingHalfPlane, Shape, SuccessSet,
     Visibility,
 };
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A set that is convex in (x, y) at every heading.
@@ -285,6 +286,25 @@ impl ConvexPart {
                 .iter()
                 .zip(&other.all)
                 .all(|(a, b)| Arc::ptr_eq(a, b))
+    }
+
+    /// Returns the least slack of each part at each pose of the goal frame, in `f64`. A set that several parts share is evaluated once.
+    pub(crate) fn slacks(parts: &[Self], poses: &[[f64; 3]]) -> Vec<Vec<f64>> {
+        let poses: Vec<Pose> = poses.iter().map(|pose| Pose::new(*pose)).collect();
+        let mut known: HashMap<*const Leaf, Vec<f64>> = HashMap::new();
+        let of_part = |part: &Self| {
+            let mut least = vec![f64::INFINITY; poses.len()];
+            for leaf in &part.all {
+                let slacks = known
+                    .entry(Arc::as_ptr(leaf))
+                    .or_insert_with(|| poses.iter().map(|pose| leaf.slack(pose)).collect());
+                for (least, slack) in least.iter_mut().zip(slacks) {
+                    *least = least.min(*slack);
+                }
+            }
+            least
+        };
+        parts.iter().map(of_part).collect()
     }
 
     /// Returns the sets whose intersection is the part, each convex at every heading.

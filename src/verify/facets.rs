@@ -189,8 +189,10 @@ pub(super) fn lines(layout: &Facets<'_>, number: usize) -> Vec<Line> {
     lines
 }
 
-/// Number of headings at which a piece is sampled to choose a part of the success set for it.
-const LOOKS: i64 = 5;
+/// A piece is sampled at headings of at most this distance, about 2.8 degrees, and at 5 headings at least, to choose a part of the
+/// success set for it. Some pieces have poses only at a few of their headings.
+const LOOK: i64 = 1 << 25;
+const LEAST_LOOKS: i64 = 4;
 
 /// Returns corners of a piece's polygon in the goal frame at a few headings: m, m, rad. They are approximate: no proof
 /// depends on them.
@@ -199,8 +201,9 @@ fn corners(lines: &[Line], goal: [Interval; 2], [from, to]: [i64; 2]) -> Vec<[f6
     const ROUNDING: f64 = 1e-7;
     let [gc, gs] = goal.map(Interval::middle);
     let mut found = Vec::new();
-    for look in 0..LOOKS {
-        let units = from + (to - from) / (LOOKS - 1) * look;
+    let looks = ((to - from) / LOOK + 1).max(LEAST_LOOKS);
+    for look in 0..=looks {
+        let units = from + (to - from) * look / looks;
         let yaw = Interval::radians(units).middle();
         let (c, s) = (libm::cos(yaw), libm::sin(yaw));
         let turn = [gc * c - gs * s, gs * c + gc * s].map(Interval::point);

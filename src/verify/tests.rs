@@ -1,6 +1,6 @@
 //! Tables are built for sets that have one; other sets give the right error.
 
-use super::{BuildError, build};
+use super::{BuildError, build, coverage};
 use crate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec};
 use crate::shape::{Clear, Exclusion, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
 use crate::table::Table;
@@ -82,6 +82,33 @@ fn adjacent_pieces_are_proven() {
     let (bytes, _) = build(&order(&success, [-60.0, 60.0], Layout::Facets), &|| ()).unwrap();
     let table = Table::parse(&bytes).unwrap();
     assert!(table.facets().unwrap().pieces().count() >= 3);
+}
+
+/// A robot that may turn around in a crossing, and in a lane with a bay at an angle: few of its poses are across the two regions, at few
+/// headings, and no piece for them may be lost.
+#[test]
+fn poses_across_regions_are_held_at_every_heading() {
+    let square =
+        |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2]| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    let robot = square([-0.4, 0.4], [-0.2, 0.2]);
+    let lane = square([-1.5, 1.5], [-0.55, 0.55]);
+    let (cos, sin) = (libm::cos(0.4), libm::sin(0.4));
+    let bay = square([-0.3, 1.6], [-0.35, 0.35]);
+    let bay = bay
+        .iter()
+        .map(|[x, y]| [cos * x - sin * y, sin * x + cos * y]);
+    let others = [square([-0.6, 0.6], [-1.5, 1.5]), bay.collect()];
+    let lanes = [lane, square([-1.5, 0.0], [-0.55, 0.55])];
+    for (lane, other) in lanes.into_iter().zip(others) {
+        let shape = Shape::footprint_in_union(&robot, &[lane, other]).unwrap();
+        let success = set(20.0, shape);
+        let order = order(&success, [-180.0, 180.0], Layout::Facets);
+        let (bytes, _) = build(&order, &|| ()).unwrap();
+        let table = Table::parse(&bytes).unwrap();
+        let found = coverage(&table, &success);
+        assert!(found.share > 0.98 && found.worst.share > 0.9, "{found:?}");
+        assert!(bytes.len() < 4_000, "{} bytes", bytes.len());
+    }
 }
 
 /// Returns a polygon with corners on a circle.

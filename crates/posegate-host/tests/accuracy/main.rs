@@ -6,6 +6,7 @@
 //! to 30 cm and 0.2 to 2 deg, the others of 0.5 to 5 cm and 0.05 to 0.5 deg. Correlations are up to 0.6, and
 //! estimates are evenly distributed over the part of the extent that is inside.
 
+mod regions;
 mod turning;
 mod unions;
 
@@ -128,19 +129,23 @@ fn q16(margin: posegate::contain::Margin) -> f64 {
 }
 
 fn main() -> ExitCode {
-    let alone = std::env::args().find(|word| ["unions", "turning"].contains(&word.as_str()));
+    let alone =
+        std::env::args().find(|word| ["unions", "turning", "regions"].contains(&word.as_str()));
     let arguments: Vec<u64> = std::env::args()
         .skip(1)
         .filter(|a| !a.starts_with("--") && alone.as_ref() != Some(a))
-        .map(|a| a.parse().expect("accuracy [N [SEED]] [unions|turning]"))
+        .map(|a| {
+            a.parse()
+                .expect("accuracy [N [SEED]] [unions|turning|regions]")
+        })
         .collect();
     let count = arguments.first().copied().unwrap_or(40);
     let seed = arguments.get(1).copied().unwrap_or(1);
     if let Some(part) = alone {
-        let run = if part == "unions" {
-            unions::unions
-        } else {
-            turning::turning
+        let run = match part.as_str() {
+            "unions" => unions::unions,
+            "regions" => regions::regions,
+            _ => turning::turning,
         };
         return ExitCode::from(u8::from(run(count, seed)));
     }
@@ -232,5 +237,6 @@ fn main() -> ExitCode {
     }
     short |= unions::unions((count / 10).max(12), seed);
     short |= turning::turning((count / 10).max(12), seed);
+    short |= regions::regions((count / 20).max(12), seed);
     ExitCode::from(u8::from(short))
 }
