@@ -1306,7 +1306,7 @@ typedef struct posegate_tracker {
 
 /**
  * The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
- * a bound: the share of every movement that may be wrong in the worst direction. No value may be below zero.
+ * a bound: the share of every movement that may be wrong in the worst direction. Lengths are those of the path. No value may be below zero.
  */
 typedef struct posegate_odometry_errors {
     /**
@@ -1330,11 +1330,11 @@ typedef struct posegate_odometry_errors {
      */
     double rad_per_sqrt_s;
     /**
-     * The share of a driven length that may be wrong, in any direction.
+     * The share of a driven length that may be wrong, in any direction; below 1.
      */
     double slip;
     /**
-     * The share of a turn that may be wrong, in either direction.
+     * The share of a turn that may be wrong, in either direction; below 1.
      */
     double turn_slip;
     /**
@@ -1368,7 +1368,8 @@ typedef struct posegate_tracker_settings {
 } posegate_tracker_settings;
 
 /**
- * A movement of the odometry since the previous increment, in the robot's axes at its start.
+ * A movement of the odometry since the previous increment, in the robot's axes at its start. The robot keeps its speeds ahead, to the left and
+ * of its turn meanwhile; at least the direction of movement leaves the range between its directions at both ends by at most 0.014 rad.
  */
 typedef struct posegate_increment {
     /**
@@ -1380,7 +1381,7 @@ typedef struct posegate_increment {
      */
     double left_m;
     /**
-     * Counter-clockwise, radians: less than half a turn.
+     * Counter-clockwise, radians: at most an eighth of a turn, 0.785.
      */
     double turn_rad;
     /**
