@@ -89,7 +89,9 @@ fn hall(rng: &mut Rng, number: u64) -> Hall {
         ),
         5 => {
             let around = |rng: &mut Rng, at: [f64; 2]| -> Polygon {
-                let mut angles: Vec<f64> = (0..6).map(|_| rng.within(0.0, 6.28)).collect();
+                let mut angles: Vec<f64> = (0..6)
+                    .map(|_| rng.within(0.0, std::f64::consts::TAU))
+                    .collect();
                 angles.sort_by(f64::total_cmp);
                 let radius = rng.within(0.9, 1.4);
                 let corner = |a: &f64| [at[0] + radius * a.cos(), at[1] + radius * a.sin()];
@@ -167,6 +169,7 @@ fn uncovered(polygon: &[[f64; 2]], regions: &[Polygon]) -> f64 {
 /// Returns a random pose-set about a pose across regions, as large as those of the other unions, with its true scale.
 fn case(rng: &mut Rng, hall: &Hall, inside: &(dyn Fn(Pose) -> f64 + Sync)) -> Case {
     const MOST: f64 = 3.0;
+    const LEAST: f64 = 0.3;
     let most = hall.yaw_deg.to_radians();
     loop {
         let estimate = [
@@ -204,8 +207,23 @@ fn case(rng: &mut Rng, hall: &Hall, inside: &(dyn Fn(Pose) -> f64 + Sync)) -> Ca
                 r2: 743_499.0 / 65_536.0,
             }
         };
+        // Quickly: the outermost poses on each axis of a set that is too large.
+        let outermost = |axis: usize| match &set {
+            PoseSet::Gaussian { cov, r2 } => cov[axis].map(|v| v * (r2 / cov[axis][axis]).sqrt()),
+            PoseSet::Bounded { translation, yaw } => {
+                let reach = [*translation, *translation, *yaw];
+                [0, 1, 2].map(|i| if i == axis { reach[i] } else { 0.0 })
+            }
+        };
+        let fits = (0..3).map(outermost).all(|by| {
+            let at = |sign: f64| [0, 1, 2].map(|i| estimate[i] + sign * LEAST * by[i]);
+            inside(at(1.0)) >= 0.0 && inside(at(-1.0)) >= 0.0
+        });
+        if !fits {
+            continue;
+        }
         let truth = union_scale(inside, estimate, &set, MOST, rng);
-        if truth > 0.3 && truth < 0.99 * MOST {
+        if truth > LEAST && truth < 0.99 * MOST {
             return Case {
                 estimate,
                 set,
