@@ -1184,7 +1184,7 @@ typedef struct posegate_verdict {
      */
     uint32_t margin_q16;
     /**
-     * The pose of the pose-set that leaves the table first as the set grows, world frame.
+     * A pose at the border of the pose-set that the table does not cover, world frame.
      */
     struct posegate_pose worst_pose;
 } posegate_verdict;

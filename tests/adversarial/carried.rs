@@ -5,6 +5,7 @@ use crate::oracle::{
     Pose, PoseSet, Rng, cholesky, pose_from_deg, random_estimate, random_pose_set_near, to_goal,
     to_world,
 };
+use crate::singles::wide_or_thin;
 use crate::trial::{Trial, scaled};
 use posegate::contain::{Decision, decide};
 use posegate::motion::MotionBounds;
@@ -177,7 +178,11 @@ pub fn robots(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
     for _ in 0..most {
         let world = &trial.stage.world;
         let estimate = pose_from_deg(random_estimate(rng, world));
-        let drawn = random_pose_set_near(rng, world, estimate).pose_set;
+        let drawn = if rng.chance(0.15) {
+            wide_or_thin(rng)
+        } else {
+            random_pose_set_near(rng, world, estimate).pose_set
+        };
         let r2 = match &drawn {
             PoseSet::Gaussian { r2, .. } => *r2,
             PoseSet::Bounded { .. } => 11.4,

@@ -81,7 +81,7 @@ pub fn three(rng: &mut Rng, trial: &mut Trial<'_>, most: usize) {
 }
 
 /// Returns a set that turns by more than a radian, up to more than a turn, or whose axes differ by a factor of a thousand.
-fn wide_or_thin(rng: &mut Rng) -> PoseSet {
+pub fn wide_or_thin(rng: &mut Rng) -> PoseSet {
     let length = rng.log_within(1e-4, 0.3);
     let yaw = rng.within(1.0, 7.0);
     let r2 = 11.4;

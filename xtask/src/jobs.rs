@@ -22,6 +22,7 @@ pub mod python;
 pub mod recorded;
 pub mod ros2;
 pub mod slurm;
+pub mod stamps;
 pub mod steady;
 pub mod test;
 pub mod vectors;

@@ -77,7 +77,7 @@ pub struct posegate_verdict {
     /// The factor by which the pose-set could be scaled and still be inside, unit 2^-16, rounded down: at least
     /// 65,536 with a permit, below it otherwise.
     pub margin_q16: u32,
-    /// The pose of the pose-set that leaves the table first as the set grows, world frame.
+    /// A pose at the border of the pose-set that the table does not cover, world frame.
     pub worst_pose: posegate_pose,
 }
 
