@@ -701,9 +701,9 @@ fn driven(cause: Cause, openings: u64, seed: u64) -> Found {
     found
 }
 
-/// Searches a cause: nothing is outside, and robots come near to the walls.
-fn holds(cause: Cause, openings: u64, near_um: i64) {
-    let openings = if is_deep() { openings } else { openings / 400 };
+/// Searches a cause for a number of openings, in the deep job and in the fast suite: nothing is outside, and robots come near to the walls.
+fn holds(cause: Cause, [deep, fast]: [u64; 2], near_um: i64) {
+    let openings = if is_deep() { deep } else { fast };
     let found = driven(cause, openings, first_seed());
     assert_eq!(found.outside, 0, "{found:?}");
     assert!(found.moments > found.openings, "{found:?}");
@@ -711,22 +711,24 @@ fn holds(cause: Cause, openings: u64, near_um: i64) {
     assert!(found.least_um < near_um, "{found:?}");
 }
 
+// A million openings in all.
+
 #[test]
 fn simulated_robots_are_inside_while_interlock_is_open() {
-    holds(Cause::Mixed, 600_000, 10_000);
+    holds(Cause::Mixed, [900_000, 1_500], 20_000);
 }
 
 #[test]
 fn rounding_at_a_thousand_increments_a_second_is_counted() {
-    holds(Cause::Rounding, 100_000, 3_000);
+    holds(Cause::Rounding, [80_000, 100], 5_000);
 }
 
 #[test]
 fn fix_with_wide_heading_is_carried_with_its_curvature() {
-    holds(Cause::WideHeading, 200_000, 100_000);
+    holds(Cause::WideHeading, [10_000, 100], 300_000);
 }
 
 #[test]
 fn slip_along_wide_arcs_is_that_of_their_length() {
-    holds(Cause::Arcs, 100_000, 50_000);
+    holds(Cause::Arcs, [10_000, 100], 100_000);
 }
