@@ -184,7 +184,8 @@ fn file_contains_every_kind_of_reply() {
                 Verdict::Deny {
                     margin, worst_pose, ..
                 } => {
-                    assert_eq!(margin.is_some(), worst_pose.is_some());
+                    // A set that is not proven inside may have no pose that is outside.
+                    assert!(margin.is_some() || worst_pose.is_none());
                     denials += usize::from(margin.is_some());
                     (margin, 1)
                 }

@@ -26,7 +26,7 @@ const DIRECTIONS: [[i8; 3]; 13] = [
 ];
 
 /// Cells between the covered ones and an uncovered pose that is named.
-const CLEAR_CELLS: i64 = 2;
+const CLEAR_CELLS: i64 = 1;
 
 /// One, in the unit of a direction.
 const ONE: i64 = 1 << 12;

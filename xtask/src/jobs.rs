@@ -22,7 +22,6 @@ pub mod python;
 pub mod recorded;
 pub mod ros2;
 pub mod slurm;
-pub mod stamps;
 pub mod steady;
 pub mod test;
 pub mod vectors;

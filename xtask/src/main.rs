@@ -98,12 +98,6 @@ const JOBS: &[Job] = &[
         jobs::test::error_budgets,
     ),
     job(
-        "stamps",
-        "",
-        "the deep jobs whose figures docs/measured.md states have run with the present sources",
-        jobs::stamps::stamps,
-    ),
-    job(
         "no_panic",
         "",
         "no panic can be reached in the firmware",

@@ -16,7 +16,7 @@ pub struct Starts {
     pub tried: u64,
     /// The gate was latched by the check of the code.
     pub found: u64,
-    /// The gate was latched before that, by the self-test, the check of the table or that of its own words.
+    /// The gate stayed closed before that, by the self-test, the check of the table, that of its own words or that of the table's identity.
     pub found_before: u64,
     /// The program ended before that, with the output low.
     pub ended: u64,
@@ -65,6 +65,9 @@ impl Starts {
             Reason::SelfTestFailed,
             Reason::TableInvalid,
             Reason::MemoryDamaged,
+            // A bit of the name or of the digest, in the table or in the settings.
+            Reason::WrongTask,
+            Reason::WrongSite,
         ]));
     }
 }
