@@ -418,7 +418,10 @@ fn containment() {
                 margin / truth
             );
         }
-        if !permit {
+        // A set that is not proven inside, though it is nearly inside, may have no pose that is outside.
+        let is_named = !answer["worst_pose"].is_null();
+        assert!(permit || is_named || truth > 0.95, "{name}: {answer}");
+        if !permit && is_named {
             let worst = numbers(&answer["worst_pose"]);
             assert!(
                 level(pose_set, &estimate, &worst) <= 1.0,

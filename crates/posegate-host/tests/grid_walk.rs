@@ -46,10 +46,8 @@ fn is_inside(bytes: &[u8], set: &PoseSet) -> bool {
         examination.margin.q16() >= 1 << 16,
         decision == Decision::Inside
     );
-    assert_eq!(
-        examination.worst_pose.is_none(),
-        decision == Decision::Inside
-    );
+    // A pose is named only if it is clear of the covered cells.
+    assert!(examination.worst_pose.is_none() || !(decision == Decision::Inside));
     decision == Decision::Inside
 }
 
