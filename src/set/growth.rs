@@ -108,8 +108,8 @@ impl Growth {
     /// Returns the largest change of this movement, in any direction of the plane, if its axes are turned by up to `yaw_q24`: a chord, rounded up.
     pub(crate) fn swung(self, yaw_q24: i32) -> Self {
         let product = wide(self.translation_um.unsigned_abs(), yaw_q24.unsigned_abs());
-        // 2 pi / 2^24 from above, of at most 2^52.
-        let chord = product.wrapping_mul(1_609) >> 32;
+        // 2 pi / 2^24 from above, of at most 2^57: beyond 2^53, a chord is longer than every growth.
+        let chord = product.saturating_mul(1_609) >> 32;
         Self::new(u32::try_from(chord.wrapping_add(1)).unwrap_or(u32::MAX), 0)
     }
 
