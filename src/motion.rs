@@ -214,39 +214,54 @@ mod tests {
         use crate::error_budget::{Exact, Random, Row, Search};
         use crate::gate::Settings;
         let mut random = Random::new(31);
-        let mut searches = [(); 4].map(|()| Search::new());
+        let mut searches = [(); 5].map(|()| Search::new());
         let metre = Exact::int(1_000_000);
         let radian = Exact::int(1 << 23).div(&Exact::pi());
         for _ in 0..crate::test_share(50_000, 20) {
-            let [length, turn, rounded, later] = &mut searches;
+            let [length, turn, rounded, turned, later] = &mut searches;
             let (speed, rate) = (random.log_within(1e-3, 10.0), random.log_within(1e-3, 20.0));
             let ms = random.log_within(1.0, 5e3) as u32;
-            let bounds = MotionBounds::new(speed, 0.0, rate).unwrap();
+            let across = random.log_within(1e-3, 10.0) * random.within(-1.0, 1.0).max(0.0);
+            let bounds = MotionBounds::new(speed, across, rate).unwrap();
+            let square = |v: f64| &Exact::float(v) * &Exact::float(v);
+            let fastest = (&square(speed) + &square(across)).sqrt();
             let growth = bounds.within(ms);
             let seconds = Exact::int(ms).div(&Exact::int(1_000));
-            let exact = &(&Exact::float(speed) * &seconds) * &metre;
+            let exact = &(&fastest * &seconds) * &metre;
             length.case(growth.translation_um().into(), exact.to_f64());
             let exact = &(&Exact::float(rate) * &seconds) * &radian;
             turn.case(growth.yaw_q24().into(), exact.to_f64());
-            let [mm, mrad] = [speed, rate].map(|v| (v * 1e3) as u32);
-            let constant = MotionBounds::of_mm_mrad(mm, 0, mrad).within(ms);
-            let exact = &Exact::int(u64::from(mm) * u64::from(ms)) * &Exact::int(1);
+            let [mm, aside, mrad] = [speed, across, rate].map(|v| (v * 1e3) as u32);
+            let constant = MotionBounds::of_mm_mrad(mm, aside, mrad).within(ms);
+            let root = Exact::int(u64::from(mm).pow(2) + u64::from(aside).pow(2)).sqrt();
+            let exact = &root * &Exact::int(ms);
             if mm > 0 {
                 rounded.case(constant.translation_um().into(), exact.to_f64());
             }
-            // True times within their milliseconds.
-            let settings = Settings::for_source(50, 20);
-            let age_ms = (random.unit() * 40.0) as u32;
+            if mrad > 0 {
+                let exact = &(&Exact::int(mrad).div(&Exact::int(1_000)) * &seconds) * &radian;
+                turned.case(constant.yaw_q24().into(), exact.to_f64());
+            }
+            // The true stamp begins its millisecond, and the permission's end ends its own.
+            let period_ms = random.log_within(5.0, 500.0) as u32;
+            let settings = Settings::for_source(period_ms, (random.unit() * 50.0) as u32);
+            let age_ms = (random.unit() * f64::from(settings.maximum_age_ms)) as u32;
             let ends_ms = (age_ms + settings.permit_hold_ms + settings.response_ms)
                 .min(settings.maximum_age_ms);
-            let seconds = (f64::from(ends_ms) + 0.999 - 0.001 * random.unit()) * 1e-3;
-            let bound = settings.movement(bounds, age_ms).translation_um();
-            later.case(bound.into(), speed * seconds * 1e6);
+            let hair = Exact::dyadic(1, 40);
+            let ends = &(&Exact::int(ends_ms) + &Exact::int(1)) - &hair;
+            let seconds = ends.div(&Exact::int(1_000));
+            let bound = settings.movement(bounds, age_ms);
+            let exact = &(&fastest * &seconds) * &metre;
+            later.case(bound.translation_um().into(), exact.to_f64());
+            let exact = &(&Exact::float(rate) * &seconds) * &radian;
+            later.case(bound.yaw_q24().into(), exact.to_f64());
         }
         let names = [
             "motion: a length within a time",
             "motion: a turn within a time",
             "motion: a length by whole numbers",
+            "motion: a turn by whole numbers",
             "motion: a movement until a permission ends",
         ];
         for (search, name) in searches.iter().zip(names) {

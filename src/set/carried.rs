@@ -32,7 +32,7 @@ const LEVER_Q56: i128 = 26_986_075_409;
 const LONGEST: i64 = 1 << 26;
 const LARGEST: i64 = 1 << 56;
 /// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding.
-const ROUNDED: i64 = 9;
+pub(super) const ROUNDED: i64 = 9;
 
 /// Returns the covariance of an estimate after a path `[x, y]`, micrometres in world axes, with the trust in its source applied: `G P G'`
 /// with the path's noise.
