@@ -25,6 +25,9 @@ const DIRECTIONS: [[i8; 3]; 13] = [
     [1, -1, -1],
 ];
 
+/// Length units between the facets and a pose that is named.
+const CLEAR_UNITS: i64 = 4;
+
 /// Cells between the covered ones and an uncovered pose that is named.
 const CLEAR_CELLS: i64 = 1;
 
@@ -37,10 +40,10 @@ impl GoalFramePoseSet<'_> {
     ///
     /// Candidates are poses where the set leaves first as it grows, where the whole set is farthest out, and its largest headings, since an
     /// interval of headings is a border without a facet. If they are covered, or if several pieces cover the set together, the outermost poses are
-    /// searched as well. Of all that are not covered, the one is returned that leaves first on the way from the estimate.
+    /// searched as well. Of all that are not covered, the one that is farthest out is returned.
     pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Option<Pose> {
         let outside = |pose: Pose| self.depth(table, pose);
-        let mut worst: Option<([i64; 2], Pose)> = None;
+        let mut worst: Option<(i64, Pose)> = None;
         let mut consider = |offset: [i64; 3]| {
             let offset = self.set.farthest_towards(offset);
             let pose = self.set.at_offset(offset);
@@ -77,18 +80,17 @@ impl GoalFramePoseSet<'_> {
         worst.map(|(_, pose)| pose)
     }
 
-    /// Returns the order in which uncovered poses at an offset are preferred, the least first: of facets the share of the offset at which the way
-    /// leaves the table, then the depth. Of cells the way beyond those that are covered; `None` if that is less than [`CLEAR_CELLS`], since cells do not
-    /// fill their set.
-    fn order(&self, table: &Table<'_>, offset: [i64; 3], depth: i64) -> Option<[i64; 2]> {
-        let share = self.leaves_at(offset, |pose| self.depth(table, pose));
+    /// Returns the order in which uncovered poses at an offset are preferred, the least first: the way beyond the facets, or beyond the cells that
+    /// are covered. `None` if that is less than [`CLEAR_UNITS`] or [`CLEAR_CELLS`], since a table does not fill its set.
+    fn order(&self, table: &Table<'_>, offset: [i64; 3], depth: i64) -> Option<i64> {
         if table.facets().is_some() {
-            return Some([share, depth]);
+            return (depth < CLEAR_UNITS.wrapping_neg() << 28).then_some(depth);
         }
         if offset == [0; 3] {
             // The estimate itself is outside.
-            return Some([i64::MIN, 0]);
+            return Some(i64::MIN);
         }
+        let share = self.leaves_at(offset, |pose| self.depth(table, pose));
         let cells = table.cells();
         let slab = cells.yaw_span.checked_div(cells.slabs.into()).unwrap_or(0) as i64;
         let step = i64::from(cells.step_um);
@@ -99,7 +101,7 @@ impl GoalFramePoseSet<'_> {
             beyond.checked_div(cell).unwrap_or(0)
         };
         let beyond = of(x, step).max(of(y, step)).max(of(yaw, slab));
-        (beyond >= CLEAR_CELLS << 8).then_some([beyond.wrapping_neg(), 0])
+        (beyond >= CLEAR_CELLS << 8).then_some(beyond.wrapping_neg())
     }
 
     /// Returns the largest share of an offset, in 256ths, up to which the way from the estimate is inside; 0 if the estimate is outside.

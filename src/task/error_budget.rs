@@ -4,6 +4,7 @@ use super::growth::{MotionUpdate, PathTolerance, chord, outwards};
 use super::path::Leg;
 use super::{BoundedDriveModel, Cylinder, PoseErrorSet};
 use crate::error_budget::{Exact, Random, Row, Search};
+use crate::pose::Pose;
 use crate::set::Estimate;
 use crate::test_share;
 use std::vec::Vec;
@@ -95,11 +96,11 @@ fn driven(poses: &[[Exact; 3]]) -> [Exact; 2] {
     [length, turning]
 }
 
-/// The bounded model along straight legs: starts and ends at their tolerances.
+/// The bounded model along straight legs: starts and ends at their tolerances, and starts that `begins_at` accepts.
 #[test]
 fn bounded_update_of_a_path() {
     let mut random = Random::new(23);
-    let mut searches = [(); 2].map(|()| Search::new());
+    let mut searches = [(); 4].map(|()| Search::new());
     let metre = Exact::int(1_000_000);
     let radian = Exact::int(1 << 23).div(&Exact::pi());
     for round in 0..test_share(20_000, 10) {
@@ -140,6 +141,23 @@ fn bounded_update_of_a_path() {
         let Some(after) = update.after(&PoseErrorSet::bounded(before)) else {
             continue;
         };
+        let units = &Exact::pi() * &Exact::dyadic(1, 31);
+        let given = |pose: Pose| {
+            let length = |um: i32| Exact::int(um).div(&metre);
+            let yaw = &Exact::int(pose.yaw.signed()) * &units;
+            [length(pose.x_um), length(pose.y_um), yaw]
+        };
+        let mut exact: Vec<[Exact; 3]> = poses.iter().map(|pose| pose.map(Exact::float)).collect();
+        // The set after the path is about the rounded end.
+        let rounding = {
+            let [to, exact] = [given(update.to()), exact[count].clone()];
+            let [dx, dy] = [&to[0] - &exact[0], &to[1] - &exact[1]];
+            [
+                (&(&dx * &dx) + &(&dy * &dy)).sqrt(),
+                turned(&(&to[2] - &exact[2])),
+            ]
+        };
+        exact[0] = given(update.from());
         let check = |searches: &mut [Search], path: &[[Exact; 3]]| {
             let [length, turning] = driven(path);
             let k = Exact::float;
@@ -148,15 +166,14 @@ fn bounded_update_of_a_path() {
             let half = &alpha.clone().min(Exact::pi()) * &Exact::dyadic(1, 1);
             let [_, sin] = half.cos_sin();
             let added = &(&k(drift.k_slip) * &length) + &(&(&length + &length) * &sin);
-            let rho = &Exact::int(before.translation_um()) + &(&added * &metre);
+            let rho = &Exact::int(before.translation_um()) + &(&(&added + &rounding[0]) * &metre);
             searches[0].case(after.certain.translation_um().into(), rho.to_f64());
-            let limited = alpha.min(Exact::pi());
+            let limited = (&alpha + &rounding[1]).min(Exact::pi());
             searches[1].case(
                 after.certain.yaw_q24().into(),
                 (&limited * &radian).to_f64(),
             );
         };
-        let exact: Vec<[Exact; 3]> = poses.iter().map(|pose| pose.map(Exact::float)).collect();
         let off = |pose: &[Exact; 3], by: Cylinder, [angle, sign]: [f64; 2]| {
             let um = f64::from(by.translation_um()) * (1.0 - 1e-14);
             let [dx, dy] = [angle.cos(), angle.sin()].map(|v| Exact::float(v * um).div(&metre));
@@ -175,12 +192,25 @@ fn bounded_update_of_a_path() {
                 within.end,
                 [random.within(-4.0, 4.0), random.sign()],
             );
-            check(&mut searches, &path);
+            check(&mut searches[..2], &path);
+        }
+        // A start as a controller compares it.
+        let mut start = update.from();
+        let um = f64::from(within.start.translation_um());
+        let angle = random.within(-4.0, 4.0);
+        start.x_um += (um * angle.cos()) as i32;
+        start.y_um += (um * angle.sin()) as i32;
+        if update.begins_at(start, Cylinder::POINT) {
+            let mut path = exact.clone();
+            path[0] = given(start);
+            check(&mut searches[2..], &path);
         }
     }
     for (search, name) in searches.iter().zip([
         "task: the bounded update of a path, place",
         "task: the bounded update of a path, heading",
+        "task: the bounded update from an accepted start, place",
+        "task: the bounded update from an accepted start, heading",
     ]) {
         search.report(&Row {
             name,

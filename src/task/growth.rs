@@ -7,7 +7,8 @@
 //!
 //! A path's integers hold for every start and every end of the estimate in the [`PathTolerance`] cylinders about the
 //! path's ends; [`MotionUpdate::begins_at`] tests a start. A robot that localizes starts where its observation puts it,
-//! which is farther from the end and needs more turning. A controller that stops late has driven farther. Poses between
+//! which is farther from the end and needs more turning. Poses are compared as integers, so a path is measured from its rounded start, and the bounded
+//! model counts the rounding of its end. A controller that stops late has driven farther. Poses between
 //! legs are assumed to be reached.
 //!
 //! A Gaussian error `F u` is carried by the integer lever: `F1 = G F`. Each entry of the first column is rounded to the
@@ -116,18 +117,24 @@ impl MotionUpdate {
         if legs.is_empty() {
             return Err(GrowthError::NoLegs);
         }
+        let start = pose(from)?;
         let Travel {
             length_m,
             turning_rad,
             to,
-        } = travel(from, legs, &within.ends());
+        } = travel(&unrounded(start), legs, &within.ends());
         let [slip, turn] = drift.added(length_m, turning_rad);
         let model = Model::Bounded {
             length_um: path_um(length_m)?,
             slip_um: path_um(slip)?,
             turn_q24: angle_q24(outwards(turn)).ok_or(GrowthError::TooLarge)?,
         };
-        Self::of(from, &to, within, model)
+        Ok(Self {
+            from: start,
+            to: pose(&to)?,
+            within,
+            model,
+        })
     }
 
     /// Evaluates the odometry model for a path, for sets of this radius; `risk` is one minus their confidence.
@@ -146,11 +153,12 @@ impl MotionUpdate {
         if legs.is_empty() {
             return Err(GrowthError::NoLegs);
         }
-        let to = travel(from, legs, &Ends::default()).to;
+        let start = pose(from)?;
+        let from = &unrounded(start);
+        let end = pose(&travel(from, legs, &Ends::default()).to)?;
         let noise = odometry.noise(from, legs, &within.ends());
         let noise = ScaledCovariance::of_noise(noise.transpose().into(), radius_squared)
             .ok_or(GrowthError::TooLarge)?;
-        let (start, end) = (pose(from)?, pose(&to)?);
         let step = |a: i32, b: i32| {
             let step = i64::from(b).wrapping_sub(i64::from(a));
             i32::try_from(step)
@@ -169,18 +177,9 @@ impl MotionUpdate {
             radius_squared,
             risk,
         };
-        Self::of(from, &to, within, model)
-    }
-
-    fn of(
-        from: &Estimate,
-        to: &Estimate,
-        within: PathTolerance,
-        model: Model,
-    ) -> Result<Self, GrowthError> {
         Ok(Self {
-            from: pose(from)?,
-            to: pose(to)?,
+            from: start,
+            to: end,
             within,
             model,
         })
@@ -231,10 +230,14 @@ impl MotionUpdate {
                 turn_q24,
             } => {
                 let error = before.enclosing()?;
-                let yaw = i64::from(error.yaw_q24()).wrapping_add(*turn_q24);
+                // One unit more of each, since the path's end is rounded.
+                let yaw = i64::from(error.yaw_q24())
+                    .wrapping_add(*turn_q24)
+                    .wrapping_add(1);
                 let translation = i64::from(error.translation_um())
                     .wrapping_add(*slip_um)
-                    .wrapping_add(chord(*length_um, yaw));
+                    .wrapping_add(chord(*length_um, yaw))
+                    .wrapping_add(1);
                 Some(PoseErrorSet {
                     certain: Cylinder::from_um_q24(translation, yaw)?,
                     doubt: before.risk(),
@@ -327,6 +330,16 @@ fn path_um(metres: f64) -> Result<i64, GrowthError> {
 
 fn pose(estimate: &Estimate) -> Result<Pose, GrowthError> {
     pose_of(*estimate).map_err(GrowthError::Pose)
+}
+
+/// Returns the estimate that a rounded pose stands for. A path is measured from it: starts are compared with rounded poses.
+#[allow(clippy::float_arithmetic)]
+fn unrounded(pose: Pose) -> Estimate {
+    Estimate {
+        x_m: f64::from(pose.x_um) / 1e6,
+        y_m: f64::from(pose.y_um) / 1e6,
+        yaw_rad: f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0),
+    }
 }
 
 /// Returns the length of a vector, micrometres, rounded up.

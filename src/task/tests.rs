@@ -102,6 +102,9 @@ proptest! {
     ) {
         let odometry = Odometry { a1: gains[0], a2: gains[1], a3: gains[2], a4: gains[3] };
         let path = legs(&to, arcs);
+        // A path is measured from its rounded start.
+        let unit = core::f64::consts::TAU / 4_294_967_296.0;
+        let from = [(from[0] * 1e6).round() / 1e6, (from[1] * 1e6).round() / 1e6, (from[2] / unit).round() * unit];
         let start = Cylinder::new(reach.0, if reach.0 > 0.0 { reach.1 } else { 0.0 }).unwrap();
         let within = PathTolerance { start, end: Cylinder::new(left, 0.5 * left).unwrap() };
         let growth = MotionUpdate::gaussian(
