@@ -25,8 +25,8 @@ const DIRECTIONS: [[i8; 3]; 13] = [
     [1, -1, -1],
 ];
 
-/// Length units between the facets and a pose that is named.
-const CLEAR_UNITS: i64 = 4;
+/// Length units between the facets and a pose that is named. (With four, a set 1 % too large often has none.)
+const CLEAR_UNITS: i64 = 1;
 
 /// Cells between the covered ones and an uncovered pose that is named.
 const CLEAR_CELLS: i64 = 1;
