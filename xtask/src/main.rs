@@ -55,6 +55,12 @@ const JOBS: &[Job] = &[
         jobs::lint::clippy,
     ),
     job(
+        "lines",
+        "",
+        "lines of code of each room, without comments, blanks and tests, against the ceilings of xtask/lines.txt",
+        jobs::lines::lines,
+    ),
+    job(
         "msrv",
         "",
         "the library and the program on the oldest compiler that Cargo.toml names",
@@ -96,6 +102,12 @@ const JOBS: &[Job] = &[
         "",
         "every row of every error budget: the largest error that a search finds, over its bound",
         jobs::test::error_budgets,
+    ),
+    job(
+        "stamps",
+        "",
+        "the deep jobs whose figures docs/measured.md states have run with the present sources",
+        jobs::stamps::stamps,
     ),
     job(
         "no_panic",
@@ -336,6 +348,7 @@ const JOBS: &[Job] = &[
 /// What a change must pass without recordings, in this order: a job and its arguments.
 const ALL: &[&str] = &[
     "quick",
+    "lines",
     "clippy",
     "wasm",
     "no_panic",

@@ -2,6 +2,7 @@
 
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, root, target_folder, tested};
+use crate::jobs::stamps;
 use crate::jobs::test::build_suite;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
@@ -47,6 +48,7 @@ pub fn docs(_: &Arguments) -> Result {
     need::qemu()?;
     need::command("arm-none-eabi-gcc", "gcc-arm-none-eabi")?;
     need::command("make", "make")?;
+    stamps::are_stated()?;
     for packages in [
         "-p posegate",
         // Without the program, whose document would replace that of the library.
