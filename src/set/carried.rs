@@ -31,7 +31,7 @@ const LEVER_Q56: i128 = 26_986_075_409;
 /// The longest path, micrometres, and the largest variance of the yaw.
 const LONGEST: i64 = 1 << 26;
 const LARGEST: i64 = 1 << 56;
-/// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding.
+/// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding in entries below 2^40.
 pub(super) const ROUNDED: i64 = 9;
 
 /// Returns the covariance of an estimate after a path `[x, y]`, micrometres in world axes, with the trust in its source applied: `G P G'`
@@ -75,6 +75,11 @@ pub(crate) fn carried(
     // xy are off by m + 3, the entries with the yaw by 1. So the errors of a row are at most 2 m + 7.
     let longest = (a.unsigned_abs().max(b.unsigned_abs()) >> 56) as i64;
     let slack = longest.wrapping_mul(2).wrapping_add(ROUNDED);
+    let (aatt, bbtt) = (by(a, att), by(b, btt));
+    // The lever is too short by a share d of 1.7e-12. So the covariance is at most 1 + e times the one here and `(1 + 1/e) d^2` times that of the
+    // lever's whole swing, for every e. With a third of the last rounding below for e, and both axes, that is 2^-35.7 of the longer swing.
+    let swung = aatt.max(bbtt).saturating_abs() >> 35;
+    let plane = slack.saturating_add(swung);
     // Twice the cross term and the square of the lever: each below 2^62 in magnitude, else the sum is refused.
     let sum = |parts: [i64; 5]| {
         let sum = parts
@@ -84,8 +89,8 @@ pub(crate) fn carried(
             .ok_or(InputError::CovarianceTooLarge)
     };
     let twice = |v: i64| v.saturating_mul(2);
-    let xx = sum([p.xx, twice(by(a, p.xt)), by(a, att), noise.xx, slack])?;
-    let yy = sum([p.yy, twice(by(b, p.yt)), by(b, btt), noise.yy, slack])?;
+    let xx = sum([p.xx, twice(by(a, p.xt)), aatt, noise.xx, plane])?;
+    let yy = sum([p.yy, twice(by(b, p.yt)), bbtt, noise.yy, plane])?;
     let tt = sum([p.tt, 0, 0, noise.tt, slack])?;
     let xy = sum([p.xy, by(a, p.yt), by(b, p.xt), by(a, btt), noise.xy])?;
     let xt = sum([p.xt, att, 0, 0, noise.xt])?;

@@ -17,6 +17,9 @@ pub(crate) struct Common {
     pub turn: Turn,
 }
 
+/// The largest bound of a length that a repeated growth gives, micrometres: no table contains a set of that size.
+const MOST_BROAD_UM: u32 = (1 << 31) - 1;
+
 impl Common {
     /// Returns the values of a set that was grown to this extent.
     pub(super) fn grow(&mut self, extent: Extent, by: Growth) {
@@ -26,7 +29,7 @@ impl Common {
             Extent::Grown { factor, by } => factor.yaw.wrapping_add(by.yaw_q24()),
         };
         let moved = by.translation_um().unsigned_abs();
-        self.broad_um = self.broad_um.wrapping_add(moved);
+        self.broad_um = self.broad_um.saturating_add(moved).min(MOST_BROAD_UM);
         self.turn = Turn::of(yaw_q24.unsigned_abs());
     }
 

@@ -149,7 +149,9 @@ impl Growth {
                 translation_um,
                 yaw_q24,
             } => Extent::Bounded {
-                translation_um: translation_um.wrapping_add(self.translation_um),
+                translation_um: translation_um
+                    .saturating_add(self.translation_um)
+                    .min(REACH_UM << 1),
                 yaw_q24: yaw_q24.wrapping_add(self.yaw_q24).min(WIDEST_YAW << 1),
             },
         }
@@ -161,6 +163,41 @@ mod tests {
     use super::*;
     use core::f64::consts::TAU;
     use proptest::prelude::*;
+
+    /// Sixteen growths of 2^28 um sum to 2^32 um.
+    #[test]
+    fn repeated_growths_never_wrap_to_a_small_set() {
+        use crate::set::{Estimate, PoseSet, RadiusSquared};
+        let estimate = Estimate {
+            x_m: 0.0,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+        };
+        let most = Growth::new(u32::MAX, u32::MAX);
+        let radius = RadiusSquared::from_q16(743_499).unwrap();
+        let covariance = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
+        for mut set in [
+            PoseSet::bounded(estimate, 0.01, 0.01).unwrap(),
+            PoseSet::gaussian(estimate, covariance, radius).unwrap(),
+        ] {
+            for count in 1..40 {
+                set = set.grown(most);
+                let (length, yaw) = match set.extent() {
+                    Extent::Bounded {
+                        translation_um,
+                        yaw_q24,
+                    } => (translation_um, yaw_q24),
+                    Extent::Grown { by, .. } => (by.translation_um(), by.yaw_q24()),
+                    Extent::Gaussian(_) => unreachable!("it moved"),
+                };
+                assert!(
+                    length >= REACH_UM && yaw >= WIDEST_YAW,
+                    "{count}: {length} {yaw}"
+                );
+                assert!(set.common().broad_um >= REACH_UM.unsigned_abs(), "{count}");
+            }
+        }
+    }
 
     #[test]
     fn only_lengths_and_turns_that_are_numbers_make_a_growth() {

@@ -127,7 +127,12 @@ fn rounding_of_short_increments() {
                     turn / 4_294_967_296.0 * TAU,
                 ];
                 let mut tried = way;
-                tried.add(&increment(by).step, 1, &noise);
+                tried.add(
+                    &increment(by).step,
+                    increment(by).step.driven_q8(),
+                    1,
+                    &noise,
+                );
                 let (sin, cos) = (f64::from(way.turn()) / 4_294_967_296.0 * TAU).sin_cos();
                 let [x, y] = [by[0], by[1]].map(|v| v * 256e6);
                 let ([x0, y0], [x1, y1]) = (way.place_q8(), tried.place_q8());
@@ -179,7 +184,12 @@ fn rounding_of_turns() {
             } else {
                 [metres, 0.0, 0.0]
             };
-            way.add(&increment(by).step, 1, &noise);
+            way.add(
+                &increment(by).step,
+                increment(by).step.driven_q8(),
+                1,
+                &noise,
+            );
             if k < count {
                 path.yaw = &path.yaw + &Exact::float(by[2]);
             } else {
@@ -342,7 +352,7 @@ fn rounding_of_carried_noise() {
             best = None;
         }
         let mut way = Way::new(&noise).with_noise(start);
-        way.add(&step, 1, &noise);
+        way.add(&step, step.driven_q8(), 1, &noise);
         let [plane, own] = noise.variances(step.driven_q8(), 0, 1);
         let [p, h] = along_arc(step.driven_q8(), 0, own);
         let [x, y] = way.place_q8();
@@ -396,7 +406,7 @@ fn curvature_of_a_heading_error() {
     for round in 0..test_share(20_000, 20) {
         let mut way = Way::new(&noise);
         for _ in 0..1 + round % 20 {
-            way.add(&step, 1, &noise);
+            way.add(&step, step.driven_q8(), 1, &noise);
         }
         let reach = random.log_within(0.003, 30.0);
         let tt = reach * reach / 743_499.0 * 65_536.0;
@@ -435,7 +445,7 @@ fn swing_of_a_heading_error() {
         let mut way = Way::new(&noise);
         let step = increment([random.log_within(1e-4, 4.0), 0.0, 0.0]).step;
         for _ in 0..(random.log_within(1.0, 50.0) as u32) {
-            way.add(&step, 1, &noise);
+            way.add(&step, step.driven_q8(), 1, &noise);
         }
         let turn = random.log_within(1.0, 16_777_216.0) as i32;
         let half = &Exact::dyadic(turn, 24) * &Exact::pi();

@@ -136,6 +136,19 @@ pub struct Tracker<const N: usize> {
     given_ms: Option<u32>,
 }
 
+#[cfg(feature = "defmt")]
+impl<const N: usize> defmt::Format for Tracker<N> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        let carries = self.fix.is_some();
+        defmt::write!(
+            f,
+            "Tracker {{ newest_ms: {}, carries: {} }}",
+            self.newest_ms,
+            carries
+        );
+    }
+}
+
 impl<const N: usize> Tracker<N> {
     /// Returns a tracker without odometry and without a fix. `None` unless the errors are numbers that are not below zero, and the
     /// times are from 1 to 2^31 - 1.
@@ -192,7 +205,7 @@ impl<const N: usize> Tracker<N> {
         self.fix
             .take_if(|fix| step.stamp_ms.wrapping_sub(fix.report.stamp_ms) as i32 > most as i32);
         if let Some(fix) = &mut self.fix {
-            fix.way.add(&step, passed, &self.noise);
+            fix.way.add(&step, step.driven_q8(), passed, &self.noise);
         }
         Ok(())
     }
@@ -269,7 +282,9 @@ impl<const N: usize> Tracker<N> {
                 if (1..1 << 31).contains(&after) {
                     if after < passed {
                         // The robot may have moved unevenly: back and forth within its bounds.
-                        way.add(&increment.part([after, passed]), after, &self.noise);
+                        let share = [after, passed];
+                        let driven_q8 = increment.driven_part_q8(share);
+                        way.add(&increment.part(share), driven_q8, after, &self.noise);
                         way.leave_out(self.settings.bounds.within(unevenness([after, passed])));
                         // The axes of the increment are those before the turn up to the fix.
                         let turned = self
@@ -279,7 +294,7 @@ impl<const N: usize> Tracker<N> {
                         let driven = self.settings.bounds.within(after.saturating_add(1));
                         way.leave_out(driven.swung(turned.yaw_q24()));
                     } else {
-                        way.add(increment, passed, &self.noise);
+                        way.add(increment, increment.driven_q8(), passed, &self.noise);
                     }
                 }
                 since = increment.stamp_ms;

@@ -291,6 +291,48 @@ fn late_fix_is_carried_along_increments_since_its_stamp() {
     assert!(part.beside.translation_um() > whole.beside.translation_um() + 4_000);
 }
 
+/// A robot that drives a circle of half a metre for 3 s turns by 6.0 rad, which reads as -0.28 rad and 14 cm.
+#[test]
+fn increment_in_which_the_robot_may_turn_around_is_a_jump() {
+    let tried = |ms: u32| {
+        let settings = TrackerSettings {
+            bounds: MotionBounds::of_mm_mrad(1_000, 0, 2_000),
+            maximum_gap_ms: 10_000,
+            ..settings(ERRORS)
+        };
+        let mut tracker = Tracker::<8>::new(settings).unwrap();
+        let start = Increment::of(0.0, 0.0, 0.0, [0, 20]).unwrap();
+        tracker.odometry(start).unwrap();
+        tracker.odometry(Increment::of(0.141, 0.0, -0.283, [20, 20 + ms]).unwrap())
+    };
+    // 7/8 of a turn takes 2,748.9 ms; stamps are rounded to one.
+    assert_eq!(tried(2_747), Ok(()));
+    assert_eq!(tried(2_748), Err(Reason::OdometryJump));
+    assert_eq!(tried(3_000), Err(Reason::OdometryJump));
+}
+
+/// The share of an arc is as long as the arc's, though its own turn is smaller.
+#[test]
+fn part_of_an_arc_has_its_share_of_the_length() {
+    for turn in [0.0, 0.2, core::f64::consts::FRAC_PI_4 - 1e-6] {
+        // A metre along the arc.
+        let (ahead, left) = if turn == 0.0 {
+            (1.0, 0.0)
+        } else {
+            (f64::sin(turn) / turn, (1.0 - f64::cos(turn)) / turn)
+        };
+        let step = Increment::of(ahead, left, turn, [0, 10]).unwrap().step;
+        for after in 1..=10u32 {
+            let found = f64::from(step.driven_part_q8([after, 10])) / 256e6;
+            let exact = f64::from(after) / 10.0;
+            assert!(
+                found >= exact && found <= exact * 1.08 + 1e-8,
+                "{turn} {after}: {found}"
+            );
+        }
+    }
+}
+
 #[test]
 fn broken_path_has_its_reason() {
     let p = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];

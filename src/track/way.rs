@@ -125,16 +125,16 @@ impl Way {
         }
     }
 
-    /// Adds an increment that lasted for a time, milliseconds.
+    /// Adds an increment of a length that the robot drove at most, 2^-8 um, and that lasted for a time, milliseconds.
     #[inline(never)]
-    pub fn add(&mut self, increment: &Step, ms: u32, noise: &Noise) {
+    pub fn add(&mut self, increment: &Step, length_q8: u32, ms: u32, noise: &Noise) {
         let [c, s] = BinaryAngle(self.turn).cos_sin_q30().map(i64::from);
         let (dx, dy) = (i64::from(increment.x_q8), i64::from(increment.y_q8));
         let whole = |sum: i64| sum.wrapping_add(1 << 29) >> 30;
         // Sums below 2^61.
         let x = whole(c.wrapping_mul(dx).wrapping_sub(s.wrapping_mul(dy)));
         let y = whole(s.wrapping_mul(dx).wrapping_add(c.wrapping_mul(dy)));
-        let (length_q8, turn_q24) = (increment.driven_q8(), increment.turn_q24());
+        let turn_q24 = increment.turn_q24();
         let [plane, turn] = noise.variances(length_q8, turn_q24, ms);
         let [bent, curved] = along_arc(length_q8, turn_q24, turn);
         let plane = plane.saturating_add(bent);

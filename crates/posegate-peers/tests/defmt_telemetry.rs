@@ -121,8 +121,7 @@ fn core_modules() -> Vec<String> {
 /// Returns the types of a file that other crates can name: all types of a public module, and the re-exported ones of a
 /// private module. `published` is the parent's text, or `None` if the module is public.
 fn types(place: &str, text: &str, published: Option<&str>) -> Vec<Type> {
-    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-    let lines: Vec<&str> = code.lines().collect();
+    let lines: Vec<&str> = text.lines().collect();
     let mut types = Vec::new();
     for (index, line) in lines.iter().enumerate() {
         let Some(rest) = ["pub struct ", "pub enum ", "pub union "]
@@ -145,10 +144,13 @@ fn types(place: &str, text: &str, published: Option<&str>) -> Vec<Type> {
             .iter()
             .rev()
             .take_while(|line| line.starts_with("#[") || line.starts_with("///"));
+        if attributes.clone().any(|line| *line == "#[cfg(test)]") {
+            continue;
+        }
         let derived = attributes
             .into_iter()
             .any(|line| line.contains(r#"feature = "defmt""#) && line.contains("defmt::Format"));
-        let implemented = code
+        let implemented = text
             .split("defmt::Format for ")
             .skip(1)
             .any(|rest| rest.chars().take_while(|c| is_name(*c)).eq(name.chars()));
@@ -181,7 +183,9 @@ fn public_types() -> Vec<Type> {
             let path = entry.unwrap().path();
             let child = path.file_stem().unwrap().to_str().unwrap().to_owned();
             let is_source = path.extension().is_some_and(|e| e == "rs");
-            if !is_source || child == "mod" || child == "tests" {
+            let of_host = format!("#[cfg(feature = \"std\")]\npub mod {child};");
+            let is_other = child == "mod" || child == "tests" || head_text.contains(&of_host);
+            if !is_source || is_other {
                 continue;
             }
             let text = std::fs::read_to_string(&path).unwrap();

@@ -80,7 +80,7 @@ proptest! {
         let noise = Noise::of(&errors).unwrap();
         let mut way = Way { turn: heading, noise: start, ..Way::new(&noise) };
         let increment = Step { x_q8: ahead >> shorter, y_q8: left >> shorter, turn: turn >> straighter, stamp_ms: 0 };
-        way.add(&increment, ms, &noise);
+        way.add(&increment, increment.driven_q8(), ms, &noise);
         // 2^-8 um, times a 2^-24 turn in radians.
         let lever = |v: i64| v as f64 / 256.0 * TAU / 16_777_216.0;
         let chord = [lever(way.x), lever(way.y)];
@@ -139,7 +139,7 @@ fn a_coarse_increment_is_not_more_certain_than_fine_ones() {
                     turn: 0,
                     stamp_ms: 0,
                 };
-                way.add(&step, 1, &noise);
+                way.add(&step, step.driven_q8(), 1, &noise);
             }
             matrix(&way.noise)
         };
@@ -171,7 +171,7 @@ fn unused_noise_is_not_carried() {
             noise: noise_before,
             ..Way::new(&noise)
         };
-        way.add(&increment, 1, &noise);
+        way.add(&increment, increment.driven_q8(), 1, &noise);
         assert_eq!(way.noise.tt, i64::MAX);
     }
 }
