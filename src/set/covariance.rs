@@ -120,23 +120,37 @@ pub(super) fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance
     let in_plane = Scale::of(UM2, plane);
     let between = Scale::of(UM_Q24, plane);
     let in_yaw = Scale::of(Q24_2, yaw);
-    let all = || {
-        let (xy, xy_slack) = in_plane.covariance(c_xy, xy_apart, xy.2)?;
-        let (xt, xt_slack) = between.covariance(c_xt, xt_apart, xt.2)?;
-        let (yt, yt_slack) = between.covariance(c_yt, yt_apart, yt.2)?;
-        Some(ScaledCovariance {
-            xx: in_plane.variance(vx)?,
-            yy: in_plane.variance(vy)?,
-            tt: in_yaw.variance(vt)?,
-            xy,
-            xt,
-            yt,
-            xy_slack,
-            xt_slack,
-            yt_slack,
-        })
-    };
-    all().ok_or(InputError::CovarianceTooLarge)
+    let scales = [in_plane, between, in_yaw];
+    let covariances = [
+        (c_xy, xy_apart, xy.2),
+        (c_xt, xt_apart, xt.2),
+        (c_yt, yt_apart, yt.2),
+    ];
+    scaled([vx, vy, vt], covariances, scales).ok_or(InputError::CovarianceTooLarge)
+}
+
+/// Returns the variances and covariances in units of the target; `None` if one is out of range. A closure in [`target`] would be shared by its
+/// callers.
+#[inline(always)]
+fn scaled(
+    [vx, vy, vt]: [Leading; 3],
+    [xy, xt, yt]: [(i32, Option<u32>, i32); 3],
+    [in_plane, between, in_yaw]: [Scale; 3],
+) -> Option<ScaledCovariance> {
+    let (xy, xy_slack) = in_plane.covariance(xy.0, xy.1, xy.2)?;
+    let (xt, xt_slack) = between.covariance(xt.0, xt.1, xt.2)?;
+    let (yt, yt_slack) = between.covariance(yt.0, yt.1, yt.2)?;
+    Some(ScaledCovariance {
+        xx: in_plane.variance(vx)?,
+        yy: in_plane.variance(vy)?,
+        tt: in_yaw.variance(vt)?,
+        xy,
+        xt,
+        yt,
+        xy_slack,
+        xt_slack,
+        yt_slack,
+    })
 }
 
 /// Returns the h for which `variance 2^(2h)` lies in `[2^28, 2^30)`.
