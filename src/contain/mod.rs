@@ -149,7 +149,8 @@ pub struct Examination {
     pub margin: Margin,
     /// With `Outside`: a pose of the given set, in the world frame, that the table does not cover, far outside of what it covers. `None` if none
     /// is found: then the set is denied since it is not proven to be inside. If the estimate is not on the table, or the set is thinner than some
-    /// micrometres, this is the estimate to the micrometre.
+    /// micrometres, this is the estimate to the micrometre. A table is smaller than its success set, by its extent and by its roundings: a pose beyond
+    /// the table may be in the set.
     pub worst_pose: Option<Pose>,
 }
 
