@@ -41,8 +41,27 @@ impl GoalFramePoseSet<'_> {
     /// Candidates are poses where the set leaves first as it grows, where the whole set is farthest out, and its largest headings, since an
     /// interval of headings is a border without a facet. If they are covered, or if several pieces cover the set together, the outermost poses are
     /// searched as well. Of all that are not covered, the one that is farthest out is returned.
+    ///
+    /// A pose within the table's extent is preferred: a success set may go on beyond the extent.
     pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Option<Pose> {
-        let outside = |pose: Pose| self.depth(table, pose);
+        self.worst_of(table, high, |pose| is_in_extent(table, pose))
+            .or_else(|| self.worst_of(table, high, |_| true))
+    }
+
+    /// As [`Self::worst_pose`], of the poses that `counts` accepts.
+    fn worst_of(
+        &self,
+        table: &Table<'_>,
+        high: Margin,
+        counts: impl Fn(Pose) -> bool,
+    ) -> Option<Pose> {
+        let outside = |pose: Pose| {
+            if counts(pose) {
+                self.depth(table, pose)
+            } else {
+                0
+            }
+        };
         let mut worst: Option<(i64, Pose)> = None;
         let mut consider = |offset: [i64; 3]| {
             let offset = self.set.farthest_towards(offset);
@@ -271,6 +290,25 @@ impl GoalFramePoseSet<'_> {
         };
         [x, y, turn.wrapping_mul(ANGLE_UNITS_PER_Q24)]
     }
+}
+
+/// Returns `true` if a pose in the world frame is within a table's extent, by a cell at least.
+fn is_in_extent(table: &Table<'_>, pose: Pose) -> bool {
+    let cells = table.cells();
+    let Some(pose) = table.goal().pose_to_goal(pose) else {
+        return false;
+    };
+    let step = i64::from(cells.step_um);
+    let is_in = |at: i32, lo: i32, count: u16| {
+        let at = i64::from(at).wrapping_sub(i64::from(lo));
+        at >= step && at <= i64::from(count).wrapping_sub(1).wrapping_mul(step)
+    };
+    let above = u64::from(pose.yaw.minus(cells.yaw_lo).0);
+    let slab = cells.yaw_span.checked_div(cells.slabs.into()).unwrap_or(0);
+    is_in(pose.x_um, cells.x_lo_um, cells.columns)
+        && is_in(pose.y_um, cells.y_lo_um, cells.rows)
+        && (cells.yaw_span >= 1 << 32
+            || above >= slab && above <= cells.yaw_span.saturating_sub(slab))
 }
 
 /// Returns a direction of length one; entries are below 2^15.
