@@ -239,7 +239,7 @@ fn noise(random: &mut Random) -> PathNoise {
 #[test]
 fn rounding_of_carried_rows() {
     let mut random = Random::new(14);
-    let mut search = Search::new();
+    let (mut search, mut swings) = (Search::new(), Search::new());
     let turn = &Exact::pi() * &Exact::dyadic(1, 23);
     let [metre, _, radian] = units();
     // The largest error is climbed to by changes of the last digits.
@@ -259,7 +259,11 @@ fn rounding_of_carried_rows() {
                     .map(|um| (um + random.within(-step, step) as i64).clamp(-(1 << 26), 1 << 26));
             }
             _ => {
-                let [a, b] = [random.log_within(1e-6, 0.1), random.log_within(1e-7, 1e-3)];
+                let widest = if random.unit() < 0.5 { 1e-3 } else { 30.0 };
+                let [a, b] = [
+                    random.log_within(1e-6, 0.1),
+                    random.log_within(1e-7, widest),
+                ];
                 let off = [(); 3].map(|()| random.within(-0.4, 0.4));
                 let (xy, xt, yt) = (a * a * off[0], a * b * off[1], a * b * off[2]);
                 p = [[a * a, xy, xt], [xy, a * a, yt], [xt, yt, b * b]];
@@ -295,15 +299,22 @@ fn rounding_of_carried_rows() {
             [1, _] => &yt + &(&b * &tt),
             _ => tt.clone(),
         });
-        // Entries above 2^40 are rounded up further.
-        if (0..3).any(|i| exact[i][i] >= Exact::int(1u64 << 40)) {
-            continue;
-        }
         let size = [&metre, &metre, &radian];
         let off =
             matrix(|i, j| &(&(&Exact::float(found[i][j]) * size[i]) * size[j]) - &exact[i][j]);
         let longest = a.abs().max(b.abs()).to_f64().floor();
         let slack = 2.0 * longest + carried::ROUNDED as f64;
+        // Entries above 2^40 are rounded up further: for the swing by the lever, and for the floats.
+        if (0..3).any(|i| exact[i][i] >= Exact::int(1u64 << 40)) {
+            let swing = (&a * &a).max(&b * &b).to_f64() * tt.to_f64() / 2f64.powi(35);
+            let up: [f64; 3] = core::array::from_fn(|i| {
+                let swing = if i < 2 { swing } else { 0.0 };
+                (slack + swing + exact[i][i].to_f64() / 2f64.powi(40)).sqrt()
+            });
+            let above = nalgebra::Matrix3::from_fn(|i, j| off[i][j].to_f64() / (up[i] * up[j]));
+            swings.case(1.0, 1.0 - above.symmetric_eigenvalues().min());
+            continue;
+        }
         let worst = (0..3)
             .map(|i| {
                 let beside: f64 = (0..3)
@@ -324,6 +335,11 @@ fn rounding_of_carried_rows() {
     search.report(&Row {
         name: "set: roundings of a carried covariance, of a row",
         unit: "um^2, um 2^-24 turn, 2^-48 turn^2",
+        looseness: None,
+    });
+    swings.report(&Row {
+        name: "set: swing of a carried covariance beyond 2^40, in the worst direction",
+        unit: "of what is added",
         looseness: None,
     });
 }
