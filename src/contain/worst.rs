@@ -42,9 +42,19 @@ impl GoalFramePoseSet<'_> {
     /// interval of headings is a border without a facet. If they are covered, or if several pieces cover the set together, the outermost poses are
     /// searched as well. Of all that are not covered, the one that is farthest out is returned.
     ///
-    /// A pose within the table's extent is preferred: a success set may go on beyond the extent.
+    /// A pose within the table's extent that is beyond the facets by more than a cell, which the facets of a set that bends may fall short of it,
+    /// is preferred: a success set may go on beyond the extent.
     pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Option<Pose> {
-        self.worst_of(table, high, |pose| is_in_extent(table, pose))
+        let cell = table.facets().map_or(0, |layout| {
+            i64::from(table.cells().step_um)
+                .wrapping_shr(layout.unit().into())
+                .wrapping_shl(28)
+        });
+        let is_clear = |pose| {
+            is_in_extent(table, pose)
+                && (cell == 0 || self.depth(table, pose) < cell.wrapping_neg())
+        };
+        self.worst_of(table, high, is_clear)
             .or_else(|| self.worst_of(table, high, |_| true))
     }
 
