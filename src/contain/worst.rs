@@ -42,35 +42,28 @@ impl GoalFramePoseSet<'_> {
     /// interval of headings is a border without a facet. If they are covered, or if several pieces cover the set together, the outermost poses are
     /// searched as well. Of all that are not covered, the one that is farthest out is returned.
     ///
-    /// A pose within the table's extent that is beyond the facets by more than a cell, which the facets of a set that bends may fall short of it,
-    /// is preferred: a success set may go on beyond the extent.
+    /// A pose within the table's extent that is beyond the facets by more than a cell is preferred. Nearer to the facets a pose may be in the success
+    /// set, since facets do not fill a set with curved borders; and a success set may go on beyond the extent.
     pub(super) fn worst_pose(&self, table: &Table<'_>, high: Margin) -> Option<Pose> {
         let cell = table.facets().map_or(0, |layout| {
-            i64::from(table.cells().step_um)
-                .wrapping_shr(layout.unit().into())
-                .wrapping_shl(28)
+            let units = i64::from(table.cells().step_um).wrapping_shr(layout.unit().into());
+            units.wrapping_shl(28).wrapping_neg()
         });
-        let is_clear = |pose| {
-            is_in_extent(table, pose)
-                && (cell == 0 || self.depth(table, pose) < cell.wrapping_neg())
-        };
-        self.worst_of(table, high, is_clear)
-            .or_else(|| self.worst_of(table, high, |_| true))
+        let clear = |pose, depth| depth < cell && is_in_extent(table, pose);
+        self.worst_of(table, high, clear)
+            .or_else(|| self.worst_of(table, high, |_, _| true))
     }
 
-    /// As [`Self::worst_pose`], of the poses that `counts` accepts.
+    /// As [`Self::worst_pose`], of the poses that `counts` accepts with their depths.
     fn worst_of(
         &self,
         table: &Table<'_>,
         high: Margin,
-        counts: impl Fn(Pose) -> bool,
+        counts: impl Fn(Pose, i64) -> bool,
     ) -> Option<Pose> {
         let outside = |pose: Pose| {
-            if counts(pose) {
-                self.depth(table, pose)
-            } else {
-                0
-            }
+            let depth = self.depth(table, pose);
+            if counts(pose, depth) { depth } else { 0 }
         };
         let mut worst: Option<(i64, Pose)> = None;
         let mut consider = |offset: [i64; 3]| {

@@ -129,8 +129,8 @@ pub(super) fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance
     scaled([vx, vy, vt], covariances, scales).ok_or(InputError::CovarianceTooLarge)
 }
 
-/// Returns the variances and covariances in units of the target; `None` if one is out of range. A closure in [`target`] would be shared by its
-/// callers.
+/// Returns the variances and covariances in units of the target; `None` if one is out of range. A covariance is a correlation, the distance of its two
+/// halves and an exponent. Inlined: a closure of [`target`] is compiled once for all callers, which costs 150 instructions (M4F).
 #[inline(always)]
 fn scaled(
     [vx, vy, vt]: [Leading; 3],
