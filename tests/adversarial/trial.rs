@@ -83,7 +83,8 @@ impl Trial<'_> {
         }
     }
 
-    /// Checks the worst pose of a denial: it is a pose of the set, and not of the success set. `exact` is s* of the set.
+    /// Checks the worst pose of a denial: it is a pose of the set, and not of the part of the success set that the table's extent holds. `exact` is
+    /// s* of the set.
     pub fn check_worst_pose(&mut self, estimate: Pose, set: &PoseSet, exact: f64) {
         let Ok(core) = core_set(estimate, set) else {
             return;
@@ -112,7 +113,8 @@ impl Trial<'_> {
         // set, and may end within it.
         let least = || min_slack_over(&self.stage.world, estimate, set, 1.0, Effort::Fast).0;
         let is_clear = || self.voxels.is_none() && least() < -2.0 * self.stage.cell;
-        let is_wrong = !is_thin && (level > 1.0 || is_inside && is_clear());
+        let is_wrong =
+            !is_thin && (level > 1.0 || is_inside && !self.is_beyond_extent(worst) && is_clear());
         if is_wrong {
             self.tally.wrong_poses += 1;
             if self.tally.wrong_poses <= 3 {
@@ -122,6 +124,24 @@ impl Trial<'_> {
                 );
             }
         }
+    }
+
+    /// Returns `true` if a pose is beyond the table's extent, which may be smaller than the success set, or within a cell of its border.
+    fn is_beyond_extent(&self, pose: posegate::pose::Pose) -> bool {
+        let cells = self.table.cells();
+        let Some(pose) = self.table.goal().pose_to_goal(pose) else {
+            return true;
+        };
+        let step = i64::from(cells.step_um);
+        let is_beyond = |at: i32, lo: i32, count: u16| {
+            let at = i64::from(at) - i64::from(lo);
+            at < step || at > (i64::from(count) - 1) * step
+        };
+        let (above, span) = (u64::from(pose.yaw.minus(cells.yaw_lo).0), cells.yaw_span);
+        let slab = span / u64::from(cells.slabs);
+        is_beyond(pose.x_um, cells.x_lo_um, cells.columns)
+            || is_beyond(pose.y_um, cells.y_lo_um, cells.rows)
+            || span < 1 << 32 && (above < slab || above > span - slab)
     }
 
     /// Returns `true` if the table permits. The decision is not counted.
