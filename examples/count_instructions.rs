@@ -538,7 +538,7 @@ mod firmware {
         ] {
             let (cost, decision) = counter.count(|| decide(black_box(&see_t7), black_box(set)))?;
             let edge = !inside;
-            let most = if edge { None } else { goal(800, 1_600) };
+            let most = if edge { None } else { goal(1_200, 2_500) };
             counter.line("", decide_name, cost, "instructions", most);
             let with_margin = counter
                 .count(|| decide_with_margin(black_box(&see_t7), black_box(set)))?

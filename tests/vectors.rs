@@ -4,9 +4,6 @@
 //! `POSEGATE_BLESS=1 cargo test -p posegate --features std --test vectors` rewrites the file and its tables.
 #![cfg(feature = "std")]
 
-#[path = "../crates/posegate-testkit/src/bends.rs"]
-#[allow(dead_code)] // This target uses a part.
-mod bends;
 #[path = "../crates/posegate-testkit/src/replay.rs"]
 mod replay;
 #[path = "../crates/posegate-testkit/src/vectors.rs"]
@@ -255,23 +252,6 @@ fn times(request: &Request, size: f64) -> Request {
         },
     };
     Request { spread, ..*request }
-}
-
-/// There are ellipsoids that the last and sharpest step of the facet test decides, permits and denials.
-#[test]
-fn file_contains_sets_decided_by_the_last_facet_step() {
-    let [permits, denials] = [true, false].map(|permit| {
-        count_of(0, |record| {
-            let code = if permit {
-                0
-            } else {
-                Reason::NotContained.code()
-            };
-            record.answer == code && bends::decided(table(record), &record.request, permit)
-        })
-    });
-    println!("{permits} permits and {denials} denials by the third step");
-    assert!(permits >= 50 && denials >= 20, "{permits} {denials}");
 }
 
 /// If a table has both layouts, each permits sets that the other does not.

@@ -27,10 +27,9 @@
 //! standard deviations within stated limits, and a determinant that is at least 5e-6 of the product of the variances. The test
 //! of the integer code accepts from 1.2e-6 on.
 //!
-//! **Inside** (`many/facets.rs`). Step 2 of `contain::facets` is evaluated for every facet of one piece, with every number rounded
-//! against acceptance by more than in the integer code: the factor's excess by the table in `set::covariance`, the estimate by
-//! [`super::facet_clearance_q14`] and one length unit, all else by 24 units of the extent. If step 2 accepts a set, so does the integer
-//! code.
+//! **Inside** (`many/facets.rs`). The bound of one slab of `contain::slab` is evaluated for every facet of one piece, with every number
+//! rounded against acceptance by more than in the integer code: the factor's excess by the table in `set::covariance`, the estimate by
+//! [`super::facet_clearance_q14`] and one length unit, all else by 44 extent units. If it accepts a set, so does the integer code.
 //!
 //! **Outside**. The filter names a pose of the given set that no piece and no cell contains, by more than the clearance of the
 //! table and one length unit. The integer code never accepts a set that has such a pose, because it is sound. The cause follows from

@@ -58,19 +58,18 @@ use self::section::{Disc, EitherSection, Ellipsoid, Offset, Section};
 
 pub use self::facets::clearance_q14 as facet_clearance_q14;
 
-mod compact;
 #[cfg(test)]
-mod exact;
+mod error_budget;
 mod facets;
-mod frame;
 pub mod grid;
-mod heading;
 #[cfg(feature = "std")]
 pub mod many;
-mod nearest;
+mod placed;
 pub mod second;
 mod section;
+mod slab;
 mod support;
+mod touching;
 mod union;
 mod worst;
 

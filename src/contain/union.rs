@@ -9,7 +9,7 @@
 //! `(1 - beta) a . P + beta a1 . P <= (1 - beta) b + beta b1`
 //!
 //! holds on the whole set (weak duality; for any beta this is an upper bound, and at a single heading the best beta makes it
-//! exact). Both sides are sums of terms that [`super::heading`] bounds slab by slab, so the numbers of two facets
+//! exact). Both sides are sums of terms that [`super::slab`] bounds slab by slab, so the numbers of two facets
 //! are added up for each slab ([`Section::weighed`]), with a beta of the slab's own. For beta = 0 the facet holds on the whole slab,
 //! and for beta = 1 the slab has no pose in the cap.
 //! In a cap of a cap, one of three such sums must hold: of the facet and either of the others, or of these two.
@@ -24,29 +24,26 @@
 //!
 //! # Rounding
 //! A sum with weights `1 - beta` and `beta` has each error at most as large as the larger one of its two facets: the roundings to
-//! the nearest, and the clearance of the proof of a table (it raises both b). Adding up rounds each number to
-//! the nearest fine unit: at most 3.6 units of a bound (left, C, S, G and their products, and two coordinates along the
-//! normal and ahead of it, 0.71 each). [`WEIGHED`] covers that at each sum. The bounds only require that the
-//! numbers of a facet's section are linear in its normal, its offset and its point. Two numbers are not: the part of G in robot axes and
-//! the part of `along` in world axes. They are carried separately from the sum, the latter rounded up.
+//! the nearest, and the clearance of the proof of a table (it raises both b). Adding up rounds each number to the nearest unit
+//! ([`rounding_of_a_sum`]). The bounds only require that the numbers of a facet's section are linear in its normal, its offset and
+//! its point.
 
-use super::heading::{Root, Section, Slab, Sweep, Width};
+use super::facets::{middle_of, next_of};
+use super::placed::{ARC_SLACK, ONE_TURN, Placed};
+use super::slab::{DEEPEST, Root, Section, Slab, U, Width, squares};
 use crate::num::{Divisor, product, sqrt_ceil, towards_zero};
 use crate::parts;
 use crate::pose::Pose;
-use crate::set::PoseSet;
 use crate::table::{Axes, Facet, Facets, MOST_UNION_STEPS, Piece};
 
-/// Most by which rounding in a weighted sum of two sections can lower a bound, fine units.
-const WEIGHED: i64 = 4;
+/// Returns the most by which rounding in a weighted sum of two sections can lower a bound, extent units.
+pub(super) const fn rounding_of_a_sum(turns: bool) -> i32 {
+    if turns { 2 } else { 1 }
+}
 /// Fraction bits of a weight.
 const WEIGHT_BITS: u32 = 12;
 /// An upper limit of lambda times a square of 25 bits, in [`Section::weight`]; two of them fit into 31 bits.
 const FAR: i32 = 1 << 29;
-/// Fraction bits of u.
-const U: u32 = 15;
-/// Largest number of halvings of the range of u.
-const DEEPEST: u32 = 6;
 /// A pose farther than this outside of every piece is outside of the union: length units, times 2^28.
 const OUTSIDE: i64 = -(4 << 28);
 /// A pose that is farther than this on an axis is treated as at this coordinate by the choice of a piece: length units times 2^14. A
@@ -54,8 +51,6 @@ const OUTSIDE: i64 = -(4 << 28);
 const FARTHEST: i64 = 7 << 27;
 // From the farthest point to the farthest pose, in any direction, is less than 2^31.
 const _: () = assert!(2 * (FARTHEST + (1 << 29)) * (FARTHEST + (1 << 29)) < 1 << 62);
-/// Slack of an arc, 2^-32 turn, as for a single piece.
-const ARC_SLACK: i64 = 3;
 /// Largest number of facets that a pose is beyond, in the search, when another piece must contain it.
 const MOST_BEYOND: usize = 2;
 /// Largest number of ends of arcs among the headings of a set. With more, the set is denied.
@@ -63,15 +58,15 @@ const MOST_CUTS: usize = 6;
 
 /// Returns `true` if the pieces together contain every pose of the set; `false` if that is not shown.
 #[inline(never)]
-pub(super) fn covers(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> bool {
-    search(facets, set, goal) == Some(Ok(()))
+pub(super) fn covers(facets: &Facets<'_>, placed: &Placed) -> bool {
+    search(facets, placed) == Some(Ok(()))
 }
 
 /// Returns a pose of the set for which the search found no piece: relative to the estimate, in world axes: um, um, 2^-24 turn. `None`
 /// for a layout of one piece and a set that is covered or too wide. For reports.
 #[inline(never)]
-pub(super) fn witness(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<[i64; 3]> {
-    search(facets, set, goal)?.err()
+pub(super) fn witness(facets: &Facets<'_>, placed: &Placed) -> Option<[i64; 3]> {
+    search(facets, placed)?.err()
 }
 
 /// Returns the depth of a pose in the piece where it is deepest: length units times 2^28, below zero outside of every piece. A radian from the
@@ -117,24 +112,21 @@ fn depth_in_arc(piece: &Piece<'_>, above_goal: u32, unit: u32) -> i64 {
     };
     // 2 pi 10^6 2^28 / 2^32.
     depth
-        .wrapping_sub(ARC_SLACK)
+        .wrapping_sub(ARC_SLACK.into())
         .wrapping_mul(392_699)
         .wrapping_shr(unit)
 }
 
 /// Returns `Ok` if the pieces together contain the set, or the offset of a pose for which no piece was found. `None` without a
 /// search: the layout has one piece, or the set is far too wide.
-fn search(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Result<(), [i64; 3]>> {
+fn search(facets: &Facets<'_>, placed: &Placed) -> Option<Result<(), [i64; 3]>> {
     if !parts::UNIONS {
         return None;
     }
-    facets.pieces().nth(1)?;
-    let sweep = Sweep::of(facets, set, goal).filter(|sweep| sweep.yaw <= 1 << 24)?;
-    let sweep = sweep.with_disc();
+    facets.pieces().nth(1).filter(|_| placed.yaw <= ONE_TURN)?;
     let mut search = Search {
-        sweep: &sweep,
+        placed,
         facets,
-        above_goal: set.mean().yaw.minus(goal.yaw).0,
         range: [-(1 << U), 1 << U],
         steps: MOST_UNION_STEPS,
         choice: facets.steps_of_choice(),
@@ -153,7 +145,7 @@ fn search(facets: &Facets<'_>, set: &PoseSet, goal: Pose) -> Option<Result<(), [
     Some(if is_covered {
         Ok(())
     } else {
-        Err(sweep.offset_of([lost.x, lost.y], lost.u))
+        Err(placed.offset_of([lost.x, lost.y], lost.u))
     })
 }
 
@@ -206,9 +198,8 @@ struct At {
 
 /// A pose-set, a range of its headings, and the remaining number of slabs.
 struct Search<'a> {
-    sweep: &'a Sweep,
+    placed: &'a Placed,
     facets: &'a Facets<'a>,
-    above_goal: u32,
     /// u of the first and the last heading, 2^-15.
     range: [i32; 2],
     /// Number of steps that remain ([`MOST_UNION_STEPS`]).
@@ -267,25 +258,30 @@ impl<'a> Search<'a> {
     /// Returns `true` if `test` accepts every facet of a piece that the cheapest test does not accept for the whole set.
     fn all_of(&mut self, piece: &Piece<'_>, test: impl Fn(&mut Self, Bound) -> bool) -> bool {
         piece.frames().all(|frame| {
-            let broadly = self.sweep.broadly(&frame);
             frame.facets().all(|facet| {
                 let bound = Bound {
                     facet,
                     axes: frame.axes,
                     point: [i32::from(frame.x), i32::from(frame.y)],
                 };
-                broadly.hold(facet) || test(self, bound)
+                bound.holds_easily(self.placed) || test(self, bound)
             })
         })
     }
 
     /// Returns the centre of the set's section.
     fn centre(&self, u: i32) -> At {
-        let [[fx, fy], ..] = self.sweep.columns;
-        let moved = |at: i32, f: i32| (i64::from(at) << 14).wrapping_add(product(f, u) >> U);
+        let [[fx, fy], ..] = self.placed.columns;
+        let along = [fx, fy].map(|f| product(f, u) >> U);
+        self.at(along, u)
+    }
+
+    /// Returns a pose at an offset from the estimate, extent units.
+    fn at(&self, [x, y]: [i64; 2], u: i32) -> At {
+        let [from_x, from_y] = self.placed.place.map(|v| i64::from(v) << 14);
         At {
-            x: moved(self.sweep.x, fx),
-            y: moved(self.sweep.y, fy),
+            x: from_x.wrapping_add(x.wrapping_shl(self.placed.down)),
+            y: from_y.wrapping_add(y.wrapping_shl(self.placed.down)),
             u,
         }
     }
@@ -296,7 +292,7 @@ impl<'a> Search<'a> {
     fn deepest(&mut self, at: At, not: &[usize]) -> Option<(usize, Piece<'a>)> {
         self.lost = at;
         self.steps = self.steps.checked_sub(self.choice)?;
-        let turn = self.sweep.turned_to(at.u);
+        let turn = self.placed.heading_at(at.u).cos_sin_q30();
         let mut best = None;
         let mut most = OUTSIDE;
         for (number, piece) in (0..usize::MAX).zip(self.facets.pieces()) {
@@ -314,63 +310,43 @@ impl<'a> Search<'a> {
     /// error is a pose that may be beyond the facet.
     #[inline(never)]
     fn holds(&mut self, bound: Bound, beyond: &[Bound]) -> Result<(), At> {
-        let sweep = self.sweep;
         let [from, to] = self.range;
-        let first = sweep.first_depth();
-        let (mut depth, mut index) = (first, 0u32);
-        let mut width = sweep.width(depth);
+        let first = self.placed.first;
+        let (mut width, mut index) = (first, 0u32);
         loop {
-            let middle = index
-                .wrapping_mul(2)
-                .wrapping_add(1)
-                .wrapping_mul(width.in_u.unsigned_abs());
-            let e = (middle as i32).wrapping_sub(1 << U);
-            let is_empty = e.wrapping_add(width.in_u) <= from || e.wrapping_sub(width.in_u) >= to;
+            let e = middle_of(index, width.depth);
+            let h = width.in_u();
+            let is_empty = e.wrapping_add(h) <= from || e.wrapping_sub(h) >= to;
             if !is_empty {
                 if self.steps == 0 {
                     return Err(self.centre(e));
                 }
-                let found = self.slab_holds(bound, beyond, e, &width, depth == first);
+                let found = self.slab_holds(bound, beyond, e, &width);
                 if found != Slab::Inside {
                     let is_within = from <= e && e <= to;
-                    if depth >= DEEPEST || is_within && found == Slab::Outside {
+                    if width.depth >= DEEPEST || is_within && found == Slab::Outside {
                         return Err(self.outermost(bound, beyond, e));
                     }
-                    depth = depth.wrapping_add(1);
                     index = index.wrapping_mul(2);
-                    width = sweep.width(depth);
+                    width = width.halved();
                     continue;
                 }
             }
-            // The next slab: up from each second half.
-            let was = depth;
-            while depth > first && index & 1 == 1 {
-                depth = depth.wrapping_sub(1);
-                index >>= 1;
-            }
-            index = index.wrapping_add(1);
-            if index.wrapping_shr(depth) != 0 {
+            let Some(next) = next_of(&mut index, width.depth, first.depth) else {
                 return Ok(());
-            }
-            if depth != was {
-                width = sweep.width(depth);
+            };
+            if next != width.depth {
+                width = first.halved_to(next);
             }
         }
     }
 
     /// As [`Search::holds`], within a slab. `Outside` if a pose of the middle section is beyond all of them, to within the weights.
     #[inline(never)]
-    fn slab_holds(
-        &mut self,
-        bound: Bound,
-        beyond: &[Bound],
-        e: i32,
-        width: &Width,
-        is_first: bool,
-    ) -> Slab {
-        let own = bound.section(self.sweep, e);
+    fn slab_holds(&mut self, bound: Bound, beyond: &[Bound], e: i32, width: &Width) -> Slab {
+        let own = bound.section(self.placed, e, width);
         // Most facets hold for the whole set. In a half of the slab, the best sum decides at least as well, apart from rounding.
-        if is_first || beyond.is_empty() {
+        if width.depth == self.placed.first.depth || beyond.is_empty() {
             let found = self.slab(&own, e, width);
             if found == Slab::Inside || beyond.is_empty() {
                 return found;
@@ -381,7 +357,7 @@ impl<'a> Search<'a> {
         let mut found = Slab::Unsure;
         let mut first: Option<Section> = None;
         for other in beyond {
-            let other = other.section(self.sweep, e);
+            let other = other.section(self.placed, e, width);
             found = self.sum_holds(&own, &other, e, width);
             if found == Slab::Inside
                 || first
@@ -400,70 +376,60 @@ impl<'a> Search<'a> {
     /// Returns the result of a slab's test of a section, which takes a step.
     fn slab(&mut self, section: &Section, e: i32, width: &Width) -> Slab {
         self.steps = self.steps.saturating_sub(1);
-        section.slab(self.sweep, e, width)
+        section.slab(self.placed, e, width)
     }
 
     /// Returns `Inside` if no pose of a slab is beyond both facets, by their best weighted sum.
     #[inline(never)]
     fn sum_holds(&mut self, first: &Section, second: &Section, e: i32, width: &Width) -> Slab {
-        let sum = self.sum(first, second, e, width.in_u);
+        let sum = self.sum(first, second, e, true);
         self.slab(&sum, e, width)
     }
 
     /// Returns `true` if a pose of a section is beyond both facets, to within the weight of their best sum there.
     #[inline(never)]
     fn is_beyond(&self, first: &Section, second: &Section, e: i32) -> bool {
-        let root = if self.sweep.radius.is_some() {
-            Root::CYLINDER
-        } else {
-            Root::of(e)
-        };
-        self.sum(first, second, e, 0).is_outside(&root)
+        self.sum(first, second, e, false).is_outside(&self.root(e))
     }
 
     /// Returns the weighted sum that says most about the poses beyond both facets, over a slab or (for 0) at its middle.
-    fn sum(&self, first: &Section, second: &Section, e: i32, half: i32) -> Section {
-        let weight = first.weight(second, self.sweep.turn(), self.root(e), half);
+    fn sum(&self, first: &Section, second: &Section, e: i32, is_slab: bool) -> Section {
+        let weight = first.weight(second, self.root(e).low(), is_slab);
         first.weighed(second, weight)
     }
 
     /// Returns the pose of a section that is farthest beyond the facets, by the best weighted sum of the first and the last.
     #[inline(never)]
     fn outermost(&self, bound: Bound, beyond: &[Bound], e: i32) -> At {
-        let own = bound.section(self.sweep, e);
+        let width = &self.placed.first;
+        let own = bound.section(self.placed, e, width);
         let section = match beyond.last() {
-            Some(last) => self.sum(&own, &last.section(self.sweep, e), e, 0),
+            Some(last) => self.sum(&own, &last.section(self.placed, e, width), e, false),
             None => own,
         };
         self.farthest(&section, e)
     }
 
-    /// Returns `sqrt(1 - e^2)`, 2^-15; for a cylinder 1.
-    fn root(&self, e: i32) -> i64 {
-        if self.sweep.radius.is_some() {
-            1 << U
-        } else {
-            i64::from(Root::of(e).low())
-        }
+    /// Returns `sqrt(1 - e^2)`; for a cylinder 1.
+    fn root(&self, e: i32) -> Root {
+        self.placed.root(e)
     }
 
     /// Returns the pose of a section that is farthest along its facet's normal.
     fn farthest(&self, section: &Section, e: i32) -> At {
-        let centre = self.centre(e);
-        let [a, b] = section.along.map(i64::from);
-        let length = sqrt_ceil(squares(a, b)).max(1);
-        let share = |v: i64| towards_zero(v.wrapping_mul(self.root(e)), length);
+        let [a, b] = section.along;
+        let length = sqrt_ceil(squares(a, b).into()).max(1);
+        let root = i64::from(self.root(e).low());
+        let share = |v: i32| towards_zero(i64::from(v).wrapping_mul(root), length);
         let (a, b) = (share(a), share(b));
-        let [_, [x2, y2], [x3, y3]] = self.sweep.columns;
-        let along = |second: i32, third: i32| {
+        let [[fx, fy], [x2, y2], [x3, y3]] = self.placed.columns;
+        let along = |first: i32, second: i32, third: i32| {
             let sum = i64::from(second).wrapping_mul(a);
-            sum.wrapping_add(i64::from(third).wrapping_mul(b)) >> U
+            sum.wrapping_add(i64::from(third).wrapping_mul(b))
+                .wrapping_add(product(first, e))
+                >> U
         };
-        At {
-            x: centre.x.wrapping_add(along(x2, x3)),
-            y: centre.y.wrapping_add(along(y2, y3)),
-            u: e,
-        }
+        self.at([along(fx, x2, x3), along(fy, y2, y3)], e)
     }
 
     /// Returns the ends of the pieces' arcs among the set's headings; `None` if there are too many.
@@ -500,13 +466,13 @@ impl<'a> Search<'a> {
 
     /// Returns the largest heading offset, 2^-32 turn.
     fn reach(&self) -> i64 {
-        (i64::from(self.sweep.yaw) << 8).max(1)
+        (i64::from(self.placed.yaw) << 8).max(1)
     }
 
     /// Returns a piece's arc relative to the estimate's heading, less its slack, 2^-32 turn: as it is, and a turn below and above.
     fn turned_arcs(&self, piece: &Piece<'_>) -> [[i64; 2]; 3] {
-        let from = i64::from(piece.from.wrapping_sub(self.above_goal));
-        let slack = ARC_SLACK.wrapping_add(self.sweep.swing());
+        let from = i64::from(piece.from.wrapping_sub(self.placed.above_goal));
+        let slack = i64::from(ARC_SLACK).wrapping_add(self.placed.swing());
         [-1i64, 0, -2].map(|turns| {
             let from = from.wrapping_add(turns << 32);
             let to = from.wrapping_add(i64::from(piece.width));
@@ -559,68 +525,45 @@ fn depth_in(piece: &Piece<'_>, at: At, [c, s]: [i32; 2], least: i64) -> Option<i
 }
 
 impl Bound {
-    fn section(&self, sweep: &Sweep, e: i32) -> Section {
-        sweep.section(self.facet, self.axes, self.point, e)
+    /// Returns `true` if the cheapest test accepts the bound for the whole set.
+    #[inline(never)]
+    fn holds_easily(&self, placed: &Placed) -> bool {
+        let seen = placed.seen_at(self.axes, self.point, &placed.middle(0), &placed.first);
+        placed.spare(self.facet, &seen) >= placed.enough(&seen)
+            || placed.holds_at_any_heading(self.facet, &seen)
+    }
+
+    fn section(&self, placed: &Placed, e: i32, width: &Width) -> Section {
+        let at = placed.middle(e);
+        let seen = placed.seen_at(self.axes, self.point, &at, width);
+        Section::of(self.facet, &seen, placed, &at, width)
     }
 }
 
 impl Section {
     /// Returns the section of `(1 - weight) self + weight other`, the weight in 2^-12.
     #[inline(never)]
-    fn weighed(&self, other: &Self, weight: i32) -> Self {
-        let own = (1i32 << WEIGHT_BITS).wrapping_sub(weight);
-        let rounded = |sum: i64| sum.wrapping_add(1 << (WEIGHT_BITS - 1)) >> WEIGHT_BITS;
-        let wide = |a: i64, b: i64| {
-            let (own, weight) = (i64::from(own), i64::from(weight));
-            rounded(a.wrapping_mul(own).wrapping_add(b.wrapping_mul(weight)))
-        };
-        let sum = |a: i32, b: i32| rounded(product(a, own).wrapping_add(product(b, weight))) as i32;
+    pub(super) fn weighed(&self, other: &Self, weight: i32) -> Self {
         let turns = self.turns || other.turns;
-        // The part that does not turn, among normals that turn.
-        let still = |section: &Self| {
-            if section.turns || !turns {
-                return i64::from(section.still);
-            }
-            let [a, b] = section.along.map(i64::from);
-            sqrt_ceil(squares(a, b)).wrapping_add(2)
-        };
-        let still = match [still(self), still(other)] {
-            [0, 0] => 0,
-            [own, other] => wide(own, other).wrapping_add(1),
-        };
-        let mut numbers = self.numbers();
-        for (number, other) in numbers.iter_mut().zip(other.numbers()) {
-            *number = sum(*number, other);
-        }
-        let [c, s, g, h, g_turning, ax, ay, bx, by, nx, ny] = numbers;
+        let own = (1i32 << WEIGHT_BITS).wrapping_sub(weight);
+        let sum = |a: i32, b: i32| product(a, own).wrapping_add(product(b, weight));
+        let nearest =
+            |a: i32, b: i32| (sum(a, b).wrapping_add(1 << (WEIGHT_BITS - 1)) >> WEIGHT_BITS) as i32;
+        let down = |a: i32, b: i32| (sum(a, b) >> WEIGHT_BITS) as i32;
+        let pair = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [nearest(a, c), nearest(b, d)];
         Self {
-            left: wide(self.left, other.left).wrapping_sub(WEIGHED),
-            c,
-            s,
-            g,
-            h,
-            g_turning,
-            still: still as u32,
-            along: [ax, ay],
-            ahead: [bx, by],
-            normal: [nx, ny],
+            left: down(self.left, other.left).wrapping_sub(rounding_of_a_sum(turns)),
+            c: down(self.c, other.c),
+            s: nearest(self.s, other.s),
+            slope: nearest(self.slope, other.slope),
+            bend: nearest(self.bend, other.bend),
+            along: pair(self.along, other.along),
+            ahead: pair(self.ahead, other.ahead),
+            normal: pair(self.normal, other.normal),
             turns,
+            // The length of a sum of a fixed and a turning normal changes.
+            bends: self.bends || other.bends || self.turns != other.turns,
         }
-    }
-
-    /// Returns the numbers that are weighed in the same way.
-    #[inline(always)]
-    const fn numbers(&self) -> [i32; 11] {
-        let ([ax, ay], [bx, by], [nx, ny]) = (self.along, self.ahead, self.normal);
-        let Self {
-            c,
-            s,
-            g,
-            h,
-            g_turning,
-            ..
-        } = *self;
-        [c, s, g, h, g_turning, ax, ay, bx, by, nx, ny]
     }
 
     /// Returns the weight of another section, 2^-12, from 0 to 1, with which the sum says most about the poses beyond the
@@ -636,15 +579,12 @@ impl Section {
     ///
     /// The signs are such that `f >= 0`. Twelve bits of each vector are enough: near its least value the sum hardly depends on lambda.
     #[inline(never)]
-    fn weight(&self, other: &Self, turn: i64, root: i64, half: i32) -> i32 {
+    fn weight(&self, other: &Self, root: i32, is_slab: bool) -> i32 {
         let reach = |section: &Self| {
-            let [a, b] = section.along.map(|v| (product(v, root as i32) >> U) as i32);
-            let slope = product(turn as i32, section.s) >> 28;
-            // Halved to fit, up to an offset of 5.6 rad. Beyond, the weight can be a bad one, which costs a permit only.
-            let slope = i64::from(section.g).wrapping_add(slope) >> 1;
-            [(product(slope as i32, half) >> (U - 1)) as i32, a, b]
+            let [a, b] = section.along.map(|v| v.wrapping_mul(root) >> U);
+            [if is_slab { section.slope } else { 0 }, a, b]
         };
-        let left = other.left.wrapping_sub(i64::from(other.c));
+        let left = i64::from(other.left);
         let (p, q) = (reach(self), reach(other));
         let largest = |v: [i32; 3]| v.iter().fold(1u32, |most, v| most | v.unsigned_abs());
         let far = i64::from(largest(q)) << 2;
@@ -710,11 +650,3 @@ impl Section {
             .map_or(0, |share| share.min(1 << WEIGHT_BITS) as i32)
     }
 }
-
-fn squares(a: i64, b: i64) -> u64 {
-    let (a, b) = (a.unsigned_abs(), b.unsigned_abs());
-    a.wrapping_mul(a).wrapping_add(b.wrapping_mul(b))
-}
-
-#[cfg(test)]
-mod tests;

@@ -49,21 +49,17 @@ impl GoalFramePoseSet<'_> {
             let units = i64::from(table.cells().step_um).wrapping_shr(layout.unit().into());
             units.wrapping_shl(28).wrapping_neg()
         });
-        let clear = |pose, depth| depth < cell && is_in_extent(table, pose);
-        self.worst_of(table, high, clear)
-            .or_else(|| self.worst_of(table, high, |_, _| true))
+        self.worst_of(table, high, Some(cell))
+            .or_else(|| self.worst_of(table, high, None))
     }
 
-    /// As [`Self::worst_pose`], of the poses that `counts` accepts with their depths.
-    fn worst_of(
-        &self,
-        table: &Table<'_>,
-        high: Margin,
-        counts: impl Fn(Pose, i64) -> bool,
-    ) -> Option<Pose> {
+    /// As [`Self::worst_pose`], of the poses of the extent that are deeper outside than `clear`, or of all poses.
+    #[inline(never)]
+    fn worst_of(&self, table: &Table<'_>, high: Margin, clear: Option<i64>) -> Option<Pose> {
         let outside = |pose: Pose| {
             let depth = self.depth(table, pose);
-            if counts(pose, depth) { depth } else { 0 }
+            let counts = clear.is_none_or(|clear| depth < clear && is_in_extent(table, pose));
+            if counts { depth } else { 0 }
         };
         let mut worst: Option<(i64, Pose)> = None;
         let mut consider = |offset: [i64; 3]| {

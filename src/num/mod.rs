@@ -374,16 +374,6 @@ pub(crate) fn clamped(value: i64, low: i64, high: i64) -> i64 {
     value.max(low).min(high)
 }
 
-/// Returns an upper bound of `sqrt(value)`, at most 6.1 % and 2 too large, in a few instructions.
-/// `(v / 2^k + 2^k) / 2` is an upper bound for any k (a Newton step from 2^k); here 2^2k is within a
-/// factor of 2 of v.
-#[must_use]
-#[inline(always)]
-pub(crate) const fn sqrt_upper(value: u32) -> u32 {
-    let k = 32u32.wrapping_sub(value.leading_zeros()) >> 1;
-    (value.wrapping_shr(k).wrapping_add(1u32.wrapping_shl(k)) >> 1).wrapping_add(1)
-}
-
 /// A divisor above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -80,10 +80,8 @@ pub(crate) struct Turn {
     down: u32,
     /// The offset, 2^-15 rad, rounded up; some value above [`Turn::LARGEST`] if the offset is larger.
     pub radians_q15: i32,
-    /// The square and the cube of the offset, 2^-15, rounded up, if it is at most [`Turn::LARGEST`]: at
-    /// most 2^13 + 1 and 2^12 + 2.
+    /// The square of the offset, 2^-15, rounded up, if it is at most [`Turn::LARGEST`]: at most 2^13 + 1.
     pub square_q15: u32,
-    pub cube_q15: u32,
     /// The offset, 2^-32 turn, or `u32::MAX` if it is a turn or more.
     pub reach: u32,
 }
@@ -91,6 +89,15 @@ pub(crate) struct Turn {
 impl Turn {
     /// Half a radian, unit 2^-15.
     pub const LARGEST: i32 = 1 << 14;
+
+    /// No turn.
+    pub const NONE: Self = Self {
+        mantissa: 0,
+        down: 36,
+        radians_q15: 1,
+        square_q15: 1,
+        reach: 0,
+    };
 
     /// Returns the turn of an offset below 2^31.
     pub fn of(yaw_q24: u32) -> Self {
@@ -117,7 +124,6 @@ impl Turn {
             down: 21i32.wrapping_sub(s).unsigned_abs(),
             radians_q15: radians as i32,
             square_q15,
-            cube_q15: (square_q15.wrapping_mul(within) >> 15).wrapping_add(1),
             reach: if yaw_q24 < 1 << 24 {
                 yaw_q24.wrapping_mul(ANGLE_UNITS_PER_Q24 as u32)
             } else {
@@ -127,18 +133,32 @@ impl Turn {
     }
 
     /// Returns the right shift that converts a product of a lever (length units) and the mantissa to units
-    /// that are finer by `finer` bits: between 1 and 31.
+    /// that are finer by `finer` bits: between 1 and 32.
     #[cfg_attr(small_code, inline(never))]
     #[cfg_attr(not(small_code), inline(always))]
-    pub fn shift(&self, finer: u32) -> u32 {
-        self.down.saturating_sub(finer).clamp(1, 31)
+    pub fn shift(&self, finer: i32) -> u32 {
+        (self.down as i32).wrapping_sub(finer).clamp(1, 32) as u32
     }
 
-    /// Returns the offset times a lever below 2^15, shifted right, to the nearest: within 1.13 if the
-    /// result is below 2^14.
-    #[inline(always)]
+    /// Returns half the turn, which is at most [`Turn::LARGEST`].
+    pub fn halved(&self) -> Self {
+        let radians = self.radians_q15.wrapping_add(1) >> 1;
+        let square = (radians.wrapping_mul(radians) >> 15).wrapping_add(1);
+        Self {
+            mantissa: self.mantissa,
+            down: self.down.wrapping_add(1),
+            radians_q15: radians,
+            square_q15: square as u32,
+            reach: self.reach >> 1,
+        }
+    }
+
+    /// Returns the offset times a lever below 41,700, shifted right, to the nearest: within
+    /// half a unit and 3.8e-5 of it.
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     pub const fn at(&self, lever: i32, shift: u32) -> i32 {
-        // Below 2^31: 51472 * 2^15.
+        // Below 2^31: 51472 * 41,700.
         let product = lever.wrapping_mul(self.mantissa);
         product.wrapping_shr(shift.wrapping_sub(1)).wrapping_add(1) >> 1
     }
@@ -168,22 +188,27 @@ mod tests {
 
     proptest! {
         #[test]
-        fn turns_keep_their_error(bits in 0..30u32, low in any::<u32>(), lever in -30_000i32..30_000, finer in 0..13u32) {
+        fn turns_keep_their_error(bits in 0..30u32, low in any::<u32>(), lever in -41_700i32..41_700, finer in -1..13i32, halvings in 0..6) {
             let yaw = 1u32 << bits | low & ((1 << bits) - 1);
-            let turn = Turn::of(yaw);
-            let radians = f64::from(yaw) * TAU / 16_777_216.0;
+            // Turns of half a radian at most are halved.
+            let halvings = if Turn::of(yaw).radians_q15 <= Turn::LARGEST { halvings } else { 0 };
+            let turn = (0..halvings).fold(Turn::of(yaw), |turn, _| turn.halved());
+            let radians = f64::from(yaw) * TAU / 16_777_216.0 / f64::from(1 << halvings);
             let shown = f64::from(turn.mantissa) * 0.5f64.powi(turn.down as i32);
             prop_assert!((shown / radians - 1.0).abs() <= 3.8e-5);
             if radians <= 0.5 {
                 let q15 = radians * 32_768.0;
-                prop_assert!(f64::from(turn.radians_q15) >= q15 && f64::from(turn.radians_q15) <= q15 + 1.7);
+                prop_assert!(f64::from(turn.radians_q15) >= q15 && f64::from(turn.radians_q15) <= q15 + 2.7);
+                let [square, found] = [q15 * q15 / 32_768.0, f64::from(turn.square_q15)];
+                prop_assert!(found >= square && found <= square + 4.0, "{found} {square}");
             } else {
                 prop_assert!(turn.radians_q15 > Turn::LARGEST);
             }
-            let exact = radians * f64::from(lever) * f64::from(1 << finer);
-            if exact.abs() <= 16_384.0 {
+            let exact = radians * f64::from(lever) * f64::from(finer).exp2();
+            if exact.abs() <= 41_000.0 {
                 let found = turn.at(lever, turn.shift(finer));
-                prop_assert!((f64::from(found) - exact).abs() <= 1.2, "{found} {exact}");
+                let most = 0.5 + 3.8e-5 * exact.abs();
+                prop_assert!((f64::from(found) - exact).abs() <= most, "{found} {exact}");
             }
         }
     }

@@ -42,6 +42,8 @@ pub const NORMAL_BITS: u32 = 14;
 pub const LONGEST_LEVER: u16 = 32_000;
 /// Largest exponent of the length unit.
 pub const LARGEST_UNIT: u8 = 12;
+/// No point of the world: longer than every lever.
+const NO_POINT: u16 = u16::MAX;
 
 /// A half-plane `a . P <= b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,9 +123,10 @@ pub struct Facets<'a> {
     length: usize,
     unit: u8,
     reach: u16,
-    arm: u16,
-    farthest: u16,
     lever: u16,
+    /// Upper bounds of the length of every v, and of every q; [`NO_POINT`] if there is none.
+    arms: u16,
+    points: u16,
     pieces: &'a [PieceBytes],
     frames: &'a [FrameBytes],
     facets: &'a [FacetBytes],
@@ -167,9 +170,10 @@ impl<'a> Facets<'a> {
             length: bytes.len(),
             unit,
             reach,
-            arm,
-            farthest,
+            // Until the frames are known, as the bytes state.
             lever: arm,
+            arms: arm,
+            points: farthest,
             pieces,
             frames,
             facets,
@@ -207,10 +211,10 @@ impl<'a> Facets<'a> {
     fn admits(&self, frame: &Frame<'_>) -> bool {
         let (near, limit) = match frame.axes {
             Axes::World => (
-                length([frame.x, frame.y]) <= u32::from(self.arm),
+                length([frame.x, frame.y]) <= u32::from(self.arms),
                 LONGEST_LEVER,
             ),
-            Axes::Robot => (true, self.farthest),
+            Axes::Robot => (true, self.points),
         };
         near && !frame.facets.is_empty()
             && frame
@@ -221,17 +225,29 @@ impl<'a> Facets<'a> {
     /// Returns the layout with its longest lever from a point to a pose within reach, or `None` if that
     /// is too long.
     fn with_lever(self) -> Option<Self> {
-        let seen = self
-            .frames
-            .iter()
-            .map(read_frame)
-            .filter(|(axes, _, _)| *axes == 1)
-            .map(|(_, _, point)| {
-                length(point).saturating_add(u32::from(self.reach).saturating_mul(2))
-            });
-        let lever = seen.fold(u32::from(self.arm), u32::max);
-        let lever = u16::try_from(lever).ok().filter(|v| *v <= LONGEST_LEVER)?;
-        Some(Self { lever, ..self })
+        let reach = u32::from(self.reach).saturating_mul(2);
+        let mut lever = u32::from(self.arms);
+        let (mut arms, mut points, mut has_points) = (0u32, 0u32, false);
+        for frame in self.frames {
+            let (axes, _, point) = read_frame(frame);
+            let [x, y] = point;
+            let far = distance([x.into(), y.into()]);
+            if axes == 1 {
+                lever = lever.max(length(point).saturating_add(reach));
+                points = points.max(far);
+                has_points = true;
+            } else {
+                arms = arms.max(far);
+            }
+        }
+        // Points of 16 bits are nearer than 49,153.
+        let points = if has_points { points as u16 } else { NO_POINT };
+        (lever <= u32::from(LONGEST_LEVER)).then_some(Self {
+            lever: lever as u16,
+            arms: arms as u16,
+            points,
+            ..self
+        })
     }
 
     /// Returns the exponent k of the length unit: 2^k micrometres.
@@ -247,24 +263,21 @@ impl<'a> Facets<'a> {
         self.reach
     }
 
-    /// Returns the upper bound of the distance of a point v from the robot's origin, length units, as
-    /// the sum of both coordinates.
-    #[must_use]
-    pub const fn arm(&self) -> u16 {
-        self.arm
-    }
-
-    /// Returns the upper bound of an offset's magnitude |b| in frames of robot axes, length units.
-    #[must_use]
-    pub const fn farthest(&self) -> u16 {
-        self.farthest
-    }
-
     /// Returns the longest lever: an upper bound of every v, and of every vector from a q to an
     /// estimate within reach, length units, as the sum of both coordinates.
     #[must_use]
     pub const fn lever(&self) -> u16 {
         self.lever
+    }
+
+    /// Returns an upper bound of every v, and of every vector from a q to this estimate, length units.
+    #[inline(always)]
+    pub(crate) fn longest_arm(&self, place: [i32; 2]) -> u32 {
+        if self.points == NO_POINT {
+            return self.arms.into();
+        }
+        let away = distance(place).wrapping_add(self.points.into());
+        away.max(self.arms.into())
     }
 
     /// Returns the number of bytes of the layout.
@@ -365,6 +378,13 @@ const fn read_frame([axes, own, x0, x1, y0, y1]: &FrameBytes) -> (u8, u8, [i16; 
 /// Returns the sum of both coordinates' magnitudes.
 fn length([x, y]: [i16; 2]) -> u32 {
     u32::from(x.unsigned_abs()).saturating_add(u32::from(y.unsigned_abs()))
+}
+
+/// Returns a vector's length, at most 12 % and 1 more.
+const fn distance([x, y]: [i32; 2]) -> u32 {
+    let [x, y] = [x.unsigned_abs(), y.unsigned_abs()];
+    let (most, least) = if x > y { (x, y) } else { (y, x) };
+    most.wrapping_add(least.wrapping_add(1) >> 1)
 }
 
 /// Reads a facet from its bytes.

@@ -4,7 +4,6 @@
 use std::path::PathBuf;
 
 pub mod bags;
-pub mod bends;
 pub mod commands;
 pub mod controller;
 pub mod counts;

@@ -1,17 +1,16 @@
 //! Facets in floats: does one piece certainly contain a set, and which pose of the set is certainly in no piece?
 //!
-//! The terms are those of `contain::facets` and `contain::frame`.
+//! The terms are those of `contain::slab` for one slab: the whole set.
 
 use super::spread::{Point, Spread, Square};
 use crate::contain::facet_clearance_q14;
 use crate::table::{Axes, Facets};
 use std::vec::Vec;
 
-/// Units of the extent that the integer code can round against acceptance at one facet: 8 of its own slack, 3 for the rest and
-/// the bend, 4.4 for the errors of the columns, the normal and the lever, 1.7 for squares of numbers that are rounded up, 1 for the
-/// slack of the estimate, rounded down. Together 18.1.
-const ROUNDED: f64 = 24.0;
-/// The largest turn at which the integer code evaluates facets to first order, radians; less than its half.
+/// Extent units that the integer code can round against acceptance at one facet: its own slack of 17 at most, as much again of what is rounded to
+/// the nearest, 1 for the slack of the estimate, and 6 for terms that are rounded up. Together 41, times the length of a normal.
+const ROUNDED: f64 = 44.0;
+/// The largest turn that the integer code tests as one slab, radians; less than its half.
 const MOST_TURN: f64 = 0.4999;
 /// Upper bound of the rounding of turns and their powers: 2 of 2^-15.
 const TURN_ROUNDED: f64 = 2.0 / 32_768.0;
@@ -29,8 +28,6 @@ pub(super) struct Layout {
     unit: f64,
     /// An estimate farther than this on an axis is left to the integer code.
     reach: f64,
-    arm: f64,
-    farthest: f64,
     lever: f64,
 }
 
@@ -82,9 +79,10 @@ pub(super) struct Failing {
 struct Terms {
     /// The largest rounding of the integer code at a facet, micrometres.
     rounded: f64,
-    rest_arm: f64,
-    rest_robot: f64,
-    bend: f64,
+    /// Half the square and a sixth of the cube of the turn.
+    bent: [f64; 2],
+    /// In robot axes, the effect of the turn on the offsets.
+    turned: f64,
     /// At least the extent along a normal, without the effect of the yaw.
     broad: f64,
 }
@@ -135,8 +133,6 @@ impl Layout {
             facets,
             unit,
             reach: (f64::from(layout.reach()) - 1.0) * unit,
-            arm: f64::from(layout.arm()) * unit,
-            farthest: f64::from(layout.farthest()) * unit,
             lever: f64::from(layout.lever()) * unit,
         }
     }
@@ -181,18 +177,16 @@ impl Layout {
         if !fits {
             return None;
         }
-        let unit = ((spread.broad + weight) / 8_192.0).max(1.0);
+        let unit = ((spread.broad + weight) / 16_384.0).max(1.0);
         let broad = spread.broad * NORMAL + 5.0 * unit;
         let turn = spread.turn + TURN_ROUNDED;
         let square = turn * turn + TURN_ROUNDED;
         let cube = square * turn + TURN_ROUNDED;
-        let across = broad + 2.0 * self.unit;
         Some(Terms {
             rounded: ROUNDED * unit,
-            rest_arm: self.arm * square * (0.5 * NORMAL),
-            rest_robot: (9.0 / 16.0) * square * self.farthest
-                + (3.0 / 8.0) * cube * (self.lever + across),
-            bend: broad * turn,
+            bent: [square / 2.0, cube / 6.0],
+            // The first column and the two others, each at most as long as the offset.
+            turned: broad * (turn * core::f64::consts::SQRT_2 + square / 2.0),
             broad,
         })
     }
@@ -206,20 +200,24 @@ impl Layout {
         turned: &Square,
         terms: &Terms,
     ) -> Option<Failing> {
-        let (above, rest, bend) = match frame.axes {
-            Axes::World if frame.is_at_robot() => (&spread.above, 0.0, 0.0),
-            Axes::World => (&spread.above, terms.rest_arm, 0.0),
-            Axes::Robot => (turned, terms.rest_robot, terms.bend),
+        let (above, more, side) = match frame.axes {
+            Axes::World => (&spread.above, 0.0, 1.0),
+            Axes::Robot => (turned, terms.turned, -1.0),
         };
         let seen = frame.seen(&spread.estimate);
         let [lx, ly] = seen.lever;
-        let less = terms.rounded + rest + bend;
-        let enough = less + terms.broad + (lx.abs() + ly.abs()) * NORMAL * spread.turn;
+        let less = terms.rounded + more;
+        let [square, cube] = terms.bent;
+        let swing = (lx.abs() + ly.abs()) * NORMAL;
+        let enough = less + terms.broad + swing * (spread.turn + square + cube);
         let failing = self.facets(frame).iter().find(|facet| {
             let slack = facet.inner - (facet.x * seen.x + facet.y * seen.y);
             slack < enough && {
-                let left = slack - less;
-                let normal = [facet.x, facet.y, facet.x * lx + facet.y * ly];
+                // C and S: the part of the point that turns along the normal, and ahead of it.
+                let c = side * (facet.x * ly - facet.y * lx);
+                let s = facet.x * lx + facet.y * ly;
+                let left = slack - less - (-c).max(0.0) * square - s.abs() * cube;
+                let normal = [facet.x, facet.y, s];
                 !(left >= 0.0 && left * left >= above.along(normal) * (1.0 + 1e-9))
             }
         });
@@ -344,11 +342,6 @@ impl Facet {
 }
 
 impl Frame {
-    #[inline(always)]
-    fn is_at_robot(&self) -> bool {
-        self.x == 0.0 && self.y == 0.0
-    }
-
     /// Returns the point of a pose.
     #[inline(always)]
     fn seen(&self, pose: &Point) -> Seen {

@@ -77,9 +77,12 @@ fn cells(yaw_lo: u32, yaw_span: u64) -> Cells {
 fn layout_reads_back_written_facets() {
     let bytes = Plan::good().bytes();
     let layout = Facets::parse(&bytes, &cells(1000, 2500)).unwrap();
-    assert_eq!((layout.unit(), layout.reach(), layout.arm()), (12, 100, 40));
+    assert_eq!((layout.unit(), layout.reach()), (12, 100));
     // From (-20, 7) to the farthest pose within reach.
-    assert_eq!((layout.farthest(), layout.lever()), (50, 227));
+    assert_eq!(layout.lever(), 227);
+    // The lengths of the estimate and of (-20, 7), or that of (30, -10): each at most 12 % and 1 more.
+    assert_eq!(layout.longest_arm([30, -40]), 55 + 24);
+    assert_eq!(layout.longest_arm([3, -4]), 35);
     assert_eq!(layout.byte_length(), bytes.len());
     assert_eq!((layout.frame_count(), layout.facet_count()), (3, 4));
     let pieces: Vec<_> = layout.pieces().collect();

@@ -116,13 +116,13 @@ fn facets(table: &Table<'_>, worst: &mut WorstCase) {
             let length = i32::from(frame.x).abs() + i32::from(frame.y).abs();
             let (count, limit) = match frame.axes {
                 Axes::World => {
-                    assert!(length <= i32::from(layout.arm()));
+                    assert!(length <= i32::from(layout.lever()));
                     (&mut worst.world_facets, i32::from(i16::MAX))
                 }
                 Axes::Robot => {
                     let lever = length + 2 * i32::from(layout.reach());
                     assert!(lever <= i32::from(layout.lever()));
-                    (&mut worst.robot_facets, i32::from(layout.farthest()))
+                    (&mut worst.robot_facets, i32::from(i16::MAX))
                 }
             };
             for facet in frame.facets() {

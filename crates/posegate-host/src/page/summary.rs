@@ -242,7 +242,7 @@ mod tests {
         let text = text_of(2);
         assert!(
             text.starts_with(
-                "<p id=\"summary\" class=\"bad\">1 of 2 work tasks served by 1 tag, worst margin 1.12, proven</p>"
+                "<p id=\"summary\" class=\"bad\">1 of 2 work tasks served by 1 tag, worst margin 1.13, proven</p>"
             ),
             "{text}"
         );

@@ -1,0 +1,126 @@
+//! The pose of a set that is farthest beyond a facet, for reports.
+
+use super::placed::{Movement, Placed};
+use super::slab::{Section, U, squares};
+use crate::num::{product, sqrt_ceil, towards_zero};
+use crate::parts;
+use crate::table::Facets;
+
+/// Headings on either side of the estimate's at which [`farthest`] evaluates facets.
+const SIDE: i32 = 8;
+
+/// Returns the pose of a set that is farthest beyond a facet of a layout's first piece, or nearest to one. Searches
+/// the sections at seventeen headings, and some around the farthest. Relative to the estimate, in world axes: um, um,
+/// 2^-24 turn. For reports.
+pub(super) fn farthest(facets: &Facets<'_>, placed: &Placed) -> [i64; 3] {
+    let mut most = Touching::NONE;
+    for frame in facets.pieces().take(1).flat_map(|piece| piece.frames()) {
+        for facet in frame.facets() {
+            let mut own = Touching::NONE;
+            let at = |e: i32, own: &mut Touching| {
+                let middle = placed.middle(e);
+                let seen = placed.seen(&frame, &middle, &placed.first);
+                let section = Section::of(facet, &seen, placed, &middle, &placed.first);
+                let found = placed.touching(&section, e);
+                if found.beyond > own.beyond {
+                    *own = found;
+                }
+            };
+            if !parts::HEADINGS {
+                at(0, &mut own);
+            } else {
+                for k in SIDE.wrapping_neg()..=SIDE {
+                    at(k << 12, &mut own);
+                }
+                // Down to 1/64, as finely as roots are known.
+                for step in [1 << 11, 1 << 10, 1 << 9] {
+                    let e = own.e;
+                    at(e.wrapping_add(step).min(1 << U), &mut own);
+                    at(e.wrapping_sub(step).max(-(1 << U)), &mut own);
+                }
+            }
+            if own.beyond > most.beyond {
+                most = own;
+            }
+        }
+    }
+    most.offset
+}
+
+/// The point where a section reaches farthest along a facet's normal.
+#[derive(Clone, Copy)]
+struct Touching {
+    /// Its distance beyond the facet, extent units.
+    beyond: i64,
+    /// u of the section, 2^-15.
+    e: i32,
+    /// Relative to the estimate: um, um, 2^-24 turn.
+    offset: [i64; 3],
+}
+
+impl Touching {
+    const NONE: Self = Self {
+        beyond: i64::MIN,
+        e: 0,
+        offset: [0; 3],
+    };
+
+    /// Returns the pose after a movement along the normal that turns it outwards, to first order.
+    fn moved(self, movement: &Movement, section: &Section) -> Self {
+        let [nx, ny] = section.normal;
+        let length = sqrt_ceil(squares(nx, ny).into()).max(1);
+        let along = |v: i32| towards_zero(product(v, movement.by.translation_um()), length);
+        let swung = movement.turn.at(section.s.wrapping_abs(), movement.shift);
+        let turn = i64::from(movement.by.yaw_q24());
+        let turn = if section.s < 0 {
+            turn.wrapping_neg()
+        } else {
+            turn
+        };
+        let [x, y, yaw] = self.offset;
+        Self {
+            beyond: self
+                .beyond
+                .wrapping_add(movement.length.into())
+                .wrapping_add(swung.into()),
+            e: self.e,
+            offset: [
+                x.wrapping_add(along(nx)),
+                y.wrapping_add(along(ny)),
+                yaw.wrapping_add(turn),
+            ],
+        }
+    }
+}
+
+impl Placed {
+    /// Returns the pose of a section that is farthest along a facet's normal.
+    fn touching(&self, section: &Section, e: i32) -> Touching {
+        let [a, b] = section.along;
+        let length = sqrt_ceil(squares(a, b).into()).max(1);
+        let root = i64::from(self.root(e).low());
+        let share = |v: i32| towards_zero(i64::from(v).wrapping_mul(root), length);
+        let (a, b) = (share(a), share(b));
+        let [[fx, fy], [x2, y2], [x3, y3]] = self.columns;
+        let axis = |first: i32, second: i32, third: i32| {
+            let sum = product(first, e)
+                .wrapping_add(i64::from(second).wrapping_mul(a))
+                .wrapping_add(i64::from(third).wrapping_mul(b));
+            sum.wrapping_shl(self.unit) >> U
+        };
+        let reach = length.wrapping_mul(root) >> U;
+        let touching = Touching {
+            beyond: reach.wrapping_sub(section.left.into()),
+            e,
+            offset: [
+                axis(fx, x2, x3),
+                axis(fy, y2, y3),
+                product(self.yaw as i32, e) >> U,
+            ],
+        };
+        match &self.movement {
+            Some(movement) => touching.moved(movement, section),
+            None => touching,
+        }
+    }
+}
