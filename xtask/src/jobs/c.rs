@@ -72,7 +72,7 @@ pub fn c(_: &Arguments) -> Result {
         let rust = emulated(machine, &board::build(Level::Fast, target, "vectors")?)?;
         for (name, built) in [("make", &made), ("cmake", &configured)] {
             for example in ["docking_gate", "controller"] {
-                board::emulate(machine, &built.join(format!("{example}.elf")), 60).run()?;
+                board::emulate(machine, &built.join(format!("{example}.elf")), 600).run()?;
             }
             let line = emulated(machine, &built.join("vectors.elf"))?;
             if line != rust {
@@ -97,7 +97,7 @@ fn with_target_folder(command: Cmd) -> Cmd {
 }
 
 fn emulated(machine: &str, elf: &Path) -> Result<String> {
-    board::emulate(machine, elf, 60).read()
+    board::emulate(machine, elf, 600).read()
 }
 
 /// Links every function of the header without a C library: no symbol is undefined, and no panic, allocator or defmt can be reached.

@@ -47,7 +47,7 @@ pub fn vectors(_: &Arguments) -> Result {
     let built = board::build_all(Level::Fast, &TARGETS, &["vectors"])?;
     for (target, machine, core) in CORES {
         let elf = built.elf(target, "vectors");
-        let outcome = board::emulate(machine, &elf, 60).outcome()?;
+        let outcome = board::emulate(machine, &elf, 600).outcome()?;
         let line = outcome.text.trim_end();
         println!("{line}");
         if outcome.code != 0 || line != right(core, count) {
@@ -60,7 +60,7 @@ pub fn vectors(_: &Arguments) -> Result {
     let built = board::build_all(Level::Small, &targets, &["vectors"])?;
     for (target, machine, core) in for_size {
         let elf = built.elf(target, "vectors");
-        let outcome = board::emulate(machine, &elf, 60).outcome()?;
+        let outcome = board::emulate(machine, &elf, 600).outcome()?;
         let line = outcome.text.trim_end();
         println!("{}", line.replace(core, &format!("{core}, at the level s")));
         if outcome.code != 0 || line != right(core, count) {
