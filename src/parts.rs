@@ -8,8 +8,9 @@
 pub(crate) const CELLS: bool = cfg!(feature = "cells");
 
 /// Facets on points that turn with the robot are evaluated heading by heading (feature `headings`). Without it, such facets are
-/// evaluated to second order, which denies every set that turns by more than half a radian.
-pub(crate) const HEADINGS: bool = cfg!(feature = "headings");
+/// evaluated over one slab of headings, which denies nearly every set that turns by more than half a radian. Several pieces together are always
+/// evaluated heading by heading, so `unions` brings this part along.
+pub(crate) const HEADINGS: bool = cfg!(any(feature = "headings", feature = "unions"));
 
 /// Several pieces of facets may contain a pose-set together (feature `unions`). Without it, one piece must contain it.
 pub(crate) const UNIONS: bool = cfg!(feature = "unions");

@@ -308,10 +308,10 @@ impl Section {
             less = less.wrapping_add(self.moved(movement, placed.broad, width));
         }
         let spare = self.left.wrapping_sub(less);
-        let is_inside = if width.depth == 0 || !parts::HEADINGS {
+        let is_inside = if width.depth == 0 {
             self.whole_at_most(spare, placed.is_cylinder)
         } else {
-            self.at_most(spare, &root, width, placed.is_cylinder)
+            parts::HEADINGS && self.at_most(spare, &root, width, placed.is_cylinder)
         };
         if is_inside {
             Slab::Inside

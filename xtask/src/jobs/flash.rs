@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 
 const ALL_PARTS: &str = "cells,headings,sight,unions";
 /// Sets of parts, as a firmware chooses them for its tables.
-const PARTS: [(&str, &str); 5] = [
+const PARTS: [(&str, &str); 6] = [
     ("facets alone", ""),
     ("facets that turn", "headings"),
     ("facets and cells", "cells"),
+    ("facets in several pieces", "unions"),
     ("facets in several pieces that turn", "headings,unions"),
     ("all parts", ALL_PARTS),
 ];
