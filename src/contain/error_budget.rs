@@ -124,7 +124,7 @@ impl Genes {
         Self(core::array::from_fn(|_| random.unit()))
     }
 
-    /// A neighbour: some numbers anew or moved.
+    /// Returns a neighbour: some of the numbers are new, or moved a little.
     fn changed(&self, random: &mut Random) -> Self {
         let mut genes = self.clone();
         for _ in 0..1 + (random.unit() * 3.0) as usize {

@@ -31,7 +31,7 @@
 //! proof of a table covers the rounding of a point, at any heading ([`super::facet_clearance_q14`]).
 
 use super::placed::{Placed, Seen, dot, q15};
-use crate::num::{sqrt_ceil, wide};
+use crate::num::{product, sqrt_ceil, towards_zero, wide};
 use crate::parts;
 use crate::set::Turn;
 use crate::table::{Axes, Facet, NORMAL_BITS};
@@ -398,6 +398,23 @@ impl Section {
         let normal = normal.wrapping_add(4).min(LONGEST);
         // 2^15 * 2^14.1.
         moved.wrapping_add((movement.length.wrapping_mul(normal) >> 14).wrapping_add(1))
+    }
+
+    /// Returns the offset from the estimate of the section's pose that is farthest along the normal: x and y in world axes, extent units times 2^15.
+    /// For reports, and for the choice of a piece.
+    pub fn farthest(&self, placed: &Placed, e: i32) -> [i64; 2] {
+        let [a, b] = self.along;
+        let length = sqrt_ceil(squares(a, b).into()).max(1);
+        let root = i64::from(placed.root(e).low());
+        let share = |v: i32| towards_zero(i64::from(v).wrapping_mul(root), length);
+        let (a, b) = (share(a), share(b));
+        let [[fx, fy], [x2, y2], [x3, y3]] = placed.columns;
+        let axis = |first: i32, second: i32, third: i32| {
+            product(first, e)
+                .wrapping_add(i64::from(second).wrapping_mul(a))
+                .wrapping_add(i64::from(third).wrapping_mul(b))
+        };
+        [axis(fx, x2, x3), axis(fy, y2, y3)]
     }
 
     /// Returns `true` if the section itself is beyond the facet.

@@ -97,26 +97,15 @@ impl Placed {
     /// Returns the pose of a section that is farthest along a facet's normal.
     fn touching(&self, section: &Section, e: i32) -> Touching {
         let [a, b] = section.along;
-        let length = sqrt_ceil(squares(a, b).into()).max(1);
-        let root = i64::from(self.root(e).low());
-        let share = |v: i32| towards_zero(i64::from(v).wrapping_mul(root), length);
-        let (a, b) = (share(a), share(b));
-        let [[fx, fy], [x2, y2], [x3, y3]] = self.columns;
-        let axis = |first: i32, second: i32, third: i32| {
-            let sum = product(first, e)
-                .wrapping_add(i64::from(second).wrapping_mul(a))
-                .wrapping_add(i64::from(third).wrapping_mul(b));
-            sum.wrapping_shl(self.unit) >> U
-        };
-        let reach = length.wrapping_mul(root) >> U;
+        let length = sqrt_ceil(squares(a, b).into());
+        let reach = length.wrapping_mul(self.root(e).low().into()) >> U;
+        let [x, y] = section
+            .farthest(self, e)
+            .map(|v| v.wrapping_shl(self.unit) >> U);
         let touching = Touching {
             beyond: reach.wrapping_sub(section.left.into()),
             e,
-            offset: [
-                axis(fx, x2, x3),
-                axis(fy, y2, y3),
-                product(self.yaw as i32, e) >> U,
-            ],
+            offset: [x, y, product(self.yaw as i32, e) >> U],
         };
         match &self.movement {
             Some(movement) => touching.moved(movement, section),

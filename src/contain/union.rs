@@ -30,8 +30,8 @@
 
 use super::facets::{middle_of, next_of};
 use super::placed::{ARC_SLACK, ONE_TURN, Placed};
-use super::slab::{DEEPEST, Root, Section, Slab, U, Width, squares};
-use crate::num::{Divisor, product, sqrt_ceil, towards_zero};
+use super::slab::{DEEPEST, Root, Section, Slab, U, Width};
+use crate::num::{Divisor, product, sqrt_ceil};
 use crate::parts;
 use crate::pose::Pose;
 use crate::table::{Axes, Facet, Facets, MOST_UNION_STEPS, Piece};
@@ -417,19 +417,7 @@ impl<'a> Search<'a> {
 
     /// Returns the pose of a section that is farthest along its facet's normal.
     fn farthest(&self, section: &Section, e: i32) -> At {
-        let [a, b] = section.along;
-        let length = sqrt_ceil(squares(a, b).into()).max(1);
-        let root = i64::from(self.root(e).low());
-        let share = |v: i32| towards_zero(i64::from(v).wrapping_mul(root), length);
-        let (a, b) = (share(a), share(b));
-        let [[fx, fy], [x2, y2], [x3, y3]] = self.placed.columns;
-        let along = |first: i32, second: i32, third: i32| {
-            let sum = i64::from(second).wrapping_mul(a);
-            sum.wrapping_add(i64::from(third).wrapping_mul(b))
-                .wrapping_add(product(first, e))
-                >> U
-        };
-        self.at([along(fx, x2, x3), along(fy, y2, y3)], e)
+        self.at(section.farthest(self.placed, e).map(|v| v >> U), e)
     }
 
     /// Returns the ends of the pieces' arcs among the set's headings; `None` if there are too many.

@@ -124,7 +124,7 @@ pub struct Facets<'a> {
     unit: u8,
     reach: u16,
     lever: u16,
-    /// Upper bounds of the length of every v, and of every q; [`NO_POINT`] if there is none.
+    /// An upper bound of the length of every v, and one of every q, length units. The latter is [`NO_POINT`] if there is no q.
     arms: u16,
     points: u16,
     pieces: &'a [PieceBytes],
