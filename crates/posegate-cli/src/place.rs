@@ -126,9 +126,9 @@ fn objective(text: &str) -> Result<Objective, String> {
 }
 
 impl Method {
-    fn optimizer(self, evaluations: u64) -> Box<dyn Optimizer> {
+    fn optimizer(self) -> Box<dyn Optimizer> {
         match self {
-            Self::Cmaes => Box::new(Cmaes::of_budget(evaluations)),
+            Self::Cmaes => Box::new(Cmaes::default()),
             Self::Ga => Box::new(Genetic::default()),
         }
     }
@@ -170,7 +170,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     let space = space(arguments, &site, &moved_task)?;
     let bar = progress(arguments.budget, "places");
-    let optimizer = arguments.method.optimizer(arguments.budget);
+    let optimizer = arguments.method.optimizer();
     let (budget, seed) = (arguments.budget, arguments.seed);
     let (before, found) = rayon::join(
         || order.placed(order.task.tag.pose),

@@ -108,11 +108,10 @@ pub(super) fn places(
             PosePrior::Exactly => EVALUATIONS_EXACT,
             PosePrior::About(_) => EVALUATIONS,
         };
-        let search = Cmaes::of_budget(evaluations);
         let found = place(
             &order(known, objective),
             &space,
-            &search,
+            &Cmaes::default(),
             evaluations,
             1,
             &|_| (),

@@ -1,6 +1,7 @@
 //! CMA-ES: evolution by a normal distribution whose covariance is adapted (Hansen, "The CMA Evolution Strategy: A
-//! Tutorial", arXiv 1604.00772, the numbers of its Table 1), restarted from other points with larger and larger
-//! populations.
+//! Tutorial", arXiv 1604.00772), restarted from other points with larger and larger populations. The covariance also
+//! learns from the worse half of a generation (the tutorial's negative weights), and step and covariance adapt faster
+//! than by the tutorial's Table 1, since places have few coordinates; `./ci.sh placement` measures this choice.
 
 use super::{Budget, Fidelity, Optimizer, Problem, Solution, apart, distinct, folded};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -19,59 +20,18 @@ pub struct Cmaes {
     pub settled: f64,
     /// Largest number of starts.
     pub starts: u32,
-    /// Points of a generation of the first runs; `None` derives it from the number of dimensions.
-    pub population: Option<usize>,
-    /// `true` if the covariance also learns from the worse half of a generation (the tutorial's negative weights), and
-    /// step and covariance adapt faster than by the tutorial's table: for few evaluations.
-    pub active: bool,
-    /// `true` if the problem's initial guesses are evaluated first.
-    pub hinted: bool,
-    /// `true` if every start gets the same part of the budget, even if others end early.
-    pub fair: bool,
-    /// The fidelity of the first evaluations.
-    pub look: Fidelity,
-}
-
-/// Smaller budgets are searched with [`Cmaes::LEAN`].
-const FEW: u64 = 1_200;
-
-impl Cmaes {
-    /// For few evaluations: one run from the best of few points.
-    pub const LEAN: Self = Self {
-        scattered: 16,
-        sigma: 0.04,
-        settled: 1e-8,
-        starts: 24,
-        population: Some(6),
-        active: true,
-        hinted: true,
-        fair: false,
-        look: Fidelity::Fine,
-    };
-
-    /// Returns the settings for a budget.
-    #[must_use]
-    pub fn of_budget(evaluations: u64) -> Self {
-        if evaluations < FEW {
-            Self::LEAN
-        } else {
-            Self::default()
-        }
-    }
+    /// Points of a generation of the first runs.
+    pub population: usize,
 }
 
 impl Default for Cmaes {
     fn default() -> Self {
         Self {
-            scattered: 64,
-            sigma: 0.06,
+            scattered: 16,
+            sigma: 0.04,
             settled: 1e-8,
-            starts: 4,
-            population: None,
-            active: false,
-            hinted: true,
-            fair: true,
-            look: Fidelity::Quick,
+            starts: 24,
+            population: 6,
         }
     }
 }
@@ -82,19 +42,15 @@ impl Optimizer for Cmaes {
     }
 
     fn refines_internally(&self) -> bool {
-        self.look == Fidelity::Fine
+        true
     }
 
     fn search(&self, problem: &dyn Problem, budget: &Budget<'_>, seed: u64) -> Vec<Solution> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let dimensions = problem.dimensions();
-        let mut scattered = if self.hinted {
-            problem.initial_guesses()
-        } else {
-            Vec::new()
-        };
+        let mut scattered = problem.initial_guesses();
         scattered.extend((0..self.scattered).map(|k| scatter(k, dimensions, &mut random)));
-        let values = budget.values(problem, &scattered, self.look);
+        let values = budget.values(problem, &scattered, Fidelity::Fine);
         let mut seen: Vec<Solution> = scattered
             .into_iter()
             .zip(values)
@@ -118,20 +74,11 @@ impl Optimizer for Cmaes {
                 |one| one.point.clone(),
             );
             let larger = 1 << (start / 6).min(4);
-            let share = if self.fair {
-                budget.left().div_ceil(u64::from(self.starts - start))
-            } else {
-                budget.left()
-            };
-            found.push(budget.with_part(share, |part| {
-                self.run(problem, part, &begin, larger, self.look, &mut random)
-            }));
+            found.push(self.run(problem, budget, &begin, larger, &mut random));
             begun.push(begin);
         }
-        // A run may end at a worse point than its start. Quick values are not comparable with fine ones.
-        if found.is_empty() || self.look == Fidelity::Fine {
-            found.extend(seen.into_iter().take(1));
-        }
+        // A run may end at a worse point than its start.
+        found.extend(seen.into_iter().take(1));
         distinct(problem, found)
     }
 }
@@ -156,14 +103,7 @@ impl Optimizer for Descent {
             sigma: self.sigma,
             ..Cmaes::default()
         };
-        let found = strategy.run(
-            problem,
-            budget,
-            &self.from.point,
-            1,
-            Fidelity::Fine,
-            &mut random,
-        );
+        let found = strategy.run(problem, budget, &self.from.point, 1, &mut random);
         let best = if found.value < self.from.value {
             found
         } else {
@@ -181,10 +121,9 @@ impl Cmaes {
         budget: &Budget<'_>,
         begin: &[f64],
         larger: usize,
-        look: Fidelity,
         random: &mut ChaCha8Rng,
     ) -> Solution {
-        let mut evolution = Evolution::new(self, problem, begin, larger, look);
+        let mut evolution = Evolution::new(self, problem, begin, larger);
         for number in 1..=600_i32 {
             let generation = evolution.draw(budget, random);
             evolution.keep_best(&generation);
@@ -196,7 +135,7 @@ impl Cmaes {
                 break;
             }
         }
-        evolution.finish(budget)
+        evolution.best
     }
 }
 
@@ -206,7 +145,7 @@ struct Rates {
     population: usize,
     /// The weights of the better half.
     weights: Vec<f64>,
-    /// The weights of the worse half, none above 0; empty unless the strategy is active.
+    /// The weights of the worse half, none above 0.
     worse: Vec<f64>,
     effective: f64,
     c_sigma: f64,
@@ -219,22 +158,17 @@ struct Rates {
 }
 
 impl Rates {
-    /// Returns the constants for a number of dimensions, by the tutorial's Table 1.
-    fn new(strategy: &Cmaes, n: usize, larger: usize) -> Self {
+    /// Returns the constants for a number of dimensions and the points of a generation.
+    fn new(n: usize, population: usize) -> Self {
         let of_n = n as f64;
-        let usual_population = (4 + libm::floor(3.0 * libm::log(of_n)) as usize).max(6);
-        let population = strategy.population.unwrap_or(usual_population) * larger;
         let parents = population / 2;
         let raw = |i: usize| raw_weight(population, i);
         let sum: f64 = (0..parents).map(raw).sum();
         let weights: Vec<f64> = (0..parents).map(|i| raw(i) / sum).collect();
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
-        // With few evaluations the step adapts faster than by the table; `./ci.sh placement` measures this choice.
-        let slower = if strategy.active { 3.0 } else { 5.0 };
-        let c_sigma = (effective + 2.0) / (of_n + effective + slower);
+        // 3.0 and 0.25 instead of the table's 5.0 and 0.0: faster.
+        let c_sigma = (effective + 2.0) / (of_n + effective + 3.0);
         let c_1 = 2.0 / ((of_n + 1.3) * (of_n + 1.3) + effective);
-        // For the same reason the covariance adapts faster.
-        let quarter = if strategy.active { 0.25 } else { 0.0 };
         let rates = Self {
             of_n,
             population,
@@ -248,17 +182,15 @@ impl Rates {
             c_c: (4.0 + effective / of_n) / (of_n + 4.0 + 2.0 * effective / of_n),
             c_1,
             c_mu: (1.0 - c_1).min(
-                2.0 * (quarter + effective - 2.0 + 1.0 / effective)
+                2.0 * (0.25 + effective - 2.0 + 1.0 / effective)
                     / ((of_n + 2.0) * (of_n + 2.0) + effective),
             ),
             usual: libm::sqrt(of_n) * (1.0 - 1.0 / (4.0 * of_n) + 1.0 / (21.0 * of_n * of_n)),
         };
-        let worse = if strategy.active {
-            rates.worse_weights()
-        } else {
-            Vec::new()
-        };
-        Self { worse, ..rates }
+        Self {
+            worse: rates.worse_weights(),
+            ..rates
+        }
     }
 
     /// Returns the weights of the worse half, with the tutorial's bounds.
@@ -323,7 +255,6 @@ impl Generation {
 struct Evolution<'a> {
     problem: &'a dyn Problem,
     rates: Rates,
-    look: Fidelity,
     /// See [`Cmaes::settled`].
     flat: f64,
     mean: DVector<f64>,
@@ -338,18 +269,11 @@ struct Evolution<'a> {
 
 impl<'a> Evolution<'a> {
     /// Creates the state before the first generation.
-    fn new(
-        strategy: &Cmaes,
-        problem: &'a dyn Problem,
-        begin: &[f64],
-        larger: usize,
-        look: Fidelity,
-    ) -> Self {
+    fn new(strategy: &Cmaes, problem: &'a dyn Problem, begin: &[f64], larger: usize) -> Self {
         let n = problem.dimensions();
         Self {
             problem,
-            rates: Rates::new(strategy, n, larger),
-            look,
+            rates: Rates::new(n, strategy.population * larger),
             flat: strategy.settled,
             mean: DVector::from_column_slice(begin),
             sigma: strategy.sigma,
@@ -380,7 +304,7 @@ impl<'a> Evolution<'a> {
             .iter()
             .map(|step| folded(self.problem, (&self.mean + step * self.sigma).as_slice()))
             .collect();
-        let values = budget.values(self.problem, &points, self.look);
+        let values = budget.values(self.problem, &points, Fidelity::Fine);
         let mut order: Vec<usize> = (0..population).collect();
         order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
         Generation {
@@ -458,39 +382,16 @@ impl<'a> Evolution<'a> {
         self.covariance = (&covariance + covariance.transpose()) * 0.5;
     }
 
-    /// Returns `true` if the values of a generation are too similar to continue. Continues with fine values if quick
-    /// ones no longer resolve the differences, from a slightly larger spread.
+    /// Returns `true` if the values of a generation are too similar to continue.
     fn has_ended(&mut self, generation: &Generation) -> bool {
         let Generation { order, values, .. } = generation;
         let (first, last) = (order[0], order[self.rates.weights.len().max(1) - 1]);
         let flat = values[last] - values[first] <= self.flat * values[first].abs();
         self.settled = if flat { self.settled + 1 } else { 0 };
         let widest = self.sigma * generation.lengths.max();
-        match self.look {
-            Fidelity::Quick if self.settled >= 2 || widest < QUICK => {
-                self.look = Fidelity::Fine;
-                self.settled = 0;
-                self.sigma *= 2.0;
-                self.best.value = f64::INFINITY;
-                false
-            }
-            Fidelity::Fine => self.settled >= 3 || !(widest >= 1e-9),
-            Fidelity::Quick => false,
-        }
-    }
-
-    /// Returns the best point with its fine value.
-    fn finish(mut self, budget: &Budget<'_>) -> Solution {
-        if self.look == Fidelity::Quick {
-            let point = core::slice::from_ref(&self.best.point);
-            self.best.value = budget.values(self.problem, point, Fidelity::Fine)[0];
-        }
-        self.best
+        self.settled >= 3 || !(widest >= 1e-9)
     }
 }
-
-/// A run continues with fine evaluations if its widest standard deviation, as a share of the cube, is below this.
-const QUICK: f64 = 3e-3;
 
 /// Returns a point of an evenly spread sequence: Halton's, shifted at random.
 fn scatter(index: u32, dimensions: usize, random: &mut ChaCha8Rng) -> Vec<f64> {

@@ -119,14 +119,6 @@ impl<'a> Budget<'a> {
         values
     }
 
-    /// Returns the result of a search with at most `most` of these evaluations.
-    pub(super) fn with_part<T>(&self, most: u64, search: impl FnOnce(&Budget<'_>) -> T) -> T {
-        let part = Budget::new(most.min(self.left()), self.progress);
-        let found = search(&part);
-        self.spent.fetch_add(part.spent(), Ordering::Relaxed);
-        found
-    }
-
     fn spend(&self, count: u64) {
         self.spent.fetch_add(count, Ordering::Relaxed);
         (self.progress)(count);
