@@ -66,17 +66,24 @@ pub fn to_world(goal: Pose, q: Pose) -> Pose {
 }
 
 /// Returns the factor by which `pose_set` must be scaled for `pose` to lie on its border: at most 1 inside. The yaw error is a real number of
-/// which the pose is the wrap: the least over up to four turns.
+/// which the pose is the wrap: the least over all turns.
 pub fn level(pose_set: &PoseSet, estimate: Pose, pose: Pose) -> f64 {
+    let [x, y] = [pose[0] - estimate[0], pose[1] - estimate[1]];
     let apart = wrap(pose[2] - estimate[2]);
-    let turns = (-4..=4).map(|k| apart + TAU * f64::from(k));
-    turns
-        .map(|turned| {
-            level_of(
-                pose_set,
-                [pose[0] - estimate[0], pose[1] - estimate[1], turned],
-            )
-        })
+    // The level is convex in the yaw error: the turns next to the likeliest yaw error have the least.
+    let likeliest = match pose_set {
+        PoseSet::Bounded { .. } => 0.0,
+        PoseSet::Gaussian { cov, .. } => {
+            let l = cholesky(cov);
+            let z0 = x / l[0][0];
+            let z1 = (y - l[1][0] * z0) / l[1][1];
+            l[2][0] * z0 + l[2][1] * z1
+        }
+    };
+    let middle = ((likeliest - apart) / TAU).round();
+    [-1.0, 0.0, 1.0]
+        .map(|more| level_of(pose_set, [x, y, apart + TAU * (middle + more)]))
+        .into_iter()
         .fold(f64::INFINITY, f64::min)
 }
 
