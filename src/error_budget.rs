@@ -67,8 +67,8 @@ impl Search {
     pub fn case(&mut self, bound: f64, found: f64) {
         let ratio = found / bound;
         self.count += 1;
-        // An error that is not a number counts as the largest one.
-        if !(ratio <= self.ratio) {
+        // An error that is not a number is the largest one, and stays so.
+        if !self.ratio.is_nan() && !(ratio <= self.ratio) {
             (self.ratio, self.bound, self.found) = (ratio, bound, found);
         }
     }

@@ -395,6 +395,61 @@ fn rounding_of_carried_noise() {
     });
 }
 
+/// Noise that is turned into world axes: the entry on the diagonal that its row of errors needs.
+#[test]
+fn noise_in_world_axes() {
+    let mut random = Random::new(13);
+    let mut search = Search::new();
+    for _ in 0..test_share(50_000, 20) {
+        let size = random.log_within(1.0, 5e8);
+        let other = random.log_within(1.0, 1e7);
+        // Of roots, so that no direction has a variance below zero.
+        let mut root = |size: f64| [0; 3].map(|_| random.within(-1.0, 1.0) * size);
+        let (x, y, t) = (root(size), root(size), root(other));
+        let dot = |a: [f64; 3], b: [f64; 3]| (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) as i64;
+        let noise = PathNoise {
+            xx: dot(x, x) + 1,
+            xy: dot(x, y),
+            yy: dot(y, y) + 1,
+            xt: dot(x, t),
+            yt: dot(y, t),
+            tt: dot(t, t) + 1,
+        };
+        let yaw = BinaryAngle((random.unit() * 4_294_967_296.0) as u32);
+        let found = turned(&noise, yaw.cos_sin_q30());
+        let half_turns = &Exact::pi() * &Exact::dyadic(1, 31);
+        let [c, s] = (&half_turns * &Exact::int(yaw.0)).cos_sin();
+        let n = |v: i64| Exact::int(v);
+        let [xx, xy, yy] = [noise.xx, noise.xy, noise.yy].map(n);
+        let (cc, ss, cs) = (&c * &c, &s * &s, &c * &s);
+        let twice = &(&cs * &xy) + &(&cs * &xy);
+        let exact = [
+            &(&(&cc * &xx) - &twice) + &(&ss * &yy),
+            &(&(&ss * &xx) + &twice) + &(&cc * &yy),
+            n(noise.tt),
+            &(&(&cs * &xx) - &(&cs * &yy)) + &(&(&cc - &ss) * &xy),
+            &(&c * &n(noise.xt)) - &(&s * &n(noise.yt)),
+            &(&s * &n(noise.xt)) + &(&c * &n(noise.yt)),
+        ];
+        let found = [found.xx, found.yy, found.tt, found.xy, found.xt, found.yt];
+        let off: Vec<f64> = exact
+            .iter()
+            .zip(found)
+            .map(|(exact, found)| (&n(found) - exact).to_f64())
+            .collect();
+        for [own, one, other] in [[0, 3, 4], [1, 3, 5], [2, 4, 5]] {
+            // An entry that is smaller than the exact one has no bound at all.
+            let bound = if off[own] > 0.0 { off[own] } else { 0.0 };
+            search.case(bound, off[one].abs() + off[other].abs());
+        }
+    }
+    search.report(&Row {
+        name: "track: noise in world axes, of a row",
+        unit: "um^2, um 2^-24 turn, 2^-48 turn^2",
+        looseness: None,
+    });
+}
+
 /// The circle of a wrong heading leaves its tangent, for every heading's error.
 #[test]
 fn curvature_of_a_heading_error() {

@@ -124,6 +124,8 @@ struct Fix {
 pub struct Tracker<const N: usize> {
     settings: TrackerSettings,
     noise: Noise,
+    /// The longest time of an increment that cannot be mistaken for another.
+    longest_ms: u32,
     /// Increments from the oldest to the newest.
     ring: Ring<N>,
     /// The stamp at which the oldest increment of the ring begins.
@@ -159,6 +161,7 @@ impl<const N: usize> Tracker<N> {
         let noise = Noise::of(&settings.errors)?;
         (are_times && settings.trust.is_valid()).then_some(Self {
             settings,
+            longest_ms: noise.longest_ms(settings.bounds),
             noise,
             ring: Ring::new(),
             begins_ms: 0,
@@ -188,7 +191,7 @@ impl<const N: usize> Tracker<N> {
         } else if begins_ms != before || !(passed <= self.settings.maximum_gap_ms) {
             // It began at another time: an increment was lost in between.
             Some(Reason::OdometryGap)
-        } else if !step.is_within(self.settings.bounds, passed) {
+        } else if !(passed <= self.longest_ms && step.is_within(self.settings.bounds, passed)) {
             Some(Reason::OdometryJump)
         } else {
             None

@@ -1,6 +1,7 @@
 //! The errors of an odometry, as numbers that a controller can add up.
 
-use crate::num::{Float, Rounding, wide};
+use crate::motion::MotionBounds;
+use crate::num::{Float, Rounding, sqrt_ceil, wide};
 
 /// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip
 /// is a bound: the share of every movement that may be wrong in the worst direction. A length is that of the path, not of the line between
@@ -61,6 +62,11 @@ fn square_q40(deviation: f64) -> Option<u128> {
     let up = u64::try_from(up).ok().filter(|up| *up < 1 << 30)?;
     Some(u128::from(up).wrapping_mul(u128::from(up)))
 }
+
+/// Readings below this, to either side, cannot be taken for a turn of at most an eighth of a turn, 2^-24 turn: 7/8 of a turn.
+const TOLD_APART: u64 = 7 << 21;
+/// The deviations of a heading's noise that a reading may be off: the largest root of a squared radius.
+const DEVIATIONS: u64 = 16;
 
 /// One, as a share.
 const WHOLE: u64 = 1 << 16;
@@ -138,6 +144,39 @@ impl Noise {
         [up(plane), up(turn)]
     }
 
+    /// Returns the longest time of an increment, milliseconds, whose turn cannot be read as another that differs by whole turns: the robot's largest
+    /// turn, with its slip and its noise, stays below [`TOLD_APART`]. Zero if none is short enough.
+    pub fn longest_ms(&self, bounds: MotionBounds) -> u32 {
+        let mut longest = 0;
+        let mut bit = 1 << 30;
+        while bit > 0 {
+            if self.tells_apart(bounds, longest | bit) {
+                longest |= bit;
+            }
+            bit >>= 1;
+        }
+        longest
+    }
+
+    fn tells_apart(&self, bounds: MotionBounds, ms: u32) -> bool {
+        // A millisecond for the rounding of both stamps.
+        let most = bounds.within(ms.saturating_add(1));
+        let turn_q24 = most.yaw_q24().unsigned_abs();
+        // A length beyond 16 m is no increment.
+        let Some(length_q8) = most.translation_um().unsigned_abs().checked_mul(1 << 8) else {
+            return false;
+        };
+        let [_, slipped] = self.slip(length_q8.into(), turn_q24.into());
+        let [_, variance] = self.variances(length_q8, turn_q24, ms.saturating_add(1));
+        let noise = sqrt_ceil(variance.unsigned_abs())
+            .unsigned_abs()
+            .saturating_mul(DEVIATIONS);
+        u64::from(turn_q24)
+            .saturating_add(slipped)
+            .saturating_add(noise)
+            < TOLD_APART
+    }
+
     /// Returns the bound of the slip on a path whose length has the unit 2^-8 um: micrometres and 2^-24 turn, rounded up.
     pub fn slip(&self, length_q8: u64, turned_q24: u64) -> [u64; 2] {
         let up = |per: u64, of: u64, down: u32| {
@@ -159,58 +198,11 @@ impl Noise {
 }
 
 #[cfg(test)]
+mod error_budget;
+
+#[cfg(test)]
 mod tests {
     use super::*;
-    use core::f64::consts::TAU;
-
-    #[test]
-    fn variances_are_those_of_the_deviations_rounded_up() {
-        let errors = OdometryErrors {
-            m_per_sqrt_m: 0.02,
-            rad_per_sqrt_rad: 0.05,
-            rad_per_sqrt_m: 0.03,
-            m_per_sqrt_s: 0.001,
-            rad_per_sqrt_s: 0.002,
-            slip: 0.05,
-            turn_slip: 0.1,
-            turn_slip_per_m: 0.01,
-        };
-        let noise = Noise::of(&errors).unwrap();
-        let q24 = TAU / 16_777_216.0;
-        for (metres, radians, seconds) in [
-            (0.006f64, 0.02f64, 0.02f64),
-            (1.0, 1.5, 4.0),
-            (3.9, 3.0, 60.0),
-        ] {
-            let [plane, turn] = noise.variances(
-                (metres * 256e6) as u32,
-                (radians / q24) as u32,
-                (seconds * 1e3) as u32,
-            );
-            let (metres, radians) = (metres / 0.95, radians / 0.9);
-            let exact = (4e-4 * metres + 1e-6 * seconds) * 1e12;
-            assert!(
-                plane as f64 >= exact * 0.99999 && (plane as f64) < exact * 1.001 + 100.0,
-                "{plane} {exact}"
-            );
-            let slipped = 0.01 * metres / 0.9;
-            let exact =
-                (25e-4 * (radians + slipped) + 9e-4 * metres + 4e-6 * seconds) / (q24 * q24);
-            assert!(
-                turn as f64 >= exact * 0.99999 && (turn as f64) < exact * 1.001 + 3000.0,
-                "{turn} {exact}"
-            );
-            let (metres, radians) = (metres * 0.95, radians * 0.9);
-            let [length, turn] = noise.slip((metres * 256e6) as u64, (radians / q24) as u64);
-            let exact = 0.05 / 0.95 * 1e6 * metres;
-            assert!((length as f64 - exact).abs() < 0.001 * exact + 2.0);
-            let exact = (0.1 / 0.9 * radians + 0.01 / 0.9 / 0.95 * metres) / q24;
-            assert!(
-                (turn as f64 - exact).abs() < 0.001 * exact + 3.0,
-                "{turn} {exact}"
-            );
-        }
-    }
 
     #[test]
     fn invalid_errors_are_refused() {

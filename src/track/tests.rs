@@ -294,11 +294,11 @@ fn late_fix_is_carried_along_increments_since_its_stamp() {
 /// A robot that drives a circle of half a metre for 3 s turns by 6.0 rad, which reads as -0.28 rad and 14 cm.
 #[test]
 fn increment_in_which_the_robot_may_turn_around_is_a_jump() {
-    let tried = |ms: u32| {
+    let tried = |errors: OdometryErrors, ms: u32| {
         let settings = TrackerSettings {
             bounds: MotionBounds::of_mm_mrad(1_000, 0, 2_000),
             maximum_gap_ms: 10_000,
-            ..settings(ERRORS)
+            ..settings(errors)
         };
         let mut tracker = Tracker::<8>::new(settings).unwrap();
         let start = Increment::of(0.0, 0.0, 0.0, [0, 20]).unwrap();
@@ -306,9 +306,25 @@ fn increment_in_which_the_robot_may_turn_around_is_a_jump() {
         tracker.odometry(Increment::of(0.141, 0.0, -0.283, [20, 20 + ms]).unwrap())
     };
     // 7/8 of a turn takes 2,748.9 ms; stamps are rounded to one.
-    assert_eq!(tried(2_747), Ok(()));
-    assert_eq!(tried(2_748), Err(Reason::OdometryJump));
-    assert_eq!(tried(3_000), Err(Reason::OdometryJump));
+    assert_eq!(tried(OdometryErrors::NONE, 2_747), Ok(()));
+    assert_eq!(
+        tried(OdometryErrors::NONE, 2_748),
+        Err(Reason::OdometryJump)
+    );
+    assert_eq!(tried(ERRORS, 3_000), Err(Reason::OdometryJump));
+    // The odometry reads more than the robot turns: by a tenth, by 0.2 rad per metre, by 16 times 0.01 rad per root of a second.
+    let mut errors = OdometryErrors {
+        turn_slip: 0.1,
+        ..OdometryErrors::NONE
+    };
+    assert_eq!(tried(errors, 2_472), Ok(()));
+    assert_eq!(tried(errors, 2_475), Err(Reason::OdometryJump));
+    errors.turn_slip_per_m = 0.2;
+    assert_eq!(tried(errors, 2_247), Ok(()));
+    assert_eq!(tried(errors, 2_249), Err(Reason::OdometryJump));
+    errors.rad_per_sqrt_s = 0.01;
+    assert_eq!(tried(errors, 2_150), Ok(()));
+    assert_eq!(tried(errors, 2_155), Err(Reason::OdometryJump));
 }
 
 /// The share of an arc is as long as the arc's, though its own turn is smaller.

@@ -15,7 +15,7 @@
 //! | w | m, at most l t / 12 | at most (l t)^2 / 720 |
 //!
 //! What is added here has q / 2 at the start, so a lever c / 2 and a variance c^2 / 4, and besides h on the heading and p on each axis. It is not
-//! smaller if `p >= 1.5 m^2 q + (l t)^2 q / 720 + m^2 q^2 / h`. With `h = q t / 4` and t at most an eighth of a turn, `p = q l^2 t / 16` is enough.
+//! smaller if `p >= 2.5 m^2 q + (l t)^2 q / 720 + m^2 q^2 / h`. With `h = q t / 4` and t at most an eighth of a turn, `p = q l^2 t / 16` is enough.
 
 use super::increment::Step;
 use super::model::Noise;

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 const POSES_OF_GROUP: usize = 4_000;
 /// Largest number of tried poses per sampled pose.
 const TRIES: usize = 100;
-/// A group with fewer sampled poses is not reported.
+/// A group with fewer sampled poses is reported only if the table holds none of them.
 const FEWEST: usize = 100;
 /// Number of equal parts of each range of a group, to find the place where most poses are missing.
 const PLACES: usize = 4;
@@ -49,7 +49,7 @@ pub struct GroupCoverage {
 impl Coverage {
     /// The number of poses of the set that are decided, unless the set is too thin.
     pub const POSES: usize = 20_000;
-    /// The least share without a warning: of the set, and of each of its groups.
+    /// The least share of the set without a warning.
     pub const LEAST: f64 = 0.98;
     /// The least share of a group without a warning.
     pub const LEAST_OF_GROUP: f64 = 0.9;
@@ -66,7 +66,7 @@ impl fmt::Display for Coverage {
         let percent = |share: f64| 100.0 * share;
         write!(
             f,
-            "the table holds {:.1} % of the success set",
+            "the table holds {:.1} % of the success set within its extent",
             percent(self.share)
         )?;
         let GroupCoverage { name, share, place } = &self.worst;
@@ -135,7 +135,9 @@ pub fn coverage(table: &Table<'_>, success: &SuccessSet) -> Coverage {
         };
         if is_whole {
             whole = Some((poses.len(), own));
-        } else if poses.len() >= FEWEST && worst.as_ref().is_none_or(|worst| share < worst.share) {
+        } else if (poses.len() >= FEWEST || count == 0 && !poses.is_empty())
+            && worst.as_ref().is_none_or(|worst| share < worst.share)
+        {
             worst = Some(own);
         }
     }

@@ -46,8 +46,8 @@ impl Path {
             ..OdometryErrors::NONE
         };
         if rng.chance(0.1) {
-            // Many steps just below the middle of two units.
-            let step = (rng.log_within(1.0, 300.0).round() + 0.4999) * 1e-6;
+            // Many steps just below the middle of two units of 2^-8 um.
+            let step = (rng.log_within(256.0, 76_800.0).round() + 0.4999) / 256e6;
             let count = 200 + rng.below(800);
             return Self {
                 twists: vec![[step, 0.0, 0.0]; count],

@@ -194,7 +194,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
             worst.instructions_m0_plus(),
         ))?;
         print(&format_args!(
-            "it holds {:.1} % of the success set, by {} poses of the extent",
+            "it holds {:.1} % of the success set within its extent, by {} poses",
             100.0 * covered.share,
             covered.poses,
         ))?;

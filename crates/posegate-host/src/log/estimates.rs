@@ -236,12 +236,14 @@ impl<R: Read> Iterator for Rows<R> {
     }
 }
 
-/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. A time up to a microsecond below a
-/// whole millisecond is that millisecond: decimals such as 1.001 s are not floats. `None` if the number is not finite or too large; the
+/// Converts seconds to the controller's wrapping millisecond clock: `floor(1000 t) mod 2^32`. A time that is below a
+/// whole millisecond by the rounding of a float is that millisecond: decimals such as 1.001 s are not floats. `None` if the number is not finite or too large; the
 /// caller treats the stamp as stale.
 #[must_use]
 pub fn clock_ms(seconds: f64) -> Option<u32> {
-    let ms = libm::floor(seconds * 1000.0 + 1e-3);
+    let ms = seconds * 1000.0;
+    // The decimal and the product are rounded by half a unit each; a unit is at most 2^-52 of the value.
+    let ms = libm::floor(ms + libm::fabs(ms) * f64::EPSILON * 2.0);
     (ms.abs() < 9e15).then(|| ms.rem_euclid(4_294_967_296.0) as u32)
 }
 
