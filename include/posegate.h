@@ -1369,7 +1369,7 @@ typedef struct posegate_tracker_settings {
 
 /**
  * A movement of the odometry since the previous increment, in the robot's axes at its start. The robot keeps its speeds ahead, to the left and
- * of its turn meanwhile; at least the direction of movement leaves the range between its directions at both ends by at most 0.014 rad.
+ * of its turn meanwhile.
  */
 typedef struct posegate_increment {
     /**
