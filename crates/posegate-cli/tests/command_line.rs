@@ -75,7 +75,10 @@ fn table_build_warns_of_what_table_lacks() {
     let (out, err) = build(large, 0.02, "--json");
     assert!(covered(&out) > 0.99 && err.is_empty(), "{out} {err}");
     let (out, _) = build(large, 0.02, "");
-    assert!(out.contains("% of the success set within its extent, by 2"), "{out}");
+    assert!(
+        out.contains("% of the success set within its extent, by 2"),
+        "{out}"
+    );
     // Cells of 10 cm: the strips of 3 cm and more at the border are lost.
     let (out, err) = build(large, 0.1, "--json --layout grid");
     assert!((covered(&out) - 1.0 / 1.03).abs() < 0.01, "{out}");
