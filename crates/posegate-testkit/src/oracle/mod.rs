@@ -69,35 +69,17 @@ pub fn to_world(goal: Pose, q: Pose) -> Pose {
 /// which the pose is the wrap: the least over all turns.
 pub fn level(pose_set: &PoseSet, estimate: Pose, pose: Pose) -> f64 {
     let [x, y] = [pose[0] - estimate[0], pose[1] - estimate[1]];
-    let apart = wrap(pose[2] - estimate[2]);
-    // The level is convex in the yaw error: the turns next to the likeliest yaw error have the least.
-    let likeliest = match pose_set {
-        PoseSet::Bounded { .. } => 0.0,
-        PoseSet::Gaussian { cov, .. } => {
+    let apart = pose[2] - estimate[2];
+    match pose_set {
+        PoseSet::Bounded { translation, yaw } => {
+            (x.hypot(y) / translation).max(wrap(apart).abs() / yaw)
+        }
+        PoseSet::Gaussian { cov, r2 } => {
+            // Forward substitution with the Cholesky factor: |L^-1 e|. The turn that is nearest to the likeliest yaw error has the least.
             let l = cholesky(cov);
             let z0 = x / l[0][0];
             let z1 = (y - l[1][0] * z0) / l[1][1];
-            l[2][0] * z0 + l[2][1] * z1
-        }
-    };
-    let middle = ((likeliest - apart) / TAU).round();
-    [-1.0, 0.0, 1.0]
-        .map(|more| level_of(pose_set, [x, y, apart + TAU * (middle + more)]))
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
-}
-
-fn level_of(pose_set: &PoseSet, e: [f64; 3]) -> f64 {
-    match pose_set {
-        PoseSet::Bounded { translation, yaw } => {
-            (e[0].hypot(e[1]) / translation).max(e[2].abs() / yaw)
-        }
-        PoseSet::Gaussian { cov, r2 } => {
-            // Forward substitution with the Cholesky factor: |L^-1 e|.
-            let l = cholesky(cov);
-            let z0 = e[0] / l[0][0];
-            let z1 = (e[1] - l[1][0] * z0) / l[1][1];
-            let z2 = (e[2] - l[2][0] * z0 - l[2][1] * z1) / l[2][2];
+            let z2 = wrap(apart - l[2][0] * z0 - l[2][1] * z1) / l[2][2];
             ((z0 * z0 + z1 * z1 + z2 * z2) / r2).sqrt()
         }
     }
