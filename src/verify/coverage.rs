@@ -17,8 +17,6 @@ use rayon::prelude::*;
 const POSES_OF_GROUP: usize = 4_000;
 /// Largest number of tried poses per sampled pose.
 const TRIES: usize = 100;
-/// A group with fewer sampled poses is reported only if the table holds none of them.
-const FEWEST: usize = 100;
 /// Number of equal parts of each range of a group, to find the place where most poses are missing.
 const PLACES: usize = 4;
 /// The pose-sets that are decided: m, rad.
@@ -135,9 +133,7 @@ pub fn coverage(table: &Table<'_>, success: &SuccessSet) -> Coverage {
         };
         if is_whole {
             whole = Some((poses.len(), own));
-        } else if (poses.len() >= FEWEST || count == 0 && !poses.is_empty())
-            && worst.as_ref().is_none_or(|worst| share < worst.share)
-        {
+        } else if !poses.is_empty() && worst.as_ref().is_none_or(|worst| share < worst.share) {
             worst = Some(own);
         }
     }
