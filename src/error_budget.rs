@@ -95,3 +95,17 @@ impl Search {
         );
     }
 }
+
+/// A case that is not a number fails its row, whatever comes after it.
+#[test]
+#[should_panic(expected = "above")]
+fn case_that_is_not_a_number_stays() {
+    let mut search = Search::new();
+    search.case(0.0, 0.0);
+    search.case(1.0, 0.5);
+    search.report(&Row {
+        name: "a row",
+        unit: "",
+        looseness: None,
+    });
+}

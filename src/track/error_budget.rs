@@ -7,7 +7,6 @@ use super::*;
 use crate::error_budget::{Exact, Random, Row, Search};
 use crate::test_share;
 use core::f64::consts::{PI, TAU};
-use std::vec::Vec;
 
 /// Radians of 2^-24 turn.
 const Q24: f64 = TAU / 16_777_216.0;
@@ -304,6 +303,15 @@ fn noise_along_an_arc() {
     });
 }
 
+/// Returns what is added to the entry on the diagonal of each row, and the errors of the row's other entries. `exact` has xx, yy, yaw-yaw, xy, x-yaw
+/// and y-yaw.
+fn row_errors(found: &PathNoise, exact: &[Exact; 6]) -> [[f64; 2]; 3] {
+    let found = [found.xx, found.yy, found.tt, found.xy, found.xt, found.yt];
+    let off: [f64; 6] = core::array::from_fn(|k| (&Exact::int(found[k]) - &exact[k]).to_f64());
+    [[0, 3, 4], [1, 3, 5], [2, 4, 5]]
+        .map(|[own, one, other]| [off[own], off[one].abs() + off[other].abs()])
+}
+
 /// Products and sums of the carried noise: the errors of a row of the matrix.
 #[test]
 fn rounding_of_carried_noise() {
@@ -370,19 +378,13 @@ fn rounding_of_carried_noise() {
             &xt + &(&a * &halfway),
             &yt + &(&b * &halfway),
         ];
-        let found = way.noise_of_path();
-        let found = [found.xx, found.yy, found.tt, found.xy, found.xt, found.yt];
         // Half of an odd variance stands for the whole.
-        let off: Vec<f64> = exact
-            .iter()
-            .zip(found)
-            .map(|(exact, found)| (&n(found) - exact).to_f64())
-            .collect();
+        let rows = row_errors(&way.noise_of_path(), &exact);
         let most = way::ROUNDED as f64;
-        let mut worst = f64::NEG_INFINITY;
-        for [own, one, other] in [[0, 3, 4], [1, 3, 5], [2, 4, 5]] {
-            worst = worst.max(most - off[own] + off[one].abs() + off[other].abs());
-        }
+        let worst = rows
+            .map(|[own, others]| most - own + others)
+            .into_iter()
+            .fold(f64::NEG_INFINITY, f64::max);
         search.case(most, worst);
         if best.as_ref().is_none_or(|(least, ..)| worst >= *least) {
             best = Some((worst, start, step));
@@ -403,18 +405,8 @@ fn noise_in_world_axes() {
     for _ in 0..test_share(50_000, 20) {
         let size = random.log_within(1.0, 5e8);
         let other = random.log_within(1.0, 1e7);
-        // Of roots, so that no direction has a variance below zero.
-        let mut root = |size: f64| [0; 3].map(|_| random.within(-1.0, 1.0) * size);
-        let (x, y, t) = (root(size), root(size), root(other));
-        let dot = |a: [f64; 3], b: [f64; 3]| (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) as i64;
-        let noise = PathNoise {
-            xx: dot(x, x) + 1,
-            xy: dot(x, y),
-            yy: dot(y, y) + 1,
-            xt: dot(x, t),
-            yt: dot(y, t),
-            tt: dot(t, t) + 1,
-        };
+        let mut row = |size: f64| [0; 3].map(|_| random.within(-1.0, 1.0) * size);
+        let noise = tests::noise_of_rows([row(size), row(size), row(other)]);
         let yaw = BinaryAngle((random.unit() * 4_294_967_296.0) as u32);
         let found = turned(&noise, yaw.cos_sin_q30());
         let half_turns = &Exact::pi() * &Exact::dyadic(1, 31);
@@ -431,16 +423,9 @@ fn noise_in_world_axes() {
             &(&c * &n(noise.xt)) - &(&s * &n(noise.yt)),
             &(&s * &n(noise.xt)) + &(&c * &n(noise.yt)),
         ];
-        let found = [found.xx, found.yy, found.tt, found.xy, found.xt, found.yt];
-        let off: Vec<f64> = exact
-            .iter()
-            .zip(found)
-            .map(|(exact, found)| (&n(found) - exact).to_f64())
-            .collect();
-        for [own, one, other] in [[0, 3, 4], [1, 3, 5], [2, 4, 5]] {
+        for [own, others] in row_errors(&found, &exact) {
             // An entry that is smaller than the exact one has no bound at all.
-            let bound = if off[own] > 0.0 { off[own] } else { 0.0 };
-            search.case(bound, off[one].abs() + off[other].abs());
+            search.case(own.max(0.0), others);
         }
     }
     search.report(&Row {

@@ -8,11 +8,11 @@ use crate::set::Q24_PER_RADIAN_Q52;
 /// detected.
 ///
 /// What the tracker's bounds need of an increment: it is so short that the odometry cannot read 7/8 of a turn meanwhile (else it is refused as a
-/// jump), the turn is at most an eighth of a turn, and the robot keeps its speeds ahead, to the left and of its turn (an arc). The bounds of its
-/// length and slip also hold if the direction of
-/// movement leaves the range between its directions at both ends by at most 0.014 rad in total. The noise of a robot that turns first and then drives
-/// is up to 1.42 times that of the arc for this increment, which counts only if a path has few increments. A robot that drives to and fro within one
-/// increment is longer than any of these bounds.
+/// jump), the turn is at most an eighth of a turn, and the robot keeps its speeds ahead, to the left and of its turn (an arc).
+///
+/// The bounds of its length and slip also hold if the direction of movement leaves the range between its directions at both ends by at most
+/// 0.014 rad in total. A robot that turns first and then drives has up to 1.42 times the deviation that this increment adds; that matters only for a
+/// path of few increments. A robot that drives to and fro within one increment drives farther than these bounds allow for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Increment {

@@ -168,13 +168,12 @@ impl Noise {
         };
         let [_, slipped] = self.slip(length_q8.into(), turn_q24.into());
         let [_, variance] = self.variances(length_q8, turn_q24, ms.saturating_add(1));
+        // Below 2^36.
         let noise = sqrt_ceil(variance.unsigned_abs())
             .unsigned_abs()
-            .saturating_mul(DEVIATIONS);
-        u64::from(turn_q24)
-            .saturating_add(slipped)
-            .saturating_add(noise)
-            < TOLD_APART
+            .wrapping_mul(DEVIATIONS);
+        let besides = u64::from(turn_q24).wrapping_add(noise);
+        slipped < TOLD_APART && slipped.wrapping_add(besides) < TOLD_APART
     }
 
     /// Returns the bound of the slip on a path whose length has the unit 2^-8 um: micrometres and 2^-24 turn, rounded up.

@@ -42,6 +42,20 @@ fn settings(errors: OdometryErrors) -> TrackerSettings {
     }
 }
 
+/// Returns the product of a matrix of three rows with its transpose, rounded, and a little more on the diagonal, so that no direction has a variance
+/// below zero.
+pub(super) fn noise_of_rows([x, y, t]: [[f64; 3]; 3]) -> PathNoise {
+    let dot = |u: [f64; 3], v: [f64; 3]| (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) as i64;
+    PathNoise {
+        xx: dot(x, x) + 3,
+        xy: dot(x, y),
+        yy: dot(y, y) + 3,
+        xt: dot(x, t),
+        yt: dot(y, t),
+        tt: dot(t, t) + 3,
+    }
+}
+
 pub(super) fn fix(pose: [f64; 3], covariance: [[f64; 3]; 3], stamp_ms: u32) -> Report {
     let [x_m, y_m, yaw_rad] = pose;
     Report {

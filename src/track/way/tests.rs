@@ -1,5 +1,6 @@
 use super::*;
 use crate::track::OdometryErrors;
+use crate::track::tests::noise_of_rows;
 use core::f64::consts::TAU;
 use proptest::prelude::*;
 
@@ -66,16 +67,7 @@ proptest! {
     ) {
         let roots = roots.map(|root| root * 2f64.powi(-shrunk));
         let [a, b, c, d, e, f, g, h, i] = roots;
-        let dot = |u: [f64; 3], v: [f64; 3]| (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) as i64;
-        let (x, y, t) = ([a, b, c], [d, e, f], [g, h, i]);
-        let start = PathNoise {
-            xx: dot(x, x) + 3,
-            xy: dot(x, y),
-            yy: dot(y, y) + 3,
-            xt: dot(x, t),
-            yt: dot(y, t),
-            tt: dot(t, t) + 3,
-        };
+        let start = noise_of_rows([[a, b, c], [d, e, f], [g, h, i]]);
         let errors = OdometryErrors { m_per_sqrt_m: 0.01, rad_per_sqrt_m: per_metre, rad_per_sqrt_rad: per_radian, ..OdometryErrors::NONE };
         let noise = Noise::of(&errors).unwrap();
         let mut way = Way { turn: heading, noise: start, ..Way::new(&noise) };

@@ -326,6 +326,8 @@ mod tests {
     #[test]
     fn clock_wraps_at_2_pow_32_ms() {
         assert_eq!(clock_ms(1.2345), Some(1234));
+        // Half a microsecond below a millisecond is no rounding of a float.
+        assert_eq!(clock_ms(1.000_999_5), Some(1000));
         for ms in (0..200_000i64).chain([1_700_000_000_001, 1_700_000_000_999]) {
             let text = format!("{}.{:03}", ms / 1_000, ms % 1_000);
             let seconds: f64 = text.parse().unwrap();
