@@ -68,7 +68,7 @@ impl KnownAnswer {
 /// Decides known pose-sets on a built-in table by both evaluations. A faulty core, or a flipped bit in
 /// code that every decision executes, gives another answer.
 ///
-/// Cost: both evaluations of 19 estimates, 238,953 instructions on a Cortex-M4F (`./ci.sh budgets`). Runs when a gate is made; a main
+/// Cost: both evaluations of 19 estimates, 231,039 instructions on a Cortex-M4F (`./ci.sh budgets`). Runs when a gate is made; a main
 /// loop may call it again.
 ///
 /// # Errors
