@@ -27,6 +27,14 @@ pub fn build(example: &str) -> PathBuf {
 /// # Panics
 /// As [`build`].
 pub fn build_with(example: &str, features: &str) -> PathBuf {
+    build_in(example, features, &[])
+}
+
+/// As [`build_with`], with variables of the compiler's environment.
+///
+/// # Panics
+/// As [`build`].
+pub fn build_in(example: &str, features: &str, environment: &[(&str, &str)]) -> PathBuf {
     demand_target();
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let directory = root.join("target").join("firmware");
@@ -42,6 +50,8 @@ pub fn build_with(example: &str, features: &str) -> PathBuf {
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .env_remove("RUSTC_WRAPPER")
         .env_remove("RUSTC_WORKSPACE_WRAPPER")
+        .env_remove("POSEGATE_FAULT_TABLE")
+        .envs(environment.iter().copied())
         .output()
         .unwrap_or_else(|error| panic!("cargo does not start: {error}"));
     assert!(

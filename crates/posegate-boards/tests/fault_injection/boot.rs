@@ -57,17 +57,20 @@ impl Starts {
             let samples = Sample::all(Lamps::default(), &events);
             samples.len() == CYCLES as usize && samples.iter().all(|s| codes.contains(&s.reason))
         };
-        self.tried += 1;
-        self.opened += u64::from(opened);
-        self.ended += u64::from(ended);
-        self.found += u64::from(latched(&[Reason::CodeDamaged]));
-        self.found_before += u64::from(latched(&[
+        let found = latched(&[Reason::CodeDamaged]);
+        let found_before = latched(&[
             Reason::SelfTestFailed,
             Reason::TableInvalid,
             Reason::MemoryDamaged,
             // A bit of the name or of the digest, in the table or in the settings.
             Reason::WrongTask,
             Reason::WrongSite,
-        ]));
+        ]);
+        self.tried += 1;
+        self.opened += u64::from(opened);
+        self.found += u64::from(found);
+        self.found_before += u64::from(found_before);
+        // A program that ends after the check was latched in every cycle counts as found.
+        self.ended += u64::from(ended && !found && !found_before);
     }
 }

@@ -33,9 +33,10 @@ pub struct Firmware {
 }
 
 impl Firmware {
-    /// Builds an example and, if it has a record for it, seals it.
-    pub fn build(name: &'static str, seals: bool) -> Self {
-        let built = crate::support::build(name);
+    /// Builds an example and, if it has a record for it, seals it. `table` is the one of the schedule, if not the dock's.
+    pub fn build(name: &'static str, seals: bool, table: Option<&str>) -> Self {
+        let table = table.map(|table| ("POSEGATE_FAULT_TABLE", table));
+        let built = crate::support::build_in(name, "firmware", table.as_slice());
         let bytes = std::fs::read(&built).expect("the firmware");
         let directory = tempfile::tempdir().expect("a directory for the firmware");
         let file = directory.path().join(name);

@@ -28,8 +28,8 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Largest allowed share of wrong permits, in percent.
-const GOAL: f64 = 0.5;
+/// Largest allowed share of wrong permits on one piece of facets, in percent. On several pieces together the second evaluation is a spot check.
+const GOAL: f64 = 0.1;
 /// Number of faults of each kind from which on the two firmwares can be distinguished.
 const MANY: u64 = 400;
 /// Number of faults of each kind in the fast suite.
@@ -44,7 +44,7 @@ fn main() -> ExitCode {
     let each = numbers.first().copied().unwrap_or(FEW);
     let seed = numbers.get(1).copied().unwrap_or(1);
 
-    let target = Firmware::build("fault_target", true);
+    let target = Firmware::build("fault_target", true, None);
     let golden = Golden::of(&target);
     faults_take_effect(&target, &golden);
     hangs_are_detected(&target);
@@ -54,12 +54,19 @@ fn main() -> ExitCode {
     }
     let protected = campaign(&target, &golden, each, seed);
     protected.print("", Some(GOAL));
-    let plain = Firmware::build("fault_target_unprotected", false);
+    let of_dock = protected.wrong_percent(None);
+    short |= !reaches_goal(&protected, each);
+    for (table, goal) in [("footprint", Some(GOAL)), ("union", None)] {
+        let target = Firmware::build("fault_target", true, Some(table));
+        let tally = campaign(&target, &Golden::of(&target), each, seed);
+        tally.print(&format!("{table}: "), goal);
+        short |= goal.is_some() && !reaches_goal(&tally, each);
+    }
+    let plain = Firmware::build("fault_target_unprotected", false, None);
     let tally = campaign(&plain, &Golden::of(&plain), each / 4, seed);
     tally.print("unprotected ", None);
-    short |= !(protected.wrong_percent(None) < GOAL);
     // A harness that detects nothing would find no difference here either.
-    if each >= MANY && tally.wrong_percent(None) <= protected.wrong_percent(None) {
+    if each >= MANY && tally.wrong_percent(None) <= of_dock {
         eprintln!("the unprotected sample does no worse: the harness does not see");
         short = true;
     }
@@ -68,6 +75,27 @@ fn main() -> ExitCode {
     } else {
         ExitCode::SUCCESS
     }
+}
+
+/// Returns `true` if the share of wrong permits is at most [`GOAL`]. A few faults cannot show such a share: of them, as many may permit wrongly as
+/// a share at the goal exceeds less than once in a hundred samples. (One in 60 is exceeded once in 580.)
+fn reaches_goal(tally: &Tally, each: u64) -> bool {
+    if each >= MANY {
+        return tally.wrong_percent(None) <= GOAL;
+    }
+    let count = each * Kind::ALL.len() as u64;
+    let share = GOAL / 100.0;
+    let chances = (0..=count).scan((1.0 - share).powf(count as f64), |chance, k| {
+        let this = *chance;
+        *chance *= (count - k) as f64 / (k + 1) as f64 * share / (1.0 - share);
+        Some(this)
+    });
+    let within = chances.scan(0.0, |sum, chance| {
+        *sum += chance;
+        Some(*sum)
+    });
+    let most = within.take_while(|sum| *sum < 0.99).count();
+    tally.wrong_percent(None) * count as f64 <= 100.0 * most as f64 + 1e-9
 }
 
 /// Injects faults whose effect is known, because an injection without effect would find nothing.
