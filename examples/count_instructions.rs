@@ -60,11 +60,8 @@ mod firmware {
     /// Facets in several pieces: the task `see-bay` of `sites/loading-bay.toml`, and a corner that a robot passes.
     static SEE_BAY: &[u8] = include_bytes!("../tests/data/see-bay.posegate");
     static CORNER: &[u8] = include_bytes!("../tests/data/corner.posegate");
-    /// Cells of the whole circle, and cells with facets over headings about half a turn.
+    /// Cells of the whole circle.
     static WHOLE_CIRCLE: &[u8] = include_bytes!("../tests/data/whole-circle.posegate");
-    /// A narrow band of cells, in which each row of a set along the band needs both of its tests.
-    static DIAGONAL: &[u8] = include_bytes!("../tests/data/diagonal.posegate");
-    static OVER_180: &[u8] = include_bytes!("../tests/data/over-180.posegate");
 
     /// Iterations of a loop that checks the whole measurement, and the allowed cost of its call.
     const KNOWN_TURNS: u32 = 400;
@@ -183,10 +180,6 @@ mod firmware {
         0.453766, 0.539741, 0.431277, 0.024601, 0.014985, 0.164541, 0.554702, 0.520781, 0.305119,
         0.770215,
     ];
-    const DEAR_OVER_180: Genes = [
-        0.941321, 0.636862, 0.996515, 0.202265, 0.270857, 0.281001, 0.465994, 0.909536, 0.351705,
-        0.404068,
-    ];
     const DEAR_WHOLE_CIRCLE: Genes = [
         0.335759, 0.363156, 0.468712, 0.004586, 0.000000, 0.000000, 0.015874, 0.626499, 0.409079,
         0.925321,
@@ -235,22 +228,20 @@ mod firmware {
             let mut cost = counter
                 .count(|| decide(black_box(table), black_box(&set)))?
                 .0;
+            // A robot that moves: the set is grown by 1 to 128 mm and by 0.09 to 11 degrees.
             let mut movement = number % 64;
-            if by_facets {
-                // A robot that moves: the set is grown by 1 to 128 mm and by 0.09 to 11 degrees.
-                if number >= random && number % 2 != 0 {
-                    movement = best_movement;
-                }
-                let moved = set.grown(Growth::new(
-                    1_000 << (movement % 8),
-                    4_096 << (movement / 8),
-                ));
-                let own = counter
-                    .count(|| decide(black_box(table), black_box(&moved)))?
-                    .0;
-                if own > cost {
-                    (set, cost) = (moved, own);
-                }
+            if number >= random && number % 2 != 0 {
+                movement = best_movement;
+            }
+            let moved = set.grown(Growth::new(
+                1_000 << (movement % 8),
+                4_096 << (movement / 8),
+            ));
+            let own = counter
+                .count(|| decide(black_box(table), black_box(&moved)))?
+                .0;
+            if own > cost {
+                (set, cost) = (moved, own);
             }
             let is_highest = search.found(cost);
             if is_highest {
@@ -375,43 +366,6 @@ mod firmware {
         );
         if highest > most {
             return Err("a run costs more than its price in the table's worst case");
-        }
-        Ok(())
-    }
-
-    /// Decides sets along a diagonal band of cells, where every row needs both of its tests.
-    fn along_a_band(counter: &mut Counter, table: &Table<'_>) -> Result<(), Failure> {
-        let goal_pose = table.goal().pose;
-        let estimate = Estimate {
-            x_m: f64::from(goal_pose.x_um) * 1e-6,
-            y_m: f64::from(goal_pose.y_um) * 1e-6,
-            yaw_rad: 0.0,
-        };
-        let yaw: f64 = 2.4 * PI / 180.0;
-        for (name, short) in [
-            ("decide diagonal, thin set", 0.01),
-            ("decide diagonal, thick set", 0.02),
-        ] {
-            let (mean, half) = (0.5 * (0.16 + short * short), 0.5 * (0.16 - short * short));
-            let c = 0.2 * short * yaw;
-            let covariance = [[mean, half, c], [half, mean, -c], [c, -c, yaw * yaw]];
-            let set = PoseSet::gaussian(estimate, covariance, table.radius_squared())
-                .map_err(|_| "a set along the band was refused")?;
-            let cost = counter.count(|| decide(black_box(table), black_box(&set)))?;
-            let worst = table.worst_case();
-            let bound = u64::from(if M4F {
-                worst.instructions_m4f()
-            } else {
-                worst.instructions_m0_plus()
-            });
-            counter.line("", name, cost.0, "instructions", Some(bound));
-            if cost.1 != Decision::Inside {
-                return Err("the band does not hold a set along it");
-            }
-            if cost.0 > bound {
-                return Err("a decision costs more than the table's worst case");
-            }
-            runs(counter, name, table, &set)?;
         }
         Ok(())
     }
@@ -642,14 +596,8 @@ mod firmware {
         let _ = counter.print("decide whole circle, every heading, ellipsoid", || {
             decide(black_box(&circle), black_box(&narrow))
         })?;
-        along_a_band(&mut counter, &parse(DIAGONAL)?)?;
         for (name, bytes, about) in [
             ("decide see-t7 grid", SEE_T7_GRID, (ABOUT, DEAR_SEE_T7_GRID)),
-            (
-                "decide over-180 both",
-                OVER_180,
-                (EVERY_HEADING, DEAR_OVER_180),
-            ),
             (
                 "decide whole circle grid",
                 WHOLE_CIRCLE,

@@ -20,18 +20,19 @@ use replay::{Fault, MAXIMUM_AGE_MS, Outcome};
 static VECTORS: &[u8] = include_bytes!("../tests/data/vectors.bin");
 
 /// In the order of the table numbers in the requests.
-static TABLES: [&[u8]; 7] = [
+static TABLES: [&[u8]; 8] = [
     include_bytes!("tables/dock.posegate"),
     include_bytes!("tables/see-t7.posegate"),
     include_bytes!("tables/see-t7-grid.posegate"),
     include_bytes!("../tests/data/whole-circle.posegate"),
     include_bytes!("../tests/data/turning.posegate"),
     include_bytes!("../tests/data/over-180.posegate"),
+    include_bytes!("../tests/data/over-180-grid.posegate"),
     include_bytes!("../tests/data/corner.posegate"),
 ];
 
 fn replayed() -> Result<Outcome, Fault> {
-    let [a, b, c, d, e, f, g] = TABLES.map(|table| Evaluator::new(table, MAXIMUM_AGE_MS));
+    let [a, b, c, d, e, f, g, h] = TABLES.map(|table| Evaluator::new(table, MAXIMUM_AGE_MS));
     let no_gate = |_| "a gate does not take its maximum age";
     let gates = [
         a.map_err(no_gate)?,
@@ -41,6 +42,7 @@ fn replayed() -> Result<Outcome, Fault> {
         e.map_err(no_gate)?,
         f.map_err(no_gate)?,
         g.map_err(no_gate)?,
+        h.map_err(no_gate)?,
     ];
     replay::replay(VECTORS, &gates)
 }

@@ -12,13 +12,14 @@ use replay::{HEADER_LENGTH, MAXIMUM_AGE_MS, Outcome, REPLY_LENGTH, WITH_REPLY};
 static VECTORS: &[u8] = include_bytes!("data/vectors.bin");
 
 /// The tables in the order of their numbers in the requests.
-static TABLES: [&[u8]; 7] = [
+static TABLES: [&[u8]; 8] = [
     include_bytes!("../examples/tables/dock.posegate"),
     include_bytes!("../examples/tables/see-t7.posegate"),
     include_bytes!("../examples/tables/see-t7-grid.posegate"),
     include_bytes!("data/whole-circle.posegate"),
     include_bytes!("data/turning.posegate"),
     include_bytes!("data/over-180.posegate"),
+    include_bytes!("data/over-180-grid.posegate"),
     include_bytes!("data/corner.posegate"),
 ];
 

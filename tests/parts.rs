@@ -14,13 +14,14 @@ use replay::{MAXIMUM_AGE_MS, Records, answer, reply};
 use std::path::Path;
 
 /// The tables in the order of `examples/vectors.rs`.
-const TABLES: [&str; 7] = [
+const TABLES: [&str; 8] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
     "examples/tables/see-t7-grid.posegate",
     "tests/data/whole-circle.posegate",
     "tests/data/turning.posegate",
     "tests/data/over-180.posegate",
+    "tests/data/over-180-grid.posegate",
     "tests/data/corner.posegate",
 ];
 /// The table of cells alone.

@@ -117,7 +117,11 @@ impl Count {
 }
 
 fn layout(number: u64) -> Layout {
-    [Layout::Facets, Layout::Facets, Layout::Grid, Layout::Both][(number % 4) as usize]
+    if number % 4 == 2 {
+        Layout::Grid
+    } else {
+        Layout::Facets
+    }
 }
 
 /// Prints a figure with its goal, a lower or an upper limit.

@@ -16,6 +16,8 @@ extern const uint8_t table_turning[];
 extern const uint32_t table_turning_length;
 extern const uint8_t table_over_180[];
 extern const uint32_t table_over_180_length;
+extern const uint8_t table_over_180_grid[];
+extern const uint32_t table_over_180_grid_length;
 extern const uint8_t table_corner[];
 extern const uint32_t table_corner_length;
 extern const uint8_t vector_file[];

@@ -7,7 +7,7 @@
 #include "posegate.h"
 #include "tables.h"
 
-#define TABLE_COUNT 7U
+#define TABLE_COUNT 8U
 #define MAXIMUM_AGE_MS 200U
 #define HEADER_LENGTH 12U
 #define CRC_LENGTH 4U
@@ -29,6 +29,7 @@ static const struct flash TABLES[TABLE_COUNT] = {
     {table_whole_circle, &table_whole_circle_length},
     {table_turning, &table_turning_length},
     {table_over_180, &table_over_180_length},
+    {table_over_180_grid, &table_over_180_grid_length},
     {table_corner, &table_corner_length},
 };
 

@@ -22,7 +22,7 @@
 //!     spec: TableSpec {
 //!         extent: Extent { x: [-0.1, 0.1], y: [-0.1, 0.1], yaw_deg: [-5.0, 5.0] },
 //!         step: Step { xy: 0.005, yaw_deg: 0.5 },
-//!         layout: Layout::Auto,
+//!         layout: Layout::Facets,
 //!     },
 //!     epsilon: 0.99,
 //!     site_digest: [0; 32],
@@ -46,7 +46,7 @@ pub(crate) use self::parts::ranges;
 pub use self::runs::Rows;
 pub use self::sight::sight_record;
 pub use self::spec::{Extent, Layout, Step, TableSpec};
-pub use self::write::{LARGEST_TABLE, write, write_layouts};
+pub use self::write::{LARGEST_TABLE, write_facets, write_grid};
 
 mod border;
 mod export;
@@ -105,7 +105,7 @@ pub enum BakeError {
         limit: f64,
     },
     /// The set or the table cannot be expressed as facets; the text is the reason.
-    #[error("no facets: {0}; use layout = \"grid\" or \"auto\"")]
+    #[error("no facets: {0}; use layout = \"grid\"")]
     NoPieces(&'static str),
     /// A task name that does not fit into the header.
     #[error("the task name {0:?} is empty or longer than 32 bytes")]
@@ -184,11 +184,10 @@ pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u
     if rows.iter().flatten().all(runs::Row::is_empty) {
         return Err(empty(order, &cells));
     }
-    write_layouts(order, &cells, Some(&rows), None)
+    write_grid(order, &cells, &rows)
 }
 
-/// Bakes the table of an order in the layouts that it names; `auto` is facets. (For a proven table use
-/// [`crate::verify::build`].)
+/// Bakes the table of an order in its layout. (For a proven table use [`crate::verify::build`].)
 ///
 /// # Errors
 /// [`BakeError`] if the order cannot be baked.
@@ -199,7 +198,7 @@ pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<
     let mut plan = facets(order, Effort::default())?;
     plan.pieces.retain(|piece| !piece.is_empty());
     progress();
-    table_of(order, &plan, progress)
+    write_facets(order, &plan)
 }
 
 /// Returns the facets of an order's set, one piece for each of its parts. The parts are the same at every effort;
@@ -209,31 +208,6 @@ pub fn table(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<
 /// [`BakeError`] if the order has no facets.
 pub fn facets(order: &BakeInput<'_>, effort: Effort) -> Result<FacetPlan, BakeError> {
     facets::of_order(order, &check(order)?, effort)
-}
-
-/// Returns the bytes of a table with these facets, without a grid.
-///
-/// # Errors
-/// [`BakeError`] if they exceed the format.
-pub fn facets_alone(order: &BakeInput<'_>, plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
-    write_layouts(order, &check(order)?, None::<&[Vec<runs::Row>]>, Some(plan))
-}
-
-/// Returns the bytes of a table with these facets, and with a grid if the order asks for both.
-///
-/// # Errors
-/// [`BakeError`] if the order cannot be baked.
-pub fn table_of(
-    order: &BakeInput<'_>,
-    plan: &FacetPlan,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Vec<u8>, BakeError> {
-    if order.spec.layout != Layout::Both {
-        return facets_alone(order, plan);
-    }
-    let cells = check(order)?;
-    let rows = runs::of_set(order.success, &cells, progress);
-    write_layouts(order, &cells, Some(&rows), Some(plan))
 }
 
 /// Checks an order without baking it: everything that can be refused from the numbers alone.

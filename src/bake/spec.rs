@@ -25,18 +25,14 @@ pub struct Step {
     pub yaw_deg: f64,
 }
 
-/// The layouts that a table contains.
+/// The layout of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
-    /// Facets.
+    /// Facets, in several pieces if the set is not convex.
+    #[default]
     Facets,
     /// A grid of cells.
     Grid,
-    /// Both.
-    Both,
-    /// Facets if the set has them and they are proven, in several pieces if the set is not convex; otherwise a grid.
-    #[default]
-    Auto,
 }
 
 /// Largest number of rows of a table: bit 15 of the count is a flag.

@@ -1,6 +1,6 @@
 //! Writes cells and runs as the bytes of format version 1.
 
-use super::{BakeError, BakeInput, FacetPlan, Rows, goal_frame, sight_record};
+use super::{BakeError, BakeInput, FacetPlan, check, goal_frame, sight_record};
 use crate::confidence::core_radius;
 use crate::table::{
     Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, SightRecord, VERSION, checksum,
@@ -10,33 +10,36 @@ use std::collections::BTreeMap;
 /// Largest table, bytes: no controller has more flash for it.
 pub const LARGEST_TABLE: usize = 64 << 20;
 
-/// Returns the bytes of a grid table: header, grid, checksum.
+/// Returns the bytes of a grid table.
 ///
 /// # Errors
 /// [`BakeError`] if the table exceeds the format.
-pub fn write(order: &BakeInput<'_>, cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
-    write_layouts(order, cells, Some(slabs), None)
-}
-
-/// Returns the bytes of a table with either layout or both, and the sight record of a visibility
-/// set.
-///
-/// # Errors
-/// [`BakeError`] if the table exceeds the format.
-pub fn write_layouts<Row>(
+pub fn write_grid<Row>(
     order: &BakeInput<'_>,
     cells: &Cells,
-    slabs: Option<&[Vec<Row>]>,
-    plan: Option<&FacetPlan>,
+    slabs: &[Vec<Row>],
 ) -> Result<Vec<u8>, BakeError>
 where
     for<'a> &'a Row: IntoIterator<Item = &'a Run>,
 {
-    let grid = slabs
-        .map(|slabs| grid(cells, slabs))
-        .transpose()?
-        .unwrap_or_default();
-    let facets = plan.map(facets).transpose()?.unwrap_or_default();
+    write(order, cells, &grid(cells, slabs)?, &[])
+}
+
+/// Returns the bytes of a table of facets.
+///
+/// # Errors
+/// [`BakeError`] if the order is refused or the table exceeds the format.
+pub fn write_facets(order: &BakeInput<'_>, plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
+    write(order, &check(order)?, &[], &facets(plan)?)
+}
+
+/// Returns the bytes of a table: header, grid or facets, the sight record of a visibility set, checksum.
+fn write(
+    order: &BakeInput<'_>,
+    cells: &Cells,
+    grid: &[u8],
+    facets: &[u8],
+) -> Result<Vec<u8>, BakeError> {
     let radius = core_radius(order.epsilon).ok_or(BakeError::Epsilon(order.epsilon))?;
     let goal = goal_frame(order.success)?;
     let sight = sight_record(order.success).map(|record| SightRecord::bytes(&record));
@@ -71,7 +74,7 @@ where
     bytes.extend(0u16.to_le_bytes());
     bytes.extend(radius.q16().to_le_bytes());
     let mut at = HEADER_LENGTH;
-    for section in [&grid, &facets] {
+    for section in [grid, facets] {
         let offset = if section.is_empty() { 0 } else { at };
         bytes.extend((offset as u32).to_le_bytes());
         bytes.extend((section.len() as u32).to_le_bytes());

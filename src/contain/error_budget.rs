@@ -24,72 +24,64 @@ const Q24: f64 = TAU / 16_777_216.0;
 const ROUNDINGS: &str =
     "about ten numbers are rounded, and others up: a search does not align them all";
 
-/// A part of [`Placed::slack`], extent units: of every set, and in addition for an offset of 2^15.
-struct Part {
+/// A number of a [`Section`], and its largest error for the columns and the normal as they are stored: always, and in addition for an offset
+/// of 2^15, extent units.
+struct Number {
+    name: &'static str,
     why: &'static str,
-    always: f64,
-    by_offset: f64,
-    /// Only of facets in robot axes.
+    error: [f64; 2],
+    /// In addition for a slab beside the estimate, in robot axes.
+    beside: [f64; 2],
     is_robots: bool,
-    /// Only of a slab beside the estimate.
-    is_beside: bool,
 }
 
-const fn part(why: &'static str, always: f64, by_offset: f64) -> Part {
-    Part {
-        why,
-        always,
-        by_offset,
+/// The numbers that a bound subtracts from the slack at the middle.
+const NUMBERS: [Number; 5] = [
+    Number {
+        name: "S w and G",
+        why: "the point's lever times the turn: 0.71, and 3.8e-5 of it, less 2^-14 of it, 0.63; the sum 0.5. Beside the estimate the middle's \
+              offset is a part of the lever: 0.71 w, cosine and sine 0.83 w, the turn 0.5 and 0.63 on each axis",
+        error: [1.85, 0.0],
+        beside: [1.07, 1.31],
         is_robots: false,
-        is_beside: false,
-    }
-}
-
-const fn of_robot(part: Part) -> Part {
-    Part {
+    },
+    Number {
+        name: "F23' n",
+        why: "0.5 in each of two numbers",
+        error: [0.71, 0.0],
+        beside: [0.0; 2],
+        is_robots: false,
+    },
+    Number {
+        name: "w F23' J n",
+        why: "0.5 w, 0.5 and 3.8e-5 in each of two numbers",
+        error: [1.07, 0.9],
+        beside: [0.0; 2],
         is_robots: true,
-        ..part
-    }
-}
-
-const fn beside(part: Part) -> Part {
-    Part {
-        is_beside: true,
-        ..part
-    }
-}
-
-const PARTS: [Part; 9] = [
-    part(
-        "entries of the factor: 0.71 in each of three columns",
-        1.23,
-        0.0,
-    ),
-    part(
-        "the lever of the point times the turn: 0.5 on each axis",
-        0.71,
-        0.0,
-    ),
-    part("3.8e-5 of that, less 2^-14 of it, rounded down", 0.63, 0.0),
-    part("F23' n: 0.5 in each of two numbers", 0.71, 0.0),
-    part("g: 0.5, and the middle's offset: 0.002", 0.502, 0.0),
-    of_robot(part(
-        "n in world axes: 0.83 of 2^-14 by cosine and sine, 0.71 to the nearest",
-        0.0,
-        3.08,
-    )),
-    of_robot(part(
-        "w F23' J n: 0.71 w, and 0.5 and 0.63 in each of two numbers",
-        1.07,
-        0.89,
-    )),
-    of_robot(part("H: 0.5 w, and 0.5 and 0.63", 0.75, 0.63)),
-    of_robot(beside(part(
-        "the middle's offset as a part of A: 0.71 w, cosine and sine 0.83 w, the turn 0.5 and 0.63 on each axis",
-        1.07,
-        1.31,
-    ))),
+    },
+    Number {
+        name: "H",
+        why: "0.5 w, 0.5 and 3.8e-5; beside the estimate 0.5 w in each entry of a halved column",
+        error: [0.75, 0.64],
+        beside: [0.36, 0.0],
+        is_robots: true,
+    },
+    Number {
+        name: "the slack at the middle",
+        why: "the product with the middle's offset, of which six bits are left out, is rounded down",
+        error: [0.01, 0.0],
+        beside: [0.0; 2],
+        is_robots: false,
+    },
 ];
+/// The error of a column of the factor: 0.5 on each axis. All three move a pose by up to 1.73 of it; a normal turns by half a radian, so the effect
+/// is up to 1.118 times that.
+const COLUMN: f64 = 0.708;
+/// The error of a normal in world axes, 2^-14: cosine and sine 0.83, to the nearest 0.71. Its effect is up to 1.118 times that of the offset.
+const NORMAL: f64 = 1.54;
+const TURNED: f64 = 1.118_1;
+/// A normal is at most this long.
+const LONGEST_NORMAL: f64 = 1.0 + 1.0 / 256.0;
 /// What a weighted sum rounds: two numbers along the normal and G, and in robot axes two ahead of it and H, extent units.
 const SUMS: [f64; 2] = [0.71 + 0.5, 0.71 + 0.5 + 0.71 + 0.5];
 
@@ -465,11 +457,9 @@ fn heading(placed: &Placed, e: i32) -> f64 {
     f64::from(placed.heading_at(e).0) / 4_294_967_296.0 * TAU
 }
 
-/// The slack covers its parts, those of a factor that is scaled among them.
+/// The slack covers the errors of all numbers, those of a factor that is scaled among them.
 #[test]
 fn slack_covers_its_parts() {
-    // A normal is at most this long.
-    let normal = 1.0 + 1.0 / 256.0;
     let mut random = Random::new(29);
     for _ in 0..test_share(20_000, 10) {
         let genes = Genes::new(&mut random);
@@ -480,11 +470,15 @@ fn slack_covers_its_parts() {
             continue;
         };
         for e in [0, 1 << 14] {
-            let parts = PARTS
-                .iter()
-                .filter(|part| (is_robot || !part.is_robots) && (e != 0 || !part.is_beside));
             let share = f64::from(placed.broad) / 32_768.0;
-            let sum: f64 = parts.map(|part| part.always + share * part.by_offset).sum();
+            let turned = if is_robot { TURNED } else { 1.0 };
+            let columns = 3f64.sqrt() * COLUMN * LONGEST_NORMAL * turned;
+            let normal = if is_robot { 2.0 * NORMAL * turned } else { 0.0 };
+            let numbers = NUMBERS
+                .iter()
+                .filter(|number| is_robot || !number.is_robots);
+            let errors = numbers.map(|number| number.bound(share, is_robot && e != 0));
+            let sum = columns + normal * share + errors.sum::<f64>();
             // Entries to the nearest micrometre, and a turn that is up by one unit.
             let units = f64::from(1u32 << layout.unit()) / um(&placed);
             let Plane { axes, point, .. } = case.planes[0];
@@ -495,14 +489,129 @@ fn slack_covers_its_parts() {
             let arm = f64::from(arm[0]).hypot(arm[1].into());
             let scaled = 1.23 / um(&placed) + arm * Q24 * units;
             let slack = f64::from(placed.slack(is_robot, e));
-            let [all, weighed] = [sum * normal + scaled, SUMS[usize::from(is_robot)]];
+            let [all, weighed] = [sum + scaled, SUMS[usize::from(is_robot)]];
             assert!(
                 all <= slack && all + weighed <= slack + f64::from(rounding_of_a_sum(is_robot)),
                 "{sum} and {scaled} of {slack}: {placed:?}"
             );
         }
     }
-    assert!(PARTS.iter().all(|part| !part.why.is_empty()));
+    assert!(NUMBERS.iter().all(|number| !number.why.is_empty()));
+}
+
+impl Number {
+    fn bound(&self, share: f64, is_beside: bool) -> f64 {
+        let [mut always, mut by_offset] = self.error;
+        if is_beside {
+            always += self.beside[0];
+            by_offset += self.beside[1];
+        }
+        always + by_offset * share
+    }
+}
+
+/// The errors of the columns, of the normal, and of the [`NUMBERS`], with their bounds.
+fn numbers(genes: &Genes, is_robot: bool, is_beside: bool) -> Option<[[f64; 2]; 7]> {
+    let case = Case::new(genes, &[is_robot], false);
+    let layout = case.layout();
+    let placed = Placed::of(&layout, &case.set, Pose::default())?;
+    if placed.is_cylinder {
+        return None;
+    }
+    let (e, width) = slab(genes, &placed, is_beside)?;
+    let plane = case.planes[0];
+    let seen = placed.seen_at(plane.axes, plane.point, &placed.middle(e), &width);
+    let section = Section::of(plane.facet, &seen, &placed, &placed.middle(e), &width);
+    let [x, y, [turn, ..]] = case.factor;
+    let columns = placed.columns.map(|column| column.map(f64::from));
+    let off = |k: usize| {
+        let [cx, cy] = columns[k];
+        (cx - x[k] / um(&placed)).hypot(cy - y[k] / um(&placed))
+    };
+    let column = off(0).max(off(1)).max(off(2));
+    let own = [plane.facet.x, plane.facet.y].map(|v| f64::from(v) / 16_384.0);
+    let (sin, cos) = heading(&placed, e).sin_cos();
+    let normal = section.normal.map(|v| f64::from(v) / 16_384.0);
+    let turned = if is_robot {
+        let [dx, dy] = [
+            cos * own[0] - sin * own[1] - normal[0],
+            sin * own[0] + cos * own[1] - normal[1],
+        ];
+        16_384.0 * dx.hypot(dy)
+    } else {
+        0.0
+    };
+    let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+    let left = |[x, y]: [f64; 2]| [-y, x];
+    let ahead = left(normal);
+    let [u, half] = [e, width.in_u()].map(|u| f64::from(u) / 32_768.0);
+    let w = turn * half;
+    let [f, second, third] = columns;
+    let units = f64::from(1u32 << layout.unit()) / um(&placed);
+    // A point's arm is what it is: its rounding counts elsewhere.
+    let arm = seen.arm.map(|v| f64::from(v) * units);
+    let lever = if is_robot {
+        -dot(own, left(arm)) + u * dot(ahead, f)
+    } else {
+        dot(own, left(arm))
+    };
+    // The slack is lower by the part that this makes up for.
+    let [sx, sy] = seen.swing.map(i32::unsigned_abs);
+    let for_turn = f64::from((sx + sy) >> 14);
+    let apart = |found: i32, exact: f64| f64::from(found) - exact;
+    let pair = |found: [i32; 2], by: f64, along: [f64; 2]| {
+        let [a, b] = found;
+        apart(a, by * dot(along, second)).hypot(apart(b, by * dot(along, third)))
+    };
+    let middle = f64::from(section.left - placed.spare(plane.facet, &seen)) + for_turn;
+    let slope = apart(section.slope, dot(normal, f) * half + lever * w);
+    let errors = [
+        slope.abs() - for_turn,
+        pair(section.along, 1.0, normal),
+        pair(section.ahead, w, ahead),
+        apart(section.bend, w * half * dot(ahead, f)).abs(),
+        middle + u * dot(normal, f),
+    ];
+    let share = f64::from(placed.broad) / 32_768.0;
+    let of = |k: usize| [NUMBERS[k].bound(share, is_robot && e != 0), errors[k]];
+    Some([
+        [COLUMN, column],
+        [NORMAL, turned],
+        of(0),
+        of(1),
+        of(2),
+        of(3),
+        of(4),
+    ])
+}
+
+#[test]
+fn numbers_of_a_section() {
+    let names = ["a column of the factor", "a normal in world axes"];
+    let names = names.into_iter().chain(NUMBERS.map(|number| number.name));
+    for (index, name) in names.enumerate() {
+        for (is_robot, axes) in [(false, "world"), (true, "robot")] {
+            let is_robots = index == 1 || index > 1 && NUMBERS[index - 2].is_robots;
+            if is_robots && !is_robot {
+                continue;
+            }
+            for (is_beside, place) in [(false, "of the whole set"), (true, "beside the estimate")] {
+                let is_slack = index == NUMBERS.len() + 1;
+                if is_slack && !is_beside {
+                    // Exact.
+                    continue;
+                }
+                searched(50 + index as u64, test_share(100, 1), |genes| {
+                    numbers(genes, is_robot, is_beside).map(|all| all[index])
+                })
+                .report(&Row {
+                    name: &std::format!("contain: {name}, in {axes} axes, {place}"),
+                    unit: if index == 1 { "2^-14" } else { "extent units" },
+                    looseness: is_slack.then_some("it is rounded down"),
+                });
+            }
+        }
+    }
 }
 
 #[test]

@@ -28,7 +28,7 @@ const ONE_Q10: u32 = 1 << 10;
 /// Estimate and goal are within 0.5 um on each axis, and their difference is rounded to the nearest 2^k um. These
 /// roundings are on world axes, which a normal in robot axes can meet at any angle. A rotated point has the error of
 /// cosine and sine times its length, and is rounded once more. That error rotates with the yaw offset t, which the
-/// decision uses to first order: it counts `sqrt(1 + t^2)` times its length, at most 1.118 times, at any angle to the
+/// decision bounds to first order, besides its curvature: it counts `sqrt(1 + t^2)` times its length, at most 1.118 times, at any angle to the
 /// normal.
 #[must_use]
 pub fn clearance_q14(facet: Facet, axes: Axes, turns: bool, unit: u8, lever: u16) -> i64 {

@@ -22,12 +22,11 @@
 //! ```
 //!
 //! # What is decided
-//! [`decide`] returns `Inside` only if every pose of the true pose-set lies in a facet piece or in a cell that the
-//! table covers. If the table has facets, they are tried first, with an error budget of their own (the head of
-//! `facets.rs`). For cells, the set is moved into the goal frame, and the slabs and rows that it can touch are walked
-//! ([`grid`]). Every limit is a comparison that must hold for acceptance, so every failure denies.
+//! [`decide`] returns `Inside` only if every pose of the true pose-set lies in the pieces of the table's facets (`slab.rs`, with an error budget of
+//! its own), or if the table has no facets, in its covered cells. For cells, the set is moved into the goal frame, and the slabs and rows that it can
+//! touch are walked (`grid.rs`). Every limit is a comparison that must hold for acceptance, so every failure denies.
 //!
-//! # The error budget
+//! # The error budget of cells
 //! The integer set X' that is walked differs from the true set X as follows. Each line bounds the distance from a pose
 //! of X to the nearest pose of X', per axis.
 //!
@@ -41,32 +40,26 @@
 //! | the proof of the table treats borders of boxes as 1e-11 m and 2e-9 rad wide | 0.00 um | 1.37 of 2^-32 turn |
 //! | **sum** | **5.39 um** | **0.01 of 2^-24 turn** |
 //!
-//! A moved ellipsoid ([`Extent::Grown`]) is decided exactly by facets. For cells, the cylinder that contains it is used
-//! instead, so a denial may be too strict.
-//!
-//! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are applied once: rows and slabs are widened by
-//! them, and the ends of runs are moved inwards by [`SLACK_UM`]. After that the walk is about X' alone, and each of
-//! its steps is either exact or rounds against acceptance, as [`grid`] states.
+//! [`SLACK_UM`] and [`SLACK_Q24`] are these sums rounded up. They are applied once: boxes and slabs are widened by them. After that the walk is
+//! about X' alone, and each of its steps is either exact or rounds against acceptance, as `grid.rs` states.
 
 use crate::num::ANGLE_UNITS_PER_Q24;
 use crate::pose::Pose;
-use crate::set::{Extent, Growth, PoseSet};
-use crate::table::{Cells, Grid, Table};
+use crate::set::{Extent, PoseSet, scaled_yaw};
+use crate::table::{Cells, Table};
 
 use self::grid::Stop;
-use self::section::{Disc, EitherSection, Ellipsoid, Offset, Section};
 
 pub use self::facets::clearance_q14 as facet_clearance_q14;
 
 #[cfg(test)]
 mod error_budget;
 mod facets;
-pub mod grid;
+mod grid;
 #[cfg(feature = "std")]
 pub mod many;
 mod placed;
 pub mod second;
-mod section;
 mod slab;
 mod support;
 mod touching;
@@ -98,7 +91,7 @@ pub enum Cause {
     TooLarge,
     /// The estimate itself is not on the table.
     OffTable,
-    /// Some pose of the pose-set lies in no covered cell.
+    /// Some pose of the pose-set is not proven to be inside.
     NotContained,
     /// The cells were walked as far as the table's limit allows ([`Table::within`]), without an answer.
     TooCostly,
@@ -171,9 +164,8 @@ pub fn decide(table: &Table<'_>, set: &PoseSet) -> Decision {
 /// (`ci.sh accuracy`).
 pub fn decide_with_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
     let goal = table.goal().pose;
-    let margin = table
-        .facets()
-        .and_then(|layout| facets::margin_q10(layout, set, goal));
+    let layout = table.facets();
+    let margin = layout.and_then(|layout| facets::margin_q10(layout, set, goal));
     if let Some(q10) = margin {
         return (Decision::Inside, Margin(q10 << 6));
     }
@@ -188,13 +180,10 @@ pub fn decide_with_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin
 fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
     match GoalFramePoseSet::on(table, set) {
         Err(cause) => Decision::Outside(cause),
-        Ok(placed) => match table
-            .grid()
-            .map(|grid| placed.walked(grid, table, placed.extent))
-        {
-            Some(Ok(())) => Decision::Inside,
-            Some(Err(Stop::TooCostly)) => Decision::Outside(Cause::TooCostly),
-            _ => Decision::Outside(Cause::NotContained),
+        Ok(placed) => match placed.walked(table, placed.extent) {
+            Ok(()) => Decision::Inside,
+            Err(Stop::TooCostly) => Decision::Outside(Cause::TooCostly),
+            Err(Stop::NotCovered) => Decision::Outside(Cause::NotContained),
         },
     }
 }
@@ -274,8 +263,6 @@ fn facets_cover(table: &Table<'_>, set: &PoseSet) -> bool {
 struct GoalFramePoseSet<'s> {
     /// The set in world axes.
     set: &'s PoseSet,
-    /// The estimate in the goal frame.
-    mean: Pose,
     /// x above the lower corner of the cells, micrometres.
     x_um: i64,
     /// y above the lower corner of the cells, micrometres.
@@ -311,7 +298,6 @@ impl<'s> GoalFramePoseSet<'s> {
         let mean = table.goal().pose_to_goal(set.mean())?;
         Some(Self {
             set,
-            mean,
             x_um: i64::from(mean.x_um).wrapping_sub(i64::from(cells.x_lo_um)),
             y_um: i64::from(mean.y_um).wrapping_sub(i64::from(cells.y_lo_um)),
             yaw: i64::from(mean.yaw.minus(cells.yaw_lo).0),
@@ -326,9 +312,14 @@ impl<'s> GoalFramePoseSet<'s> {
             Extent::Bounded {
                 translation_um,
                 yaw_q24,
-            } => Disc::new(translation_um, yaw_q24)
-                .scaled(scale.0)
-                .map(|disc| disc.extent()),
+            } => {
+                let radius = i64::from(translation_um).wrapping_mul(scale.0.into());
+                let radius = radius.wrapping_add(0xffff) >> 16;
+                (radius < 1 << 29).then_some(Extent::Bounded {
+                    translation_um: radius as i32,
+                    yaw_q24: scaled_yaw(yaw_q24, scale.0),
+                })
+            }
             Extent::Grown { factor, by } => Some(Extent::Grown {
                 factor: factor.scaled(scale.0)?,
                 by: by.scaled(scale.0)?,
@@ -339,82 +330,28 @@ impl<'s> GoalFramePoseSet<'s> {
     /// Returns `true` if the set times `scale` is covered.
     fn is_covered(&self, table: &Table<'_>, scale: Margin) -> bool {
         self.scaled(scale).is_some_and(|extent| {
+            // Rotated after scaling, because a scale would multiply the rounding of the rotation. A length beyond 2^28, for which the rotation
+            // rounds more, is wider than any table.
             facets_cover(table, &PoseSet::of(self.set.mean(), extent))
-                || table
-                    .grid()
-                    .is_some_and(|grid| self.walked_turned(grid, table, extent).is_ok())
+                || self.walked(table, turned(table, extent)).is_ok()
         })
     }
 
-    /// Returns the offset of a pose of the set times `scale` that is not covered: of a table with cells from the cells, else
-    /// from the facets. Zero if there is none.
-    fn witness(&self, table: &Table<'_>, scale: Margin) -> Offset {
-        let Some(extent) = self.scaled(scale) else {
-            return Offset::default();
+    /// Returns the offset of a pose of the set times `scale` that no facet covers, in world axes: um, um, 2^-32 turn. Zero without facets.
+    fn witness(&self, table: &Table<'_>, scale: Margin) -> [i64; 3] {
+        let (Some(extent), Some(layout)) = (self.scaled(scale), table.facets()) else {
+            return [0; 3];
         };
-        match (table.grid(), table.facets()) {
-            (Some(grid), _) => match self.walked_turned(grid, table, extent) {
-                Err(Stop::NotCovered(offset)) => offset,
-                _ => Offset::default(),
-            },
-            (None, Some(layout)) => {
-                let goal = table.goal();
-                let set = PoseSet::of(self.set.mean(), extent);
-                let [x, y, yaw] = facets::witness(layout, &set, goal.pose);
-                let (x, y) = goal.turn_to_goal(x as i32, y as i32);
-                Offset([i64::from(x), i64::from(y), yaw])
-            }
-            (None, None) => Offset::default(),
-        }
+        let set = PoseSet::of(self.set.mean(), extent);
+        let [x, y, yaw] = facets::witness(layout, &set, table.goal().pose);
+        [x, y, yaw.wrapping_mul(ANGLE_UNITS_PER_Q24)]
     }
 
-    /// As [`Self::walked`], with an extent in world axes.
-    ///
-    /// It is rotated after scaling, because a scale would multiply the rounding of the rotation. A length beyond 2^28, for
-    /// which the rotation rounds more, is wider than any table.
-    fn walked_turned(
-        &self,
-        grid: &Grid<'_>,
-        table: &Table<'_>,
-        extent: Extent,
-    ) -> Result<(), Stop> {
-        self.walked(grid, table, turned(table, extent))
-    }
-
-    /// Returns `Ok` if a grid covers the set with an extent in the goal's axes, by a walk within the table's limit.
-    fn walked(&self, grid: &Grid<'_>, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
-        let (cells, most_runs) = (table.cells(), table.most_runs());
-        let extent = match extent {
-            // It has every heading, with the places of several of its offsets: those of the cylinder that contains it are walked.
-            Extent::Gaussian(factor) if factor.yaw > grid::WIDEST_Q24 => {
-                Disc::around(&factor, Growth::NONE).extent()
-            }
-            _ => extent,
-        };
-        if cfg!(small_code) {
-            return self.walk(grid, cells, &EitherSection::of(extent), most_runs);
-        }
-        match extent {
-            Extent::Gaussian(factor) => self.walk(grid, cells, &Ellipsoid::new(factor), most_runs),
-            Extent::Bounded {
-                translation_um,
-                yaw_q24,
-            } => self.walk(grid, cells, &Disc::new(translation_um, yaw_q24), most_runs),
-            Extent::Grown { factor, by } => {
-                self.walk(grid, cells, &Disc::around(&factor, by), most_runs)
-            }
-        }
-    }
-
-    fn walk<S: Section>(
-        &self,
-        grid: &Grid<'_>,
-        cells: &Cells,
-        section: &S,
-        most_runs: u32,
-    ) -> Result<(), Stop> {
+    /// Returns `Ok` if the cells of a table without facets cover the set with an extent in the goal's axes, by a walk within the table's limit.
+    fn walked(&self, table: &Table<'_>, extent: Extent) -> Result<(), Stop> {
+        let grid = table.grid().ok_or(Stop::NotCovered)?;
         let mean = [self.x_um, self.y_um, self.yaw];
-        grid::covers(grid, cells, mean, section, most_runs)
+        grid::covers(grid, table.cells(), mean, extent, table.most_runs())
     }
 
     /// Narrows the interval between a scale that is covered and one that is not to 2^-10 of the larger. Returns both.

@@ -7,7 +7,7 @@
 use super::slab::{Middle, Root, U, Width};
 use crate::num::{BinaryAngle, product, sqrt_ceil};
 use crate::parts;
-use crate::pose::Pose;
+use crate::pose::{Pose, REACH_UM};
 use crate::set::{Extent, Growth, PoseSet, SqrtFactor, Turn};
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
@@ -42,7 +42,7 @@ pub(super) struct Placed {
     pub movement: Option<Movement>,
     /// e: the extent's unit is 2^e um.
     pub unit: u32,
-    /// The right shift from length units times 2^14 to extent units: 14 - k + e, from 1 to 15.
+    /// The right shift from length units times 2^14 to extent units: 14 - k + e, from 2 to 15.
     pub down: u32,
     /// The first slabs.
     pub first: Width,
@@ -98,6 +98,10 @@ impl Placed {
             first: Width::NONE,
             rescaled: 0,
         };
+        // Growths are stored up to this length. No table contains a set of that size: tables reach half as far from the goal.
+        if common.broad_um >= REACH_UM.unsigned_abs() {
+            return None;
+        }
         let (factor, by) = match set.extent() {
             Extent::Gaussian(factor) => (Some(factor), Growth::NONE),
             Extent::Grown { factor, by } => (Some(factor), by),

@@ -47,7 +47,7 @@
 //!
 //! # Several pieces, and cells
 //! If no single piece contains a set and there are several, each of the outermost poses of the set must lie in one of them. If
-//! the table has cells, these poses are looked up there. Both are spot checks, not proofs. The share of wrong acceptances is
+//! the table has cells instead of facets, these poses are looked up there. Both are spot checks, not proofs. The share of wrong acceptances is
 //! measured.
 
 use crate::parts;
@@ -109,14 +109,11 @@ fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth
     if !(trust.is_valid() && (1 << 16..1 << 24).contains(&question.radius_q16)) {
         return None;
     }
-    let by_planes = layout(table, 76).and_then(|planes| planes::hold(table, planes, &question));
-    if by_planes == Some(true) {
-        return Some(true);
+    match (layout(table, 76), layout(table, 68)) {
+        (Some(planes), _) => planes::hold(table, planes, &question),
+        (None, Some(cells)) if parts::CELLS => spots::hold(table, cells, &question),
+        _ => None,
     }
-    if !parts::CELLS {
-        return None;
-    }
-    spots::hold(table, layout(table, 68)?, &question)
 }
 
 /// Returns the bytes of a layout whose offset and length are in the header at `at`.

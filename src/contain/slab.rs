@@ -13,7 +13,7 @@
 //!
 //! | part | at most |
 //! |---|---|
-//! | A: `-C (1 - cos tau) + S sin tau`, `C = n . A`, S its derivative | `S w y + max(-C, 0) w^2/2 + abs(S) w^3/6` |
+//! | A: `-C (1 - cos tau) + S sin tau`; the first term is at most 0 for C > 0, `C = n . A`, S its derivative | `S w y + max(-C, 0) w^2/2 + abs(S) w^3/6` |
 //! | world axes: `n . D` | `G y + N r(u)`, `G = h n . f`, `N = abs(F23' n)` |
 //! | robot axes: `n_tau . D` | the same with `n + tau J n`, and `w^2/2 abs(D)` |
 //! | its `tau y h (J n) . f` | `max(H, 0)`, `H = w h (J n) . f` |
@@ -132,7 +132,8 @@ impl Width {
         };
         // 2^15.2 * 2^13.
         let bent = longest.wrapping_mul(self.turn.square_q15 as i32) >> 14;
-        self.second_order = bent.wrapping_add(1);
+        // A normal is longer than one by up to 2^-8.
+        self.second_order = bent.wrapping_add(bent >> 8).wrapping_add(2);
         self
     }
 
@@ -479,7 +480,7 @@ pub(super) fn squares(a: i32, b: i32) -> u32 {
 /// Returns at least a turn times a lever below 2^17 (length units), extent units: [`Turn::at`] takes a quarter of it.
 #[inline(always)]
 fn long_lever(turn: &Turn, lever: i32, shift: u32) -> i32 {
-    // A turn of at most half a radian is shifted by 5 or more.
+    // A turn of at most half a radian is shifted by 4 or more. Only a lever of 0 has larger ones.
     let quarter = lever.wrapping_add(3) >> 2;
     turn.at(quarter, shift.wrapping_sub(2)).wrapping_add(3)
 }

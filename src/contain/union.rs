@@ -565,7 +565,7 @@ impl Section {
     /// - the same with `(d + g) / |q|`, if `f + lambda g <= 0` there;
     /// - `lambda = -f / g` otherwise.
     ///
-    /// The signs are such that `f >= 0`. Twelve bits of each vector are enough: near its least value the sum hardly depends on lambda.
+    /// The growth by a movement is left out: a set that has grown far is denied by a union sooner than needed. The signs are such that `f >= 0`. Twelve bits of each vector are enough: near its least value the sum hardly depends on lambda.
     #[inline(never)]
     fn weight(&self, other: &Self, root: i32, is_slab: bool) -> i32 {
         let reach = |section: &Self| {

@@ -1,6 +1,5 @@
 //! The worst pose of a denied set, for reports: a pose of the set that the table does not cover.
 
-use super::section::Offset;
 use super::{GoalFramePoseSet, Margin, union};
 use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil};
 use crate::parts;
@@ -81,8 +80,8 @@ impl GoalFramePoseSet<'_> {
             let scaled = v.wrapping_mul(Margin::ONE.0.into()).checked_div(scale);
             scaled.unwrap_or(v)
         };
-        consider(self.witness_offset(table, high).map(outwards));
-        consider(self.witness_offset(table, Margin::ONE));
+        consider(self.witness(table, high).map(outwards));
+        consider(self.witness(table, Margin::ONE));
         for end in self.ends_of_heading() {
             consider(end);
             consider(end.map(i64::wrapping_neg));
@@ -92,7 +91,15 @@ impl GoalFramePoseSet<'_> {
             .is_some_and(|layout| parts::UNIONS && layout.pieces().nth(1).is_some());
         // The estimate itself last: a set may be too thin for another pose.
         let is_found = consider([0; 3]);
-        if has_pieces || !is_found {
+        if table.facets().is_none() {
+            // Cells have no depth to climb along.
+            for direction in &DIRECTIONS {
+                for sign in [1, -1] {
+                    let start = normal(direction.map(|v| i64::from(v).wrapping_mul(sign)));
+                    consider(self.outermost(start));
+                }
+            }
+        } else if has_pieces || !is_found {
             consider(self.farthest_out(outside));
         }
         worst.map(|(_, pose)| pose)
@@ -142,11 +149,8 @@ impl GoalFramePoseSet<'_> {
 
     /// Returns the depth of a pose in the table: below zero outside, in units of the facets if there are any.
     fn depth(&self, table: &Table<'_>, pose: Pose) -> i64 {
-        let depth = table
-            .facets()
-            .map(|layout| union::depth(layout, pose, table.goal().pose));
-        if table.grid().is_none() {
-            return depth.unwrap_or(-1);
+        if let Some(layout) = table.facets() {
+            return union::depth(layout, pose, table.goal().pose);
         }
         let point = Extent::Bounded {
             translation_um: 0,
@@ -154,25 +158,7 @@ impl GoalFramePoseSet<'_> {
         };
         let is_covered = GoalFramePoseSet::at(table, &PoseSet::of(pose, point), point)
             .is_some_and(|point| point.is_covered(table, Margin(0)));
-        match depth {
-            _ if is_covered => 0,
-            Some(depth) => depth.min(-1),
-            None => -1,
-        }
-    }
-
-    /// Returns the offset of a witness at a scale ([`Self::witness`]) in world axes: um, um, 2^-32 turn.
-    fn witness_offset(&self, table: &Table<'_>, scale: Margin) -> [i64; 3] {
-        let offset = self.witness(table, scale);
-        let Offset([.., yaw]) = offset;
-        let pose = table.goal().pose_to_world(offset.applied_to(self.mean));
-        let mean = self.set.mean();
-        let length = |to: i32, from: i32| i64::from(to).wrapping_sub(i64::from(from));
-        [
-            length(pose.x_um, mean.x_um),
-            length(pose.y_um, mean.y_um),
-            yaw.wrapping_mul(ANGLE_UNITS_PER_Q24),
-        ]
+        if is_covered { 0 } else { -1 }
     }
 
     /// Returns the offsets of the poses that turn farthest to one side, and of that at half a turn on the way: um, um, 2^-32 turn.

@@ -99,8 +99,8 @@ pub struct Settings<'a> {
     /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
     /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
     /// control cycle, the longest duration of a step and the delay of the output. A step takes two evaluations and
-    /// the conversion of the estimate: about 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and up
-    /// to eleven times the bound of `posegate table info` with cells ([`Settings::most_runs`] lowers that bound). If a later cycle finds the gate open, the gate
+    /// the conversion of the estimate: about 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and and with cells
+    /// 31,000 (79,000) and the bound of `posegate table info` ([`Settings::most_runs`] lowers it). If a later cycle finds the gate open, the gate
     /// closes ([`super::Reason::CycleLate`]).
     pub response_ms: u32,
     /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. A step does not use it. Settings with
@@ -117,7 +117,7 @@ pub struct Settings<'a> {
     pub restart: Restart,
     /// The largest number of runs of cells that a decision reads (a row without a run counts as one), for a table with cells. A pose-set that
     /// needs more is denied with [`super::Reason::TooCostly`]. `Table::within(most_runs).worst_case()` bounds the instructions: a run takes
-    /// at most 2,500 on a Cortex-M4F. Facets are not affected. Zero: cells permit nothing. Read once, when the gate is made or reset.
+    /// at most 150 on a Cortex-M4F, and each slab of headings that a set meets 3,500. Facets are not affected. Zero: cells permit nothing. Read once, when the gate is made or reset.
     pub most_runs: u32,
     /// The tag that the robot should look at to relocalise for this task. Only [`super::Advice`] uses it.
     pub look_at: Option<u32>,

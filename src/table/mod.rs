@@ -367,16 +367,17 @@ impl<'a> Table<'a> {
         if !parts::CELLS && facets.is_none() {
             return Some(Err(TableError::NoCells));
         }
-        let grid = grid.filter(|_| parts::CELLS);
-        let grid = match grid.map(|bytes| Grid::parse(bytes, &cells)) {
-            None => None,
-            Some(Some(grid)) => Some(grid),
-            Some(None) => return Some(Err(TableError::Grid)),
-        };
         let facets = match facets.map(|bytes| Facets::parse(bytes, &cells)) {
             None => None,
             Some(Some(facets)) => Some(facets),
             Some(None) => return Some(Err(TableError::Facets)),
+        };
+        // Tables of older versions may have cells beside facets.
+        let grid = grid.filter(|_| parts::CELLS && facets.is_none());
+        let grid = match grid.map(|bytes| Grid::parse(bytes, &cells)) {
+            None => None,
+            Some(Some(grid)) => Some(grid),
+            Some(None) => return Some(Err(TableError::Grid)),
         };
         let sight = sight.filter(|_| parts::SIGHT);
         let sight = match sight.map(sight::checked) {
@@ -496,7 +497,7 @@ impl<'a> Table<'a> {
         names.map(|(name, _)| name).collect()
     }
 
-    /// Returns the grid layout, if there is one and this build has the feature `cells`.
+    /// Returns the grid layout, if the table has cells and no facets, and this build has the feature `cells`.
     #[must_use]
     pub const fn grid(&self) -> Option<&Grid<'a>> {
         // A constant `None` lets the compiler drop the code that only cells need.

@@ -25,7 +25,7 @@
 //!     spec: TableSpec {
 //!         extent: Extent { x: [-0.1, 0.1], y: [-0.1, 0.1], yaw_deg: [-5.0, 5.0] },
 //!         step: Step { xy: 0.005, yaw_deg: 0.5 },
-//!         layout: Layout::Auto,
+//!         layout: Layout::Facets,
 //!     },
 //!     epsilon: 0.99,
 //!     site_digest: [0; 32],
@@ -121,6 +121,9 @@ pub enum VerifyError {
         /// Value from the site.
         expected: String,
     },
+    /// Facets and cells. The cells are not used, but they were by older versions.
+    #[error("the table has both facets and cells: build it again, so that it has one of them")]
+    BothLayouts,
     /// A cell that is not proven inside.
     #[error("{0} is not proven inside the success set")]
     Cell(Unproven),
@@ -150,6 +153,11 @@ fn verify_but(
     known: Option<&FacetProofCache>,
 ) -> Result<Proof, VerifyError> {
     let table = Table::parse(bytes).map_err(VerifyError::Table)?;
+    // The lengths of both layouts.
+    let is_empty = |at: usize| bytes.get(at..at + 4) == Some(&[0; 4]);
+    if !is_empty(72) && !is_empty(80) {
+        return Err(VerifyError::BothLayouts);
+    }
     header(&table, claim)?;
     sight::sight(table.sight_record(), claim.success)?;
     let proof = runs(&table, claim.success, progress).map_err(VerifyError::Cell)?;
@@ -194,8 +202,7 @@ impl BuildError {
 }
 
 /// Bakes a table and proves it. If facets are not proven, they are moved inwards ([`Effort`]);
-/// pieces that are still not proven are omitted. `auto` writes facets; it falls back to a grid if the set has no facets, if they exceed the
-/// format, or if none are proven.
+/// pieces that are still not proven are omitted.
 ///
 /// # Errors
 /// [`BuildError`] if the order cannot be baked, or the table is not proven.
@@ -209,26 +216,17 @@ pub fn build(
         epsilon: order.epsilon,
         site_digest: order.site_digest,
     };
+    if order.spec.layout == Layout::Grid {
+        let bytes = bake::grid(order, progress)?;
+        let proof = verify(&bytes, &claim, progress)?;
+        return Ok((bytes, proof));
+    }
+    let (plan, known) = proven_facets(order)?;
+    progress();
+    let bytes = bake::write_facets(order, &plan)?;
     // Bytes with all facets proven while they were chosen are not proven twice.
-    let proven_but = |bytes: Vec<u8>, known: Option<&FacetProofCache>| {
-        let proof = verify_but(&bytes, &claim, progress, known)?;
-        Ok((bytes, proof))
-    };
-    let proven = |bytes: Vec<u8>| proven_but(bytes, None);
-    let layout = order.spec.layout;
-    if layout == Layout::Grid {
-        return proven(bake::grid(order, progress)?);
-    }
-    match proven_facets(order) {
-        Ok((plan, known)) => {
-            progress();
-            proven_but(bake::table_of(order, &plan, progress)?, known.as_ref())
-        }
-        Err(BuildError::Bake(
-            BakeError::NoPieces(_) | BakeError::Empty { .. } | BakeError::TooLarge { .. },
-        )) if layout == Layout::Auto => proven(bake::grid(order, progress)?),
-        Err(error) => Err(error),
-    }
+    let proof = verify_but(&bytes, &claim, progress, known.as_ref())?;
+    Ok((bytes, proof))
 }
 
 /// Returns facets with every piece proven, each with the least effort that suffices, without the pieces that
@@ -244,7 +242,7 @@ fn proven_facets(
     plan.pieces.retain(|piece| !piece.is_empty());
     // Returns the unproven pieces of a selection, the layout's lever, and the proof if it is complete.
     let left = |plan: &FacetPlan, among: &dyn Fn(u16) -> Vec<usize>| {
-        let bytes = bake::facets_alone(order, plan)?;
+        let bytes = bake::write_facets(order, plan)?;
         let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
         let Some(layout) = table.facets() else {
             return Ok::<_, BuildError>((Vec::new(), 0, None));

@@ -1,6 +1,6 @@
 //! Tables are built for sets that have one; other sets give the right error.
 
-use super::{BuildError, build, coverage};
+use super::{BuildError, ExpectedTable, VerifyError, build, coverage, verify};
 use crate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec};
 use crate::shape::{Clear, Exclusion, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
 use crate::table::Table;
@@ -127,7 +127,7 @@ fn set_without_pose_in_extent_names_its_constraint() {
         vec![[0.35, 1.0], [-0.35, 1.0], [-0.35, -1.0], [0.35, -1.0]],
     );
     let success = set(0.0, Shape::Footprint(footprint.unwrap()));
-    let faults = [Layout::Facets, Layout::Grid, Layout::Both, Layout::Auto]
+    let faults = [Layout::Facets, Layout::Grid]
         .map(|layout| build(&order(&success, [-20.0, 20.0], layout), &|| ()).unwrap_err());
     let empty = |fault: &BuildError| match fault {
         BuildError::Bake(BakeError::Empty { nearest, .. }) => {
@@ -141,9 +141,9 @@ fn set_without_pose_in_extent_names_its_constraint() {
     assert!(faults.iter().all(empty), "{faults:?}");
 }
 
-/// A robot with more corners than facets have frames.
+/// A robot with more corners than facets have frames. A grid holds its set.
 #[test]
-fn set_with_too_many_corners_gets_cells() {
+fn set_with_too_many_corners_is_refused_by_facets() {
     let region = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
     let footprint = Footprint::new(round(300, 0.3), region).unwrap();
     let success = set(0.0, Shape::Footprint(footprint));
@@ -152,7 +152,21 @@ fn set_with_too_many_corners_gets_cells() {
         build(Layout::Facets),
         Err(BuildError::Bake(BakeError::TooLarge { what: "frames", .. }))
     ));
-    let (bytes, proof) = build(Layout::Auto).unwrap();
+    let (bytes, proof) = build(Layout::Grid).unwrap();
     let table = Table::parse(&bytes).unwrap();
     assert!(table.facets().is_none() && proof.cells > 1000, "{proof:?}");
+}
+
+/// Firmware of an older version would decide by cells that are not proven here.
+#[test]
+fn table_with_both_layouts_is_refused() {
+    let bytes = include_bytes!("../../tests/data/both-layouts.posegate");
+    let success = set(0.0, Shape::Any(Vec::new()));
+    let claim = ExpectedTable {
+        task: "over-180",
+        success: &success,
+        epsilon: 0.95,
+        site_digest: [0; 32],
+    };
+    assert_eq!(verify(bytes, &claim, &|| ()), Err(VerifyError::BothLayouts));
 }

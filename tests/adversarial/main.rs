@@ -57,8 +57,7 @@ fn main() -> ExitCode {
     let layout_of = match layout {
         "grid" => Layout::Grid,
         "facets" => Layout::Facets,
-        "both" => Layout::Both,
-        _ => panic!("no layout `{layout}`: grid, facets or both"),
+        _ => panic!("no layout `{layout}`: grid or facets"),
     };
     let per_world = per_world(cases);
     let worlds = cases.div_ceil(per_world);

@@ -24,6 +24,7 @@ TABLES = [
     "tests/data/whole-circle.posegate",
     "tests/data/turning.posegate",
     "tests/data/over-180.posegate",
+    "tests/data/over-180-grid.posegate",
     "tests/data/corner.posegate",
 ]
 good = True

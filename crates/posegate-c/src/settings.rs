@@ -109,7 +109,7 @@ pub struct posegate_settings {
     /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
     /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of
     /// the control cycle, the longest duration of a step (about 9,000 instructions on a Cortex-M4F, 24,000 on a
-    /// Cortex-M0+; with cells up to eleven times the bound of `posegate table info`) and the delay of the output.
+    /// Cortex-M0+; with cells 31,000 and 79,000, and the bound of `posegate table info`) and the delay of the output.
     /// If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
     pub response_ms: u32,
     /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. Settings with which reports at this
@@ -129,7 +129,7 @@ pub struct posegate_settings {
     /// uses it.
     pub look_at_tag: u32,
     /// The largest number of runs of cells that a decision reads (a row without a run counts as one), for a table with cells; 0 means 1,000.
-    /// A pose-set that needs more is denied: `POSEGATE_REASON_TOO_COSTLY`. A run takes at most 2,500 instructions on a Cortex-M4F.
+    /// A pose-set that needs more is denied: `POSEGATE_REASON_TOO_COSTLY`. A run takes at most 150 instructions on a Cortex-M4F, and each slab of headings that a set meets 3,500.
     /// Facets are not affected.
     pub most_runs: u32,
 }

@@ -85,10 +85,16 @@ impl Failure {
     pub fn table(site: &Input, task: &str, error: BakeError) -> Self {
         let help = match &error {
             BakeError::Empty { .. } => "make the steps finer, or put the extent about the set",
+            BakeError::TooLarge {
+                what: "facets" | "facets in a frame" | "frames" | "pieces",
+                ..
+            } => {
+                "make the success set simpler, or write layout = \"grid\" in [table] or task.NAME.table"
+            }
             BakeError::TooLarge { .. } | BakeError::TooFar { .. } => {
                 "make the extent smaller or the steps coarser in [table] or task.NAME.table"
             }
-            BakeError::NoPieces(_) => "write layout = \"grid\" or \"auto\"",
+            BakeError::NoPieces(_) => "write layout = \"grid\" in [table] or task.NAME.table",
             BakeError::Goal { .. } => "choose a world origin nearer to the site",
             BakeError::Epsilon(_) => "write an epsilon such as 0.99 in [confidence]",
             _ => "see [table] and task.NAME.table in the site file",

@@ -62,10 +62,14 @@ pub struct Build {
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum LayoutName {
-    Facets,
-    Grid,
-    Both,
+    /// As `facets`
     Auto,
+    /// Half-planes, in several pieces if the set is not convex
+    Facets,
+    /// Cells, for any set: larger and slower than facets, and they deny more
+    Grid,
+    /// As `facets`, for older scripts
+    Both,
 }
 
 #[derive(clap::Args)]
@@ -125,10 +129,8 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     let mut spec = spec(&site, chosen, &arguments.site, &arguments.task)?;
     if let Some(layout) = arguments.layout {
         spec.layout = match layout {
-            LayoutName::Facets => Layout::Facets,
+            LayoutName::Auto | LayoutName::Facets | LayoutName::Both => Layout::Facets,
             LayoutName::Grid => Layout::Grid,
-            LayoutName::Both => Layout::Both,
-            LayoutName::Auto => Layout::Auto,
         };
     }
     arguments.start_threads()?;
@@ -325,11 +327,7 @@ fn facts(table: &Table<'_>) -> Value {
         "bytes": table.bytes().len(),
         "epsilon": table.epsilon(),
         "radius_squared": f64::from(table.radius_squared().q16()) / 65536.0,
-        "layout": match (table.grid(), table.facets()) {
-            (Some(_), Some(_)) => "both",
-            (None, Some(_)) => "facets",
-            _ => "grid",
-        },
+        "layout": if table.facets().is_some() { "facets" } else { "grid" },
         "facets": table.facets().map(|layout| json!({
             "bytes": layout.byte_length(),
             "count": layout.facet_count(),

@@ -4,8 +4,7 @@
 use posegate_testkit::sites;
 
 use posegate::bake::{
-    BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan, Rows, Step, TableSpec, check,
-    write_layouts,
+    BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan, Step, TableSpec, write_facets,
 };
 use posegate::contain::{Decision, decide, examine};
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
@@ -65,8 +64,7 @@ fn proven(
     claim: &ExpectedTable<'_>,
     plan: &FacetPlan,
 ) -> Result<u64, VerifyError> {
-    let cells = check(order).unwrap();
-    let bytes = write_layouts(order, &cells, None::<&[Rows]>, Some(plan)).unwrap();
+    let bytes = write_facets(order, plan).unwrap();
     verify(&bytes, claim, &|| ()).map(|proof| proof.corners)
 }
 
@@ -238,8 +236,7 @@ fn set_is_inside_joined_pieces_unless_it_meets_a_gap() {
             ..made.clone()
         };
         assert!(proven(&order, &claim, &two).is_ok());
-        let cells = check(&order).unwrap();
-        write_layouts(&order, &cells, None::<&[Rows]>, Some(&two)).unwrap()
+        write_facets(&order, &two).unwrap()
     };
     let [bytes, apart] = [0.01, -0.01].map(halves);
     let [table, apart] = [&bytes, &apart].map(|bytes| Table::parse(bytes).unwrap());

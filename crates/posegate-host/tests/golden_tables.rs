@@ -5,7 +5,7 @@
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec, table};
 use posegate::shape::PoseDeg;
 use posegate::table::{Table, checksum};
-use posegate::verify::{ExpectedTable, verify};
+use posegate::verify::{ExpectedTable, build, verify};
 use posegate_host::site::Site;
 use std::path::Path;
 
@@ -14,8 +14,8 @@ fn committed_tables_are_made_from_the_committed_site() {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples");
     let site = Site::read(root.join("sites/dock.toml")).unwrap();
     for (task, file, layout) in [
-        ("dock", "dock", Layout::Auto),
-        ("see-t7", "see-t7", Layout::Auto),
+        ("dock", "dock", Layout::Facets),
+        ("see-t7", "see-t7", Layout::Facets),
         ("see-t7", "see-t7-grid", Layout::Grid),
     ] {
         let found = site.task(task).unwrap();
@@ -47,7 +47,7 @@ fn committed_tables_are_made_from_the_committed_site() {
         };
         let proof = verify(&kept, &claim, &|| ()).unwrap();
         assert_eq!(proof.cells > 1000, layout == Layout::Grid);
-        assert_eq!(proof.corners > 10, layout == Layout::Auto);
+        assert_eq!(proof.corners > 10, layout == Layout::Facets);
         let table = Table::parse(&kept).unwrap();
         assert_eq!(table.tool_version(), env!("CARGO_PKG_VERSION"));
         assert_eq!((table.task(), table.site_digest()), (task, site.digest));
@@ -78,9 +78,32 @@ fn committed_tables_are_made_from_the_committed_site() {
     assert!(length("tables/see-t7.posegate") <= 500);
 }
 
-/// The table of the gate's self-test, with both layouts, of a tag that is seen from an unusual place.
+/// The tables of the gate's self-test, of a tag that is seen from an unusual place.
 #[test]
-fn self_test_table_equals_the_one_that_is_made() {
+fn self_test_tables_equal_those_that_are_made() {
+    for (name, layout) in [
+        ("self_test", Layout::Facets),
+        ("self_test_grid", Layout::Grid),
+    ] {
+        let made = self_test_table(layout);
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+            .join(format!("src/gate/{name}.posegate"));
+        if std::env::var_os("POSEGATE_BLESS").is_some() {
+            std::fs::write(&path, &made).unwrap();
+        }
+        assert!(
+            std::fs::read(&path).unwrap() == made,
+            "POSEGATE_BLESS=1 cargo test -p posegate-host --test golden_tables"
+        );
+        assert!(made.len() <= 800, "{}", made.len());
+        let table = Table::parse(&made).unwrap();
+        assert!(table.grid().is_some() == (layout == Layout::Grid));
+        assert!(table.sight_record().is_none());
+    }
+}
+
+/// Returns a proven table without its sight record.
+fn self_test_table(layout: Layout) -> Vec<u8> {
     let examples = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples");
     let site = Site::read(examples.join("sites/dock.toml")).unwrap();
     let mut success = site.task("see-t7").unwrap().success.clone();
@@ -102,54 +125,18 @@ fn self_test_table_equals_the_one_that_is_made() {
                 xy: 0.2,
                 yaw_deg: 3.0,
             },
-            layout: Layout::Both,
+            layout,
         },
         epsilon: 0.99,
         site_digest: [0; 32],
     };
-    let made = table(&order, &|| ()).unwrap();
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
-        .join("src/gate/self_test.posegate");
-    if std::env::var_os("POSEGATE_BLESS").is_some() {
-        std::fs::write(&path, &made).unwrap();
+    let (mut bytes, _) = build(&order, &|| ()).unwrap();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let sight_at = word(92);
+    bytes.truncate(sight_at as usize);
+    for (at, value) in [(12, sight_at + 4), (92, 0)] {
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
     }
-    assert!(
-        std::fs::read(&path).unwrap() == made,
-        "POSEGATE_BLESS=1 cargo test -p posegate-host --test golden_tables"
-    );
-    let claim = ExpectedTable {
-        task: "self-test",
-        success: &success,
-        epsilon: 0.99,
-        site_digest: [0; 32],
-    };
-    verify(&made, &claim, &|| ()).unwrap();
-    assert!(made.len() <= 1_000, "{}", made.len());
-    let table = Table::parse(&made).unwrap();
-    assert!(table.grid().is_some() && table.facets().is_some());
-    let facets = facets_alone(&made);
-    let path = path.with_file_name("self_test_facets.posegate");
-    if std::env::var_os("POSEGATE_BLESS").is_some() {
-        std::fs::write(&path, &facets).unwrap();
-    }
-    assert!(
-        std::fs::read(&path).unwrap() == facets,
-        "POSEGATE_BLESS=1 cargo test -p posegate-host --test golden_tables"
-    );
-    let table = Table::parse(&facets).unwrap();
-    assert!(table.grid().is_none() && table.facets().is_some() && table.sight_record().is_none());
-}
-
-/// Returns a table without its cells and its sight record.
-fn facets_alone(bytes: &[u8]) -> Vec<u8> {
-    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
-    let (start, length) = (word(76), word(80));
-    let mut alone = bytes[..176].to_vec();
-    alone.extend(&bytes[start..start + length]);
-    let total = alone.len() as u32 + 4;
-    for (at, value) in [(12, total), (68, 0), (72, 0), (76, 176), (92, 0)] {
-        alone[at..at + 4].copy_from_slice(&value.to_le_bytes());
-    }
-    alone.extend(checksum(&alone).to_le_bytes());
-    alone
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes
 }

@@ -89,16 +89,8 @@ fn set_over_any_missing_cell_is_denied() {
                     .filter(|r| r.first <= r.last && r.last < 20)
                     .collect();
                 let bytes = table_of(spec([-10.0, 10.0], 5.0), &slabs);
-                // The distance of the cell's nearest point from the estimate, for the comparison with the disc.
-                let near = |index: f64| (index - 10.0).max(9.0 - index).max(0.0) * 0.1;
-                let nearest = near(f64::from(column)).hypot(near(row as f64));
-                let expected = nearest > 0.98;
-                assert!((nearest - 0.98).abs() > 1e-3);
-                assert_eq!(
-                    is_inside(&bytes, &set),
-                    expected,
-                    "{slab} {row} {column}: {nearest}"
-                );
+                // The square about the disc touches every cell of the table.
+                assert!(!is_inside(&bytes, &set), "{slab} {row} {column}");
             }
         }
     }
@@ -223,7 +215,7 @@ fn worst_pose_is_at_the_exit_of_the_set() {
         .collect();
     let bytes = table_of(spec([-10.0, 10.0], 5.0), &vec![rows; 4]);
     let table = Table::parse(&bytes).unwrap();
-    let set = disc(0.2, 0.3, 0.0, 0.6, 3.0);
+    let set = disc(0.2, 0.3, 0.0, 0.64, 3.0);
     let examination = examine(&table, &set);
     let worst = examination.worst_pose.unwrap();
     let (dx, dy) = (
@@ -231,7 +223,7 @@ fn worst_pose_is_at_the_exit_of_the_set() {
         f64::from(worst.y_um) * 1e-6 - 0.3,
     );
     // On the border of the disc (found in 256 steps), to the right, where rows 13 to 15 end at x = 0.7: it leaves them first.
-    let level = dx.hypot(dy) / 0.6;
+    let level = dx.hypot(dy) / 0.64;
     assert!(level <= 1.0 && level > 0.99, "{level}");
     assert!(examination.margin.q16() < 1 << 16);
     assert!(dx > 0.0, "{worst:?}");

@@ -2,7 +2,7 @@
 
 use posegate_testkit::{counts, sites};
 
-use posegate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec, grid, write};
+use posegate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec, grid, write_grid};
 use posegate::shape::{Footprint, Shape, SuccessSet};
 use posegate::table::{Cells, HEADER_LENGTH, Run, SIGHT_LENGTH, Table, TableError};
 use posegate::verify::{VerifyError, verify};
@@ -238,7 +238,7 @@ fn run_that_is_one_cell_too_wide_is_not_proven() {
                     .collect()
             })
             .collect();
-        let rewritten = write(&order, cells, &slabs).unwrap();
+        let rewritten = write_grid(&order, cells, &slabs).unwrap();
         assert_eq!(rewritten, bytes, "the bytes come back from their runs");
         let mut tried = 0;
         // A sample of slabs and rows; every run would take minutes. A third of it each day, all of it in a deep job.
@@ -268,7 +268,7 @@ fn run_that_is_one_cell_too_wide_is_not_proven() {
                     }
                     let mut changed = slabs.clone();
                     changed[slab][row][0] = wider;
-                    let bytes = write(&order, cells, &changed).unwrap();
+                    let bytes = write_grid(&order, cells, &changed).unwrap();
                     match verify(&bytes, &claim, &|| ()) {
                         Err(VerifyError::Cell(cell)) => {
                             assert_eq!(
@@ -365,7 +365,7 @@ fn exit_between_samples_is_not_proven() {
     let cells = spec.cells().unwrap();
     assert_eq!((cells.columns, cells.rows, cells.slabs), (1, 1, 1));
     let whole = vec![vec![vec![Run { first: 0, last: 0 }]]];
-    let bytes = write(&order, &cells, &whole).unwrap();
+    let bytes = write_grid(&order, &cells, &whole).unwrap();
     let claim = posegate::verify::ExpectedTable {
         task: "dip",
         success: &success,

@@ -9,12 +9,13 @@ use posegate::table::Table;
 use posegate_host::log::coordinates;
 use std::path::Path;
 
-/// Facets of a box, facets of a visibility set, cells, both layouts, and facets in several pieces.
-const TABLES: [&str; 5] = [
+/// Facets of a box, facets of a visibility set, cells, and twice facets in several pieces.
+const TABLES: [&str; 6] = [
     "examples/tables/dock.posegate",
     "examples/tables/see-t7.posegate",
     "examples/tables/see-t7-grid.posegate",
     "tests/data/over-180.posegate",
+    "tests/data/over-180-grid.posegate",
     "tests/data/corner.posegate",
 ];
 

@@ -1,6 +1,6 @@
 //! Success sets and tables for tests.
 
-use posegate::bake::{BakeInput, Rows, TableSpec, grid, write};
+use posegate::bake::{BakeInput, Rows, TableSpec, grid, write_grid};
 use posegate::verify::ExpectedTable;
 use posegate_host::site::{SAMPLE, Site};
 
@@ -43,7 +43,7 @@ pub fn table_of(spec: TableSpec, slabs: &[Rows]) -> Vec<u8> {
         spec,
         ..order(&site, "dock")
     };
-    write(&order, &spec.cells().unwrap(), slabs).unwrap()
+    write_grid(&order, &spec.cells().unwrap(), slabs).unwrap()
 }
 
 /// Writes the correct checksum into the bytes.

@@ -10,16 +10,16 @@ use posegate::table::checksum;
 use posegate::wire::{Request, Uncertainty};
 
 /// Decisions in the file.
-pub const COUNT: u32 = 10_270;
+pub const COUNT: u32 = 10_650;
 /// One reply is kept per this number of requests; with all replies the file would exceed 1 MB. Coprime
 /// to the number of tables and of kinds, so that each kind on each table has replies.
-const REPLY_EVERY: u32 = 5;
+const REPLY_EVERY: u32 = 7;
 const SEED: u64 = 0x243f_6a88_85a3_08d3;
 /// The smallest number above zero.
 const TINY: f64 = f64::from_bits(1);
 
 /// Requests after which the gates' turns repeat: two for each but the last, which has one.
-const ROUND: u32 = 13;
+const ROUND: u32 = 15;
 
 /// Returns the file. The requests go to the gates in turn.
 pub fn file(gates: &[Evaluator<'_>]) -> Vec<u8> {

@@ -2,10 +2,10 @@
 //! several runs in a row, several pieces, points that the robot carries. Except for that of
 //! [`turning`], cells and facets are synthetic and belong to no success set.
 
-use posegate::bake::{BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan};
-use posegate::bake::{Rows, Step, TableSpec, write_layouts};
+use posegate::bake::{BakeError, BakeInput, Extent, FacetPlan, FramePlan, Layout, PiecePlan};
+use posegate::bake::{Rows, Step, TableSpec, write_facets, write_grid};
 use posegate::shape::{BoxSet, Footprint, PoseDeg, Shape, SuccessSet};
-use posegate::table::{Axes, Facet, Run};
+use posegate::table::{Axes, Cells, Facet, Run};
 use posegate::verify::build;
 
 /// Returns a table of every heading: two rooms whose wall moves with the heading, and a pillar in one of them.
@@ -39,8 +39,7 @@ pub fn whole_circle() -> Vec<u8> {
         [-1500.25, 880.125, -135.0],
         spec,
         0.9,
-        &slabs,
-        None,
+        |order, cells| write_grid(order, cells, &slabs),
     )
 }
 
@@ -127,30 +126,24 @@ pub fn corner() -> Vec<u8> {
     build(&order, &|| ()).expect("a table that is proven").0
 }
 
-/// Returns a table whose cells are a narrow band from one corner to the other: a set along the band needs both tests of every row, the
-/// most expensive walk.
-pub fn diagonal() -> Vec<u8> {
-    let band = |row: u16| vec![run(row.saturating_sub(5), (row + 5).min(99))];
-    let slabs: Vec<Rows> = vec![(0..100).map(band).collect(); 2];
-    let spec = TableSpec {
-        extent: Extent {
-            x: [-1.0, 1.0],
-            y: [-1.0, 1.0],
-            yaw_deg: [-10.0, 10.0],
-        },
-        step: Step {
-            xy: 0.02,
-            yaw_deg: 10.0,
-        },
-        layout: Layout::Grid,
+/// Returns a table of facets of headings from 140 to 220 degrees, in the world from 157.3 to 237.3.
+pub fn over_180() -> Vec<u8> {
+    let plan = FacetPlan {
+        unit: UNIT,
+        reach: 10_200,
+        pieces: vec![in_a_rectangle(), in_view()],
     };
-    table("diagonal", [7.5, -2.25, 0.0], spec, 0.99, &slabs, None)
+    table(
+        "over-180",
+        GOAL,
+        over_180_spec(Layout::Facets),
+        0.95,
+        |order, _| write_facets(order, &plan),
+    )
 }
 
-/// Returns a table of headings from 140 to 220 degrees, in the world from 157.3 to 237.3, with columns that need 16
-/// bits.
-/// Facets contain the gap between the runs, and some poses that the cells contain, too.
-pub fn over_180() -> Vec<u8> {
+/// Returns a grid of the headings of [`over_180`], with columns that need 16 bits and two runs in a row.
+pub fn over_180_grid() -> Vec<u8> {
     let slabs: Vec<Rows> = (0..8u16)
         .map(|slab| {
             let row = |row: u16| {
@@ -160,7 +153,17 @@ pub fn over_180() -> Vec<u8> {
             (0..20).map(row).collect()
         })
         .collect();
-    let spec = TableSpec {
+    table(
+        "over-180-grid",
+        GOAL,
+        over_180_spec(Layout::Grid),
+        0.95,
+        |order, cells| write_grid(order, cells, &slabs),
+    )
+}
+
+fn over_180_spec(layout: Layout) -> TableSpec {
+    TableSpec {
         extent: Extent {
             x: [-2.5, 1.5],
             y: [-0.1, 0.1],
@@ -170,24 +173,18 @@ pub fn over_180() -> Vec<u8> {
             xy: 0.01,
             yaw_deg: 10.0,
         },
-        layout: Layout::Both,
-    };
-    let plan = FacetPlan {
-        unit: UNIT,
-        reach: 10_200,
-        pieces: vec![in_the_gap(), in_view()],
-    };
-    let goal = [1700.5, -1650.75, GOAL_YAW_DEG];
-    table("over-180", goal, spec, 0.95, &slabs, Some(&plan))
+        layout,
+    }
 }
 
-/// Heading of the goal of [`over_180`].
+/// Goal of [`over_180`]: m, m, degrees.
+const GOAL: [f64; 3] = [1700.5, -1650.75, GOAL_YAW_DEG];
 const GOAL_YAW_DEG: f64 = 17.3;
 /// Exponent of the length unit, 256 um.
 const UNIT: u8 = 8;
 
-/// Returns a piece: a point of the robot in a rectangle over the gap between the runs.
-fn in_the_gap() -> PiecePlan {
+/// Returns a piece: a point of the robot in a rectangle.
+fn in_a_rectangle() -> PiecePlan {
     let wall = |yaw_deg, metres| facet(GOAL_YAW_DEG + yaw_deg, metres);
     let frame = FramePlan {
         axes: Axes::World,
@@ -255,8 +252,7 @@ fn table(
     [x, y, yaw_deg]: [f64; 3],
     spec: TableSpec,
     epsilon: f64,
-    slabs: &[Rows],
-    plan: Option<&FacetPlan>,
+    write: impl Fn(&BakeInput<'_>, &Cells) -> Result<Vec<u8>, BakeError>,
 ) -> Vec<u8> {
     let Extent {
         x: xs,
@@ -278,5 +274,5 @@ fn table(
         site_digest: [0; 32],
     };
     let cells = spec.cells().expect("the extent is one");
-    write_layouts(&order, &cells, Some(slabs), plan).expect("the format holds the table")
+    write(&order, &cells).expect("the format holds the table")
 }

@@ -6,7 +6,7 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 
 /// Every committed table: convex sets, unions, arcs, whole circles, cells alone and cells next to facets.
-const TABLES: [(&str, &[u8]); 12] = [
+const TABLES: [(&str, &[u8]); 13] = [
     (
         "dock",
         include_bytes!("../../../examples/tables/dock.posegate"),
@@ -38,6 +38,10 @@ const TABLES: [(&str, &[u8]); 12] = [
     (
         "over-180",
         include_bytes!("../../../tests/data/over-180.posegate"),
+    ),
+    (
+        "over-180-grid",
+        include_bytes!("../../../tests/data/over-180-grid.posegate"),
     ),
     (
         "see-bay",

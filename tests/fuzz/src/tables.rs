@@ -3,14 +3,15 @@
 use posegate::table::Table;
 use std::sync::OnceLock;
 
-/// Facets, grids, both; a rotated goal; arcs over half a turn and of the whole circle. The first
+/// Facets and grids; a rotated goal; arcs over half a turn and of the whole circle. The first
 /// is that of [`DOCK`].
-pub const BYTES: [&[u8]; 7] = [
+pub const BYTES: [&[u8]; 8] = [
     include_bytes!("../../../examples/tables/dock.posegate"),
     include_bytes!("../../../examples/tables/see-t7.posegate"),
     include_bytes!("../../../examples/tables/see-t7-grid.posegate"),
     include_bytes!("../../data/turning.posegate"),
     include_bytes!("../../data/over-180.posegate"),
+    include_bytes!("../../data/over-180-grid.posegate"),
     include_bytes!("../../data/corner.posegate"),
     include_bytes!("../../data/whole-circle.posegate"),
 ];
@@ -20,7 +21,7 @@ pub const BYTES: [&[u8]; 7] = [
 pub const DOCK: [f64; 3] = [0.08, 0.06, 4.0];
 
 /// Returns [`BYTES`] as tables.
-pub fn all() -> &'static [Table<'static>; 7] {
-    static TABLES: OnceLock<[Table<'static>; 7]> = OnceLock::new();
+pub fn all() -> &'static [Table<'static>; 8] {
+    static TABLES: OnceLock<[Table<'static>; 8]> = OnceLock::new();
     TABLES.get_or_init(|| BYTES.map(|bytes| Table::parse(bytes).expect("a committed table")))
 }

@@ -120,7 +120,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
     );
     program(
         folder,
-        "table build dock.toml --task dock --layout both -o both.posegate",
+        "table build dock.toml --task dock --layout grid -o grid.posegate",
         &[],
     );
     program(
@@ -265,7 +265,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             Binary,
             "mutant.posegate",
             vec![
-                bytes("both.posegate"),
+                bytes("grid.posegate"),
                 bytes("sight.posegate"),
                 bytes("dock.posegate"),
             ],

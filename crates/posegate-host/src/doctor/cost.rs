@@ -30,11 +30,6 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
             site_digest: site.digest,
         };
         let bytes = match bake::table(&input, &|| ()) {
-            // `table build` falls back to cells.
-            Err(BakeError::NoPieces(_) | BakeError::TooLarge { .. }) => bake::grid(&input, &|| ()),
-            other => other,
-        };
-        let bytes = match bytes {
             Ok(bytes) => bytes,
             // Another warning of `doctor` reports this.
             Err(BakeError::Empty { .. }) => continue,

@@ -159,11 +159,10 @@ fn tasks(site: &Site, contents: &Contents) -> String {
             Ok((bytes, proof)) => {
                 let parsed = Table::parse(bytes).ok();
                 let layout = parsed.as_ref().map_or("", |table| {
-                    match (table.grid().is_some(), table.facets().is_some()) {
-                        (true, true) => "grid and facets",
-                        (true, false) => "grid",
-                        (false, true) => "facets",
-                        (false, false) => "",
+                    if table.facets().is_some() {
+                        "facets"
+                    } else {
+                        "grid"
                     }
                 });
                 let crc = parsed.map_or(0, |table| table.crc());

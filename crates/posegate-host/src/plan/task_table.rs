@@ -150,7 +150,7 @@ impl TaskTable {
         let order = self.order(site, self.complete()?);
         let mut plan = bake::facets(&order, Effort::default()).ok()?;
         plan.fit();
-        bake::facets_alone(&order, &plan).ok()
+        bake::write_facets(&order, &plan).ok()
     }
 
     fn built(&self, site: &Site) -> Result<Vec<u8>, PlanError> {
@@ -168,11 +168,7 @@ impl TaskTable {
         if let Ok((bytes, _)) = build(&self.order(site, facets), &|| ()) {
             return Ok(bytes);
         }
-        let spec = TableSpec {
-            layout: Layout::Auto,
-            ..chosen.unwrap_or(facets)
-        };
-        let built = build(&self.order(site, spec), &|| ());
+        let built = build(&self.order(site, chosen.unwrap_or(facets)), &|| ());
         built.map(|(bytes, _)| bytes).map_err(failed)
     }
 }

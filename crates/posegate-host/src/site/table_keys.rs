@@ -63,10 +63,9 @@ fn step(node: &Node<'_>) -> Result<Step, SiteError> {
 
 fn layout(node: &Node<'_>) -> Result<Layout, SiteError> {
     match node.text()? {
-        "facets" => Ok(Layout::Facets),
+        // Older site files say "both" for facets with cells beside them; facets alone decide now.
+        "auto" | "facets" | "both" => Ok(Layout::Facets),
         "grid" => Ok(Layout::Grid),
-        "both" => Ok(Layout::Both),
-        "auto" => Ok(Layout::Auto),
         _ => Err(node.unknown_word(["facets", "grid", "both", "auto"])),
     }
 }

@@ -52,10 +52,10 @@ pub(super) fn encode(
     recipe: &Recipe,
 ) -> Result<Vec<u8>, TableError> {
     let made = Table::parse(table)?;
-    let layout = match (made.grid(), made.facets()) {
-        (Some(_), Some(_)) => "both",
-        (None, Some(_)) => "facets",
-        _ => "grid",
+    let layout = if made.facets().is_some() {
+        "facets"
+    } else {
+        "grid"
     };
     let record = ProofRecord {
         bytes: table.len() as u64,

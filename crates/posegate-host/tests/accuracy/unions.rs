@@ -190,7 +190,7 @@ pub fn unions(count: u64, seed: u64) -> bool {
                     xy: 0.02,
                     yaw_deg: 2.0,
                 },
-                layout: Layout::Auto,
+                layout: Layout::Facets,
             },
             epsilon: site.epsilon,
             site_digest: site.digest,

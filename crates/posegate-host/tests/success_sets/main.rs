@@ -279,8 +279,11 @@ fn one(seed: u64, samples: u64, tally: &Tally) {
 }
 
 fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> BakeInput<'a> {
-    let layout =
-        [Layout::Auto, Layout::Grid, Layout::Facets, Layout::Both][random.below(4) as usize];
+    let layout = if random.chance(0.5) {
+        Layout::Grid
+    } else {
+        Layout::Facets
+    };
     let yaw = random.within(5.0, 60.0);
     BakeInput {
         task: "random",

@@ -70,7 +70,7 @@ fn sample_parses() {
             xy: 0.02,
             yaw_deg: 1.0,
         },
-        layout: Layout::Auto,
+        layout: Layout::Facets,
     };
     assert_eq!(
         (dock.kind, dock.error_bound, dock.table),
@@ -149,7 +149,11 @@ start = { x = 0, y = 0, yaw_deg = 0, bounded = { translation = 0, yaw_deg = 0 } 
     );
     let spec = site.table_spec(task).expect("complete");
     assert_eq!((spec.step.xy, spec.layout), (1.0, Layout::Facets));
-    for (name, layout) in [("grid", Layout::Grid), ("both", Layout::Both)] {
+    for (name, layout) in [
+        ("grid", Layout::Grid),
+        ("auto", Layout::Facets),
+        ("both", Layout::Facets),
+    ] {
         let site = Site::parse(&text.replace("facets", name), FILE).expect("sound");
         assert_eq!(site.tasks["a"].table.map(|spec| spec.layout), Some(layout));
     }
