@@ -72,7 +72,7 @@ fn measure(table: &Table<'_>, name: &str, population: &str, sets: &Sets, goal: f
     });
     let is_same_on_one = found == expected;
     let all = best(|| found = decide_many(table, radius, poses, black_box(covariances)));
-    let certain = rows().filter(|(pose, covariance)| filter.certain(**pose, covariance).is_some());
+    let certain = rows().filter(|(pose, covariance)| filter.is_certain(**pose, covariance));
     let inside = expected
         .iter()
         .filter(|found| **found == Ok(Decision::Inside));

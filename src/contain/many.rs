@@ -1,7 +1,7 @@
 //! Decides on many pose-sets against one table: [`decide_many`], on all cores, and [`Filter`], one set after the other.
 //!
-//! The decisions equal those of [`super::decide`], bit for bit. A filter in floats answers if the integer code is certain to
-//! give the same answer. It leaves every other set to the integer code, so it adds no way to be permitted.
+//! The decisions equal those of [`super::decide`], bit for bit. A filter in floats permits a set if the integer code is certain to permit
+//! it. It leaves every other set to the integer code, so it adds no way to be permitted.
 //!
 //! ```
 //! use posegate::contain::{Cause, Decision, many::decide_many};
@@ -30,24 +30,18 @@
 //! **Inside** (`many/facets.rs`). The bound of one slab of `contain::slab` is evaluated for every facet of one piece, with every number
 //! rounded against acceptance by more than in the integer code: the factor's excess by the table in `set::covariance`, the estimate by
 //! [`super::facet_clearance_q14`] and one length unit, all else by 44 extent units. If it accepts a set, so does the integer code.
-//!
-//! **Outside**. The filter names a pose of the given set that no piece and no cell contains, by more than the clearance of the
-//! table and one length unit. The integer code never accepts a set that has such a pose, because it is sound. The cause follows from
-//! the extent and the estimate; if one of them is within 4 um or 2^-22 turn of its limit, the integer code decides.
 
 use rayon::prelude::*;
 use std::vec::Vec;
 
-use super::{Cause, Decision, decide};
+use super::{Decision, decide};
 use crate::set::{Estimate, InputError, PoseSet, RadiusSquared};
 use crate::table::Table;
 
-use self::cells::CellLimits;
 use self::facets::Layout;
-use self::spread::{Point, Spread};
+use self::spread::Spread;
 
 mod angle;
-mod cells;
 mod facets;
 mod spread;
 #[cfg(test)]
@@ -82,7 +76,6 @@ pub struct Filter<'a> {
     table: Table<'a>,
     radius_squared: RadiusSquared,
     layout: Option<Layout>,
-    cells: CellLimits,
 }
 
 impl<'a> Filter<'a> {
@@ -93,7 +86,6 @@ impl<'a> Filter<'a> {
             table: *table,
             radius_squared,
             layout: table.facets().map(Layout::new),
-            cells: CellLimits::new(table),
         }
     }
 
@@ -107,38 +99,22 @@ impl<'a> Filter<'a> {
         pose: [f64; 3],
         covariance: &[[f64; 3]; 3],
     ) -> Result<Decision, InputError> {
-        match self.certain(pose, covariance) {
-            Some(decision) => Ok(decision),
-            None => self.decide_by_integers(pose, covariance),
+        if self.is_certain(pose, covariance) {
+            return Ok(Decision::Inside);
         }
+        self.decide_by_integers(pose, covariance)
     }
 
-    /// Returns the decision if the filter is certain, else `None`. [`Filter::decide`] uses the integer code in all other cases.
+    /// Returns `true` if the filter is certain that the integer code permits the set. [`Filter::decide`] uses the integer code in all other
+    /// cases.
     #[inline]
     #[must_use]
-    pub fn certain(&self, pose: [f64; 3], covariance: &[[f64; 3]; 3]) -> Option<Decision> {
+    pub fn is_certain(&self, pose: [f64; 3], covariance: &[[f64; 3]; 3]) -> bool {
         let goal = self.table.goal().pose;
-        let spread = Spread::new(pose, covariance, self.radius_squared, goal)?;
-        let Some(layout) = &self.layout else {
-            let cause = self.cells.cause(&spread)?;
-            // Without facets the integer code tests the extent and the estimate first.
-            let is_certain = cause != Cause::NotContained || self.is_in_no_cell(&spread.estimate);
-            return is_certain.then_some(Decision::Outside(cause));
-        };
-        let Err(failing) = layout.contains(&spread) else {
-            return Some(Decision::Inside);
-        };
-        let found = layout.pose_outside(&spread, failing)?;
-        if !self.is_in_no_cell(&found) {
-            return None;
-        }
-        self.cells.cause(&spread).map(Decision::Outside)
-    }
-
-    /// Returns `true` if no cell is near a pose.
-    fn is_in_no_cell(&self, pose: &Point) -> bool {
-        let grid = self.table.grid();
-        grid.is_none_or(|grid| self.cells.are_free(grid, pose))
+        self.layout.as_ref().is_some_and(|layout| {
+            Spread::new(pose, covariance, self.radius_squared, goal)
+                .is_some_and(|spread| layout.contains(&spread))
+        })
     }
 
     #[inline(never)]

@@ -1,4 +1,4 @@
-//! Facets in floats: does one piece certainly contain a set, and which pose of the set is certainly in no piece?
+//! Facets in floats: does one piece certainly contain a set?
 //!
 //! The terms are those of `contain::slab` for one slab: the whole set.
 
@@ -53,8 +53,6 @@ struct Facet {
     y: f64,
     /// The bound minus the largest effect of the estimate's rounding.
     inner: f64,
-    /// The bound plus more than the table's clearance.
-    outer: f64,
 }
 
 /// The point of the estimate in a frame.
@@ -64,15 +62,6 @@ struct Seen {
     y: f64,
     /// The effect of the yaw on the point, per radian.
     lever: [f64; 2],
-}
-
-/// A facet that is not certain to hold.
-#[derive(Clone, Copy)]
-pub(super) struct Failing {
-    /// The facet's normal in world axes, and the effect of the yaw.
-    direction: [f64; 3],
-    /// `true` if the estimate itself is beyond the facet.
-    is_estimate_beyond: bool,
 }
 
 /// A set with the terms that all frames of a layout share.
@@ -111,7 +100,6 @@ impl Layout {
                         y: f64::from(facet.y) / 16_384.0,
                         // Twice: the lever of the yaw is rounded as the point is.
                         inner: b - (2.0 * clearance + 1.0) * unit - 2.0,
-                        outer: b + (clearance + 1.0) * unit + 2.0,
                     });
                 }
                 frames.push(Frame {
@@ -137,30 +125,25 @@ impl Layout {
         }
     }
 
-    /// Returns `Ok` only if the integer code accepts the set by one piece. The error is a facet of the last piece, if one fails.
+    /// Returns `true` only if the integer code accepts the set by one piece.
     #[inline]
-    pub fn contains(&self, spread: &Spread) -> Result<(), Option<Failing>> {
-        let terms = self.terms(spread).ok_or(None)?;
+    pub fn contains(&self, spread: &Spread) -> bool {
+        let Some(terms) = self.terms(spread) else {
+            return false;
+        };
         // In axes of the robot, where its frames have constant normals.
         let turned = if self.lever > 0.0 {
             spread.above.turned(spread.estimate.facing)
         } else {
             spread.above
         };
-        let mut found = None;
-        for piece in &self.pieces {
-            if !piece.holds_arc(spread) {
-                continue;
-            }
-            let frames = self.frames(piece).iter();
-            let mut failing =
-                frames.filter_map(|frame| self.failing(frame, spread, &turned, &terms));
-            found = failing.next();
-            if found.is_none() {
-                return Ok(());
-            }
-        }
-        Err(found)
+        self.pieces.iter().any(|piece| {
+            piece.holds_arc(spread)
+                && self
+                    .frames(piece)
+                    .iter()
+                    .all(|frame| self.holds(frame, spread, &turned, &terms))
+        })
     }
 
     /// Returns the terms of a set, or `None` if the integer code evaluates the set in another way.
@@ -191,15 +174,9 @@ impl Layout {
         })
     }
 
-    /// Returns the first facet of a frame that is not certain to hold.
+    /// Returns `true` if every facet of a frame is certain to hold.
     #[inline(always)]
-    fn failing(
-        &self,
-        frame: &Frame,
-        spread: &Spread,
-        turned: &Square,
-        terms: &Terms,
-    ) -> Option<Failing> {
+    fn holds(&self, frame: &Frame, spread: &Spread, turned: &Square, terms: &Terms) -> bool {
         let (above, more, side) = match frame.axes {
             Axes::World => (&spread.above, 0.0, 1.0),
             Axes::Robot => (turned, terms.turned, -1.0),
@@ -210,79 +187,15 @@ impl Layout {
         let [square, cube] = terms.bent;
         let swing = (lx.abs() + ly.abs()) * NORMAL;
         let enough = less + terms.broad + swing * (spread.turn + square + cube);
-        let failing = self.facets(frame).iter().find(|facet| {
+        self.facets(frame).iter().all(|facet| {
             let slack = facet.inner - (facet.x * seen.x + facet.y * seen.y);
-            slack < enough && {
+            slack >= enough || {
                 // C and S: the part of the point that turns along the normal, and ahead of it.
                 let c = side * (facet.x * ly - facet.y * lx);
                 let s = facet.x * lx + facet.y * ly;
                 let left = slack - less - (-c).max(0.0) * square - s.abs() * cube;
-                let normal = [facet.x, facet.y, s];
-                !(left >= 0.0 && left * left >= above.along(normal) * (1.0 + 1e-9))
+                left >= 0.0 && left * left >= above.along([facet.x, facet.y, s]) * (1.0 + 1e-9)
             }
-        });
-        failing.map(|facet| Failing {
-            direction: facet.direction(frame.axes, &seen, &spread.estimate),
-            is_estimate_beyond: facet.x * seen.x + facet.y * seen.y > facet.outer,
-        })
-    }
-
-    /// Returns a pose of the given set that is certainly in no piece, if one is found: the estimate, the pose farthest beyond a
-    /// failing facet, or the pose that is farthest beyond a facet of a piece.
-    #[inline]
-    pub fn pose_outside(&self, spread: &Spread, failing: Option<Failing>) -> Option<Point> {
-        let is_outside = |pose: &Point| self.is_in_no_piece(pose);
-        let first = failing.and_then(|facet| {
-            if facet.is_estimate_beyond {
-                Some(spread.estimate)
-            } else {
-                spread.farthest(facet.direction)
-            }
-        });
-        first.filter(is_outside).or_else(|| {
-            if is_outside(&spread.estimate) {
-                return Some(spread.estimate);
-            }
-            let mut pieces = self.pieces.iter();
-            pieces.find_map(|piece| self.farthest_beyond(piece, spread).filter(is_outside))
-        })
-    }
-
-    /// Returns the pose of the given set that is farthest beyond a facet of a piece or beyond its arc, to first order.
-    #[inline(never)]
-    fn farthest_beyond(&self, piece: &Piece, spread: &Spread) -> Option<Point> {
-        // Squares are compared: the sign of a difference of roots is all that counts, and an order of its size.
-        let (mut most, mut along) = (0.0, None);
-        for frame in self.frames(piece) {
-            let seen = frame.seen(&spread.estimate);
-            for facet in self.facets(frame) {
-                let direction = facet.direction(frame.axes, &seen, &spread.estimate);
-                let slack = facet.outer - (facet.x * seen.x + facet.y * seen.y);
-                let beyond = spread.given.along(direction) - slack * slack.abs();
-                if beyond > most {
-                    (most, along) = (beyond, Some(direction));
-                }
-            }
-        }
-        let found = along.and_then(|along| spread.farthest(along));
-        found.or_else(|| {
-            // Which end of the arc is nearer.
-            let above = spread.estimate.above_goal.wrapping_sub(piece.from);
-            let is_high = above > piece.width >> 1;
-            spread.farthest([0.0, 0.0, if is_high { 1.0 } else { -1.0 }])
-        })
-    }
-
-    /// Returns `true` if a pose is beyond the arc or a facet of every piece, by more than the integer code's soundness leaves open.
-    #[inline]
-    fn is_in_no_piece(&self, pose: &Point) -> bool {
-        self.pieces.iter().all(|piece| {
-            piece.excludes_heading(pose)
-                || self.frames(piece).iter().any(|frame| {
-                    let seen = frame.seen(pose);
-                    let mut facets = self.facets(frame).iter();
-                    facets.any(|facet| facet.x * seen.x + facet.y * seen.y > facet.outer)
-                })
         })
     }
 
@@ -314,30 +227,6 @@ impl Piece {
         let turn = spread.largest_turn();
         let room = above.min(self.width.saturating_sub(above));
         above <= self.width && turn + f64::from(ARC_SLACK) + 256.0 <= f64::from(room)
-    }
-
-    /// Returns `true` if a heading is certainly not in the arc.
-    #[inline(always)]
-    fn excludes_heading(&self, pose: &Point) -> bool {
-        if self.is_whole_circle() {
-            return false;
-        }
-        let above = pose.above_goal.wrapping_sub(self.from);
-        above > self.width.saturating_add(ARC_SLACK) && above < u32::MAX - ARC_SLACK
-    }
-}
-
-impl Facet {
-    /// Returns the normal in world axes with the effect of the yaw.
-    #[inline(always)]
-    fn direction(&self, axes: Axes, seen: &Seen, estimate: &Point) -> [f64; 3] {
-        let [lx, ly] = seen.lever;
-        let [c, s] = estimate.facing;
-        let [x, y] = match axes {
-            Axes::World => [self.x, self.y],
-            Axes::Robot => [c * self.x - s * self.y, s * self.x + c * self.y],
-        };
-        [x, y, self.x * lx + self.y * ly]
     }
 }
 

@@ -29,11 +29,6 @@ const LENGTH: [f64; 2] = [1e-8, 16.0];
 const YAW: [f64; 2] = [1e-8, 36.0];
 /// Smallest determinant over the product of the variances.
 const LEAST_DETERMINANT: f64 = 5e-6;
-/// A pose of the set is nearer to the estimate by this share than the rounding of the filter could place it outside of the set.
-const WITHIN: f64 = 1.0 - 1e-6;
-/// A pose that turns farther than this is not named, so that its heading's rounding is known.
-const MOST_TURN: f64 = 3.1;
-
 /// A symmetric matrix over x, y and yaw: um^2, um rad, rad^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Square {
@@ -46,20 +41,12 @@ pub(super) struct Square {
 }
 
 impl Square {
-    /// Returns the product with a vector.
-    #[inline(always)]
-    pub fn times(&self, [x, y, t]: [f64; 3]) -> [f64; 3] {
-        [
-            self.xx * x + self.xy * y + self.xt * t,
-            self.xy * x + self.yy * y + self.yt * t,
-            self.xt * x + self.yt * y + self.tt * t,
-        ]
-    }
-
     /// Returns the square of the extent along a vector.
     #[inline(always)]
-    pub fn along(&self, v: [f64; 3]) -> f64 {
-        dot(v, self.times(v))
+    pub fn along(&self, [x, y, t]: [f64; 3]) -> f64 {
+        x * (self.xx * x + self.xy * y + self.xt * t)
+            + y * (self.xy * x + self.yy * y + self.yt * t)
+            + t * (self.xt * x + self.yt * y + self.tt * t)
     }
 
     /// Returns the matrix in axes that are turned by the angle with this cosine and sine.
@@ -79,11 +66,6 @@ impl Square {
     }
 }
 
-#[inline(always)]
-fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
-    a * x + b * y + c * z
-}
-
 /// A pose: its place from the goal in world axes, and its heading.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
@@ -99,8 +81,6 @@ pub(super) struct Point {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spread {
     pub estimate: Point,
-    /// `r2 P`.
-    pub given: Square,
     /// At least `F F'` in every direction.
     pub above: Square,
     /// At least the length of every offset in the plane.
@@ -162,30 +142,9 @@ impl Spread {
                 above_goal: binary(yaw).wrapping_sub(goal.yaw.0),
                 facing: cos_sin(yaw),
             },
-            given,
             above,
             broad: (given.xx + given.yy + more_x + more_y).sqrt() + 2.0,
             turn: (given.tt + more_turn).sqrt(),
-        })
-    }
-
-    /// Returns the pose of the given set that is farthest along a vector over x, y and yaw. `None` if it turns too far to be
-    /// named.
-    #[inline(always)]
-    pub fn farthest(&self, along: [f64; 3]) -> Option<Point> {
-        let [x, y, t] = self.given.times(along);
-        let share = WITHIN / dot([x, y, t], along).sqrt();
-        let (x, y, t) = (x * share, y * share, t * share);
-        // Also false for a NaN.
-        (t.abs() <= MOST_TURN).then(|| {
-            let [c, s] = self.estimate.facing;
-            let [cos, sin] = cos_sin(t);
-            Point {
-                x: self.estimate.x + x,
-                y: self.estimate.y + y,
-                above_goal: self.estimate.above_goal.wrapping_add(binary(t)),
-                facing: [c * cos - s * sin, s * cos + c * sin],
-            }
         })
     }
 
@@ -193,10 +152,5 @@ impl Spread {
     #[inline(always)]
     pub fn largest_turn(&self) -> f64 {
         self.turn * Q32_PER_RADIAN
-    }
-
-    /// Returns at most the largest turn of the set of integers, 2^-32 turn.
-    pub fn least_turn(&self) -> f64 {
-        self.given.tt.sqrt() * Q32_PER_RADIAN
     }
 }
