@@ -8,11 +8,8 @@ use super::scrub::{Scrub, ScrubProgress};
 use super::self_test;
 use super::standing::{DecodedState, StateSnapshot};
 use super::state::State;
-use super::{Advice, InvalidParameter, Permission, Reason, Restart, Settings, Source, Verdict};
-use crate::contain::{self, Decision, second};
-use crate::motion::MotionBounds;
+use super::{Advice, InvalidParameter, Permission, Reason, Settings, Source, Verdict};
 use crate::report::{PoseEstimate, Report};
-use crate::set::{Growth, Trust};
 use crate::table::{self, Table};
 use crate::task::Risk;
 use core::hint::black_box;
@@ -100,6 +97,10 @@ impl defmt::Format for Gate<'_> {
 const NO_SOURCE: u32 = 0x0001_0000;
 /// Half the range of the clock: a longer step counts as backwards.
 const BACKWARDS_MS: u32 = 1 << 31;
+
+mod earning;
+mod order;
+mod weighing;
 
 /// The outcome of a step, or [`CorruptWord`] if memory is corrupted.
 type Weighed = Result<Result<(), Reason>, CorruptWord>;
@@ -199,7 +200,7 @@ impl<'a> Gate<'a> {
 
     /// Ends a permit, and the permits counted so far, at the controller's time `now_ms`. Call it if something else
     /// has closed the interlock for a cause that may pass, such as a watchdog or a mode of the machine. The gate then
-    /// qualifies again as after a denial. With [`Restart::OnReset`] an open gate waits for the reset.
+    /// qualifies again as after a denial. With [`super::Restart::OnReset`] an open gate waits for the reset.
     pub fn inhibit(&mut self, now_ms: u32, reason: Reason) -> Step {
         if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -243,7 +244,7 @@ impl<'a> Gate<'a> {
     }
 
     /// Returns the verdict on a report's estimate with its margin and worst pose, as [`super::judge`] does, at the
-    /// cost of [`contain::examine`]. For telemetry: the gate does not change.
+    /// cost of [`crate::contain::examine`]. For telemetry: the gate does not change.
     pub fn examine(&self, report: &Report) -> Verdict {
         self.examine_on(&Evidence::of(report)).1
     }
@@ -457,358 +458,6 @@ impl<'a> Gate<'a> {
         Ok(weighed)
     }
 
-    /// Returns `Ok` if a report permits by itself. A repeated report is evaluated like any other, but without
-    /// [`Check::Followed`], so its signature is never complete.
-    fn weigh(
-        &self,
-        evidence: &Evidence<'_>,
-        source: Result<&Source, Reason>,
-        newest: Result<(), Reason>,
-        flow: &mut FlowSignature,
-    ) -> Weighed {
-        let source = match source {
-            Ok(source) => source,
-            Err(reason) => return Ok(Err(reason)),
-        };
-        let report = evidence.report;
-        let follows = self.follows(report, newest)?;
-        match follows {
-            Ok(()) => flow.past(Check::Followed),
-            Err(Reason::Repeated) => {}
-            Err(reason) => return Ok(Err(reason)),
-        }
-        if !self.is_fresh(report.stamp_ms)? {
-            return Ok(Err(Reason::Stale));
-        }
-        flow.past(Check::Fresh);
-        let table = match &self.table {
-            Ok(table) => table,
-            Err(reason) => return Ok(Err(*reason)),
-        };
-        if !(evidence.others.len() < MOST_HYPOTHESES) {
-            return Ok(Err(Reason::TooManyHypotheses));
-        }
-        let age_ms = self.now_ms.get()?.wrapping_sub(report.stamp_ms);
-        let movement = self.settings.movement(source.motion, age_ms);
-        let movement = movement.plus(evidence.beside);
-        let radius = table.radius_squared();
-        // Most reports state neither: nothing is copied for them.
-        let changed;
-        let trust = if evidence.since_fix_ms.is_none() && evidence.elsewhere == Risk::NONE {
-            &source.trust
-        } else {
-            let aged = source.trust_after(evidence.since_fix_ms);
-            match allowed_for(evidence.elsewhere, radius, aged) {
-                Some(trust) if evidence.elsewhere == Risk::NONE || evidence.can_make_up() => {
-                    changed = trust;
-                }
-                _ => return Ok(Err(Reason::ElsewhereTooLikely)),
-            }
-            &changed
-        };
-        if let Err(reason) = first_opinion(table, &report.belief, trust, movement) {
-            return Ok(Err(reason));
-        }
-        for belief in evidence.others {
-            if let Err(reason) = first_opinion(table, belief, trust, movement) {
-                return Ok(Err(reason));
-            }
-        }
-        flow.past(Check::First);
-        // Looked up again, so that the two evaluations do not depend on one pointer.
-        let Some(source) = black_box(self.settings)
-            .sources
-            .get(usize::from(report.source))
-        else {
-            return Err(CorruptWord);
-        };
-        let movement = self.movement_by_complement(report, source);
-        let Evidence {
-            beside,
-            elsewhere,
-            since_fix_ms,
-            ..
-        } = *black_box(evidence);
-        let movement = movement.plus(beside);
-        let changed;
-        let trust = if since_fix_ms.is_none() && elsewhere == Risk::NONE {
-            &source.trust
-        } else {
-            // The radius from flash, as for the evaluation itself.
-            let radius = table::stored_radius_squared(self.bytes);
-            let aged = source.trust_again(since_fix_ms);
-            match radius.and_then(|radius| allowed_for(elsewhere, radius, aged)) {
-                Some(trust) => changed = trust,
-                None => return Ok(Err(Reason::EvaluationsDisagree)),
-            }
-            &changed
-        };
-        let confirms = |belief: &PoseEstimate| {
-            let word = second::opinion_after(self.bytes, belief, *trust, movement);
-            word == second::INSIDE
-        };
-        if !confirms(&report.belief) {
-            return Ok(Err(Reason::EvaluationsDisagree));
-        }
-        // Counted down, so that a loop that ends too early is found.
-        let mut left = evidence.others.len();
-        for belief in evidence.others {
-            if !confirms(belief) {
-                return Ok(Err(Reason::EvaluationsDisagree));
-            }
-            left = left.wrapping_sub(1);
-        }
-        if !(left == 0) {
-            return Err(CorruptWord);
-        }
-        flow.past(Check::Second);
-        Ok(follows)
-    }
-
-    /// Returns the largest movement until a permission on a report ends, from the complements and in another form: within the time
-    /// until the estimate is too old, or the time since its stamp until the hold time is over, whichever is less.
-    #[inline(always)]
-    fn movement_by_complement(&self, report: &Report, source: &Source) -> Growth {
-        if source.motion == MotionBounds::STANDS_STILL {
-            return Growth::NONE;
-        }
-        let seen = black_box(self);
-        let settings = seen.settings;
-        let now = seen.now_ms.by_complement_of_opaque();
-        let most = settings.maximum_age_ms;
-        let held = settings.permit_hold_ms.wrapping_add(settings.response_ms);
-        let age = now.wrapping_sub(report.stamp_ms);
-        // Each time is below 2^31. An estimate that is older than the maximum age does not come here.
-        let left = most.saturating_sub(age);
-        let horizon = if left < held {
-            most.max(age)
-        } else {
-            age.wrapping_add(held)
-        };
-        source.motion.within(horizon)
-    }
-
-    /// Checks that a report is the next one of the last report's source. The first report after a start or a reset
-    /// always passes.
-    fn follows(&self, report: &Report, newest: Result<(), Reason>) -> Weighed {
-        let seen = black_box(self);
-        let source = seen.last_source.get_of_opaque()?;
-        if source == NO_SOURCE {
-            return Ok(Ok(()));
-        }
-        if source != u32::from(report.source) {
-            return Ok(Err(Reason::SourceChanged));
-        }
-        let steps = report
-            .sequence
-            .wrapping_sub(seen.last_sequence.get_of_opaque()?);
-        if steps > 1 {
-            return Ok(Err(Reason::SequenceGap));
-        }
-        if steps == 0 && report.stamp_ms == seen.newest_stamp_ms.get_of_opaque()? {
-            return Ok(Err(Reason::Repeated));
-        }
-        Ok(match newest {
-            Ok(()) if steps == 0 => Err(Reason::SequenceStuck),
-            otherwise => otherwise,
-        })
-    }
-
-    /// Checks that a stamp is newer than every earlier stamp, and not from the future.
-    ///
-    /// Both stamps are counted back from the latest time that the newest stamp can have, so that the clock's wrap
-    /// makes neither older than it is. After 49.7 days the wrap makes the newest stamp recent again, and a fresh
-    /// report waits for the maximum age at most.
-    fn is_newest(&self, stamp_ms: u32) -> Weighed {
-        let seen = black_box(self);
-        let now_ms = seen.now_ms.get_of_opaque()?;
-        if !(now_ms.wrapping_sub(stamp_ms) < BACKWARDS_MS) {
-            return Ok(Err(Reason::Stale));
-        }
-        let latest = now_ms.wrapping_add(self.settings.maximum_age_ms);
-        let newest = match seen.last_source.get_of_opaque()? {
-            // Farther back than any stamp.
-            NO_SOURCE => latest.wrapping_add(1),
-            _ => seen.newest_stamp_ms.get_of_opaque()?,
-        };
-        Ok(
-            if latest.wrapping_sub(stamp_ms) < latest.wrapping_sub(newest) {
-                Ok(())
-            } else {
-                Err(Reason::TimeBackwards)
-            },
-        )
-    }
-
-    /// Returns `true` if a report has the frame of its source and follows the last report. A second check against a
-    /// corrupted result of the first: it reads the complements and compares in another form. A stamp from the future
-    /// is not fresh, and freshness has a second check too.
-    fn follows_again(&self, report: &Report) -> bool {
-        let seen = black_box(self);
-        let source = seen.last_source.by_complement_of_opaque();
-        let settings = seen.settings;
-        let framed = settings
-            .sources
-            .get(usize::from(report.source))
-            .is_some_and(|known| known.frame.digest() ^ report.frame.digest() == 0);
-        if source == NO_SOURCE {
-            return framed;
-        }
-        let sequence = seen.last_sequence.by_complement_of_opaque();
-        let newest = seen.newest_stamp_ms.by_complement_of_opaque();
-        // Counted forwards from just after the latest time that the newest stamp can have.
-        let behind = seen
-            .now_ms
-            .by_complement_of_opaque()
-            .wrapping_add(settings.maximum_age_ms)
-            .wrapping_add(1);
-        framed
-            && source ^ u32::from(report.source) == 0
-            && sequence.wrapping_add(1) ^ report.sequence == 0
-            && report.stamp_ms.wrapping_sub(behind) > newest.wrapping_sub(behind)
-    }
-
-    /// Returns `true` if a report is the last one: a second check, in case another denial is taken for
-    /// [`Reason::Repeated`].
-    fn is_last_again(&self, report: &Report) -> bool {
-        let seen = black_box(self);
-        seen.last_source.by_complement_of_opaque() ^ u32::from(report.source) == 0
-            && seen.last_sequence.by_complement_of_opaque() ^ report.sequence == 0
-            && seen.newest_stamp_ms.by_complement_of_opaque() ^ report.stamp_ms == 0
-    }
-
-    /// Stores the values that the next report is compared with. A stamp from the future is not stored: otherwise no
-    /// report would be newer until that time.
-    fn remember(&mut self, report: &Report, is_newest: bool) -> Result<(), CorruptWord> {
-        if is_newest {
-            self.newest_stamp_ms = RedundantWord::new(report.stamp_ms);
-        } else if self.last_source.get()? == NO_SOURCE {
-            // Older than every fresh stamp.
-            let stale = self.settings.maximum_age_ms.wrapping_add(1);
-            self.newest_stamp_ms = RedundantWord::new(self.now_ms.get()?.wrapping_sub(stale));
-        }
-        self.last_source = RedundantWord::new(u32::from(report.source));
-        self.last_sequence = RedundantWord::new(report.sequence);
-        Ok(())
-    }
-
-    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and not from
-    /// the future. A stamp from the future has an age of half the clock's range or more.
-    fn is_fresh(&self, stamp_ms: u32) -> Result<bool, CorruptWord> {
-        Ok(self.is_fresh_at(self.now_ms.get()?, stamp_ms))
-    }
-
-    /// As [`Gate::is_fresh`], in a cycle at `now_ms`.
-    fn is_fresh_at(&self, now_ms: u32, stamp_ms: u32) -> bool {
-        now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()
-    }
-
-    /// Restores the state from before a report that the first checks found to be a repetition. Closes the gate
-    /// if the second check, from the complements, finds another report.
-    fn repeat(&mut self, report: &Report, before: &StateSnapshot) {
-        if self.is_last_again(report) {
-            self.restore(before);
-        } else {
-            self.close(before, Reason::Repeated);
-        }
-    }
-
-    /// Adds one permit, and opens the gate if there are enough. Repeats the first checks from the complements:
-    /// `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree.
-    fn permit(
-        &mut self,
-        report: &Report,
-        before: &StateSnapshot,
-        held: bool,
-        mut flow: FlowSignature,
-    ) -> Result<(), CorruptWord> {
-        if !self.follows_again(report) {
-            return Err(CorruptWord);
-        }
-        flow.past(Check::FollowedAgain);
-        // The age again, from the complements.
-        let seen = black_box(&*self);
-        let settings = seen.settings;
-        let now = seen.now_ms.by_complement_of_opaque();
-        if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) {
-            return Err(CorruptWord);
-        }
-        flow.past(Check::FreshAgain);
-        self.permitted_at_ms = self.now_ms;
-        let needed = u32::from(settings.permits_in_a_row);
-        let so_far = match before.standing {
-            DecodedState::Inhibited(_) => 0,
-            DecodedState::Qualifying(count) => u32::from(count),
-            DecodedState::Permitted(_) => needed,
-            DecodedState::Latched(_) => return Err(CorruptWord),
-        };
-        let count = so_far.saturating_add(1).min(0xffff);
-        if !(count >= needed && held) {
-            self.state = DecodedState::Qualifying(count as u16).word();
-            return Ok(());
-        }
-        // The count and the times again, from the complements: detects a corrupted count or subtraction.
-        if !before.has_earned_by_complement(settings.permits_in_a_row)
-            || !self.is_held_long_enough_by_complement(settings)
-        {
-            return Err(CorruptWord);
-        }
-        flow.past(Check::Qualified);
-        self.state = DecodedState::Permitted(flow).word();
-        Ok(())
-    }
-
-    /// Returns `true` if the hold time since the last denial is over.
-    fn is_held_long_enough(&self) -> Result<bool, CorruptWord> {
-        let seen = black_box(self);
-        let closed_for = seen
-            .now_ms
-            .get_of_opaque()?
-            .wrapping_sub(seen.closed_at_ms.get_of_opaque()?);
-        Ok(closed_for >= self.settings.inhibit_hold_ms)
-    }
-
-    /// As [`Gate::is_held_long_enough`], from the complements.
-    fn is_held_long_enough_by_complement(&self, settings: &Settings<'_>) -> bool {
-        let seen = black_box(self);
-        let now = seen.now_ms.by_complement_of_opaque();
-        let opens = seen
-            .closed_at_ms
-            .by_complement_of_opaque()
-            .wrapping_add(settings.inhibit_hold_ms);
-        now.wrapping_sub(opens) <= u32::MAX.wrapping_sub(settings.inhibit_hold_ms)
-    }
-
-    /// Closes the gate for at least the hold time. With [`Restart::OnReset`] an open gate stays closed until the
-    /// reset.
-    #[cfg_attr(small_code, inline(never))]
-    fn close(&mut self, before: &StateSnapshot, reason: Reason) {
-        match before.standing {
-            DecodedState::Latched(_) => {}
-            DecodedState::Permitted(_) if self.settings.restart == Restart::OnReset => {
-                self.state = DecodedState::Latched(reason).word();
-            }
-            _ => self.enter_inhibited(reason),
-        }
-    }
-
-    fn enter_inhibited(&mut self, reason: Reason) {
-        self.closed_at_ms = self.now_ms;
-        self.state = DecodedState::Inhibited(reason).word();
-    }
-
-    /// Returns `true` if a permit is still valid: a second check of the times, from the complements, independent of
-    /// the first.
-    #[cfg_attr(small_code, inline(never))]
-    fn stands(&self) -> bool {
-        let seen = black_box(self);
-        let settings = seen.settings;
-        let now = seen.now_ms.by_complement_of_opaque();
-        let age = now.wrapping_sub(seen.newest_stamp_ms.by_complement_of_opaque());
-        let since = now.wrapping_sub(seen.permitted_at_ms.by_complement_of_opaque());
-        age <= settings.oldest_ms() && since <= settings.permit_hold_ms
-    }
-
     /// Returns the current permission and state, with the verdict on a report if there is one.
     fn output(&self, verdict: Option<Result<(), Reason>>) -> Step {
         let standing =
@@ -833,27 +482,6 @@ impl<'a> Gate<'a> {
                 State::Inhibited(reason) | State::Latched(reason) => Err(reason),
             }),
         }
-    }
-}
-
-/// Returns `Ok` if the pose-set of a hypothesis after a movement is inside by the first evaluation.
-#[inline(never)]
-fn first_opinion(
-    table: &Table<'_>,
-    belief: &PoseEstimate,
-    trust: &Trust,
-    movement: Growth,
-) -> Result<(), Reason> {
-    let mut set = belief.pose_set(table.radius_squared(), *trust);
-    // In place: the set takes more memory than the rest of the step.
-    let set = match &mut set {
-        Ok(set) => set,
-        Err(impossible) => return Err((*impossible).into()),
-    };
-    set.grow(movement);
-    match contain::decide(table, set) {
-        Decision::Inside => Ok(()),
-        Decision::Outside(cause) => Err(cause.into()),
     }
 }
 
