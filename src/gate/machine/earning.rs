@@ -84,7 +84,7 @@ impl Gate<'_> {
     }
 
     /// As [`Gate::is_held_long_enough`], from the complements.
-    fn is_held_long_enough_by_complement(&self, settings: &Settings<'_>) -> bool {
+    pub(super) fn is_held_long_enough_by_complement(&self, settings: &Settings<'_>) -> bool {
         let seen = black_box(self);
         let now = seen.now_ms.by_complement_of_opaque();
         let opens = seen

@@ -1,6 +1,7 @@
 //! Reports with several hypotheses and with slip: both evaluations decide on each.
 
 use super::*;
+use crate::set::Growth;
 
 /// An estimate at `y_m` to the side of the goal.
 fn at(y_m: f64) -> PoseEstimate {
