@@ -10,7 +10,7 @@ use super::slab::{DEEPEST, Section, Slab, Width};
 use super::union::rounding_of_a_sum;
 use crate::error_budget::{Random, Row, Search};
 use crate::num::BinaryAngle;
-use crate::pose::Pose;
+use crate::pose::{GoalFrame, Pose};
 use crate::set::{Extent, Growth, PoseSet, SqrtFactor};
 use crate::table::{Axes, Cells, Facet, Facets, LONGEST_LEVER};
 use crate::test_share;
@@ -802,4 +802,112 @@ fn rounding_of_an_estimate_and_its_point() {
         unit: "2^-14 length units",
         looseness: None,
     });
+}
+
+/// A goal as a table stores it, and its heading: cosine and sine are each within one unit of 2^-30.
+fn goal(random: &mut Random) -> (GoalFrame, f64) {
+    let heading = random.within(0.0, TAU);
+    let mut entry =
+        |exact: f64| (exact * 1_073_741_824.0 + random.within(-0.5, 0.5)).round() as i32;
+    let (cos_q30, sin_q30) = (entry(heading.cos()), entry(heading.sin()));
+    let pose = Pose {
+        x_um: 0,
+        y_um: 0,
+        yaw: BinaryAngle((heading / TAU * 4_294_967_296.0).round() as i64 as u32),
+    };
+    let goal = GoalFrame {
+        pose,
+        cos_q30,
+        sin_q30,
+    };
+    (goal, heading)
+}
+
+/// The rows of the head of [`super`]: a set in the goal's axes, which are those of the cells.
+#[test]
+fn sets_in_the_axes_of_cells() {
+    let mut random = Random::new(47);
+    let (mut of_places, mut of_headings) = (Search::new(), Search::new());
+    let (mut of_factors, mut of_scales) = (Search::new(), Search::new());
+    for _ in 0..test_share(2_000_000, 200) {
+        let (goal, turn) = goal(&mut random);
+        let (s, c) = turn.sin_cos();
+        // Up to 2^28 um from the goal, each to the nearest micrometre.
+        let [x, y] = [0; 2].map(|_| random.log_within(1.0, 268e6) * random.sign());
+        let [gx, gy] = [0; 2].map(|_| random.within(-0.5, 0.5));
+        let yaw = random.within(-TAU, TAU);
+        let pose = Pose {
+            x_um: x.round() as i32,
+            y_um: y.round() as i32,
+            yaw: BinaryAngle::from_radians(yaw).unwrap(),
+        };
+        if let Some(found) = goal.pose_to_goal(pose) {
+            let (x, y) = (x - gx, y - gy);
+            let exact = [c * x + s * y, c * y - s * x];
+            for (found, exact) in [found.x_um, found.y_um].into_iter().zip(exact) {
+                of_places.case(2.42, (f64::from(found) - exact).abs());
+            }
+            let exact = (yaw - turn) / TAU * 4_294_967_296.0;
+            let off = f64::from(found.yaw.0) - exact.rem_euclid(4_294_967_296.0);
+            let off = off - (off / 4_294_967_296.0).round() * 4_294_967_296.0;
+            of_headings.case(1.01, off.abs());
+        }
+        let mut row = || [0; 3].map(|_| (random.log_within(1.0, 3e6) * random.sign()) as i32);
+        let factor = SqrtFactor {
+            yaw: 1,
+            x: row(),
+            y: row(),
+        };
+        let scale_q16 = random.log_within(1e3, 4e6) as u32;
+        let scale = f64::from(scale_q16) / 65_536.0;
+        let Some(scaled) = factor.scaled(scale_q16) else {
+            continue;
+        };
+        // A row's error along any unit vector is the length of the errors of its entries.
+        let error = |of: [i32; 3], exact: [f64; 3]| {
+            let squares = of
+                .iter()
+                .zip(exact)
+                .map(|(of, exact)| (f64::from(*of) - exact).powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        let exact = |k: usize, x: &[i32; 3], y: &[i32; 3], times: f64| {
+            let (x, y) = (f64::from(x[k]) * times, f64::from(y[k]) * times);
+            [c * x + s * y, c * y - s * x]
+        };
+        let rotated = [0, 1, 2].map(|k| exact(k, &factor.x, &factor.y, 1.0));
+        let found = factor.to_goal(&goal);
+        of_factors.case(1.74, error(found.x, rotated.map(|v| v[0])));
+        of_factors.case(1.74, error(found.y, rotated.map(|v| v[1])));
+        // The scale's share alone: rotated exactly.
+        let before = [0, 1, 2].map(|k| exact(k, &scaled.x, &scaled.y, 1.0));
+        let after = [0, 1, 2].map(|k| exact(k, &factor.x, &factor.y, scale));
+        for axis in 0..2 {
+            let squares = before
+                .iter()
+                .zip(after)
+                .map(|(a, b)| (a[axis] - b[axis]).powi(2));
+            of_scales.case(1.23, squares.sum::<f64>().sqrt());
+        }
+    }
+    for (search, name, unit) in [
+        (of_places, "contain: estimate in the goal frame", "um"),
+        (
+            of_headings,
+            "contain: heading above the goal's",
+            "2^-32 turn",
+        ),
+        (
+            of_factors,
+            "contain: factor in the goal frame, of a row",
+            "um",
+        ),
+        (of_scales, "contain: factor times a scale, of a row", "um"),
+    ] {
+        search.report(&Row {
+            name,
+            unit,
+            looseness: None,
+        });
+    }
 }

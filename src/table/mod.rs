@@ -421,4 +421,6 @@ fn is_unit(cos_q30: i32, sin_q30: i32) -> bool {
 }
 
 #[cfg(test)]
+mod error_budget;
+#[cfg(test)]
 pub(crate) mod tests;

@@ -63,7 +63,7 @@ impl Question<'_> {
         Some(above)
     }
 
-    /// Returns the heading, 2^-32 turn: off by at most one unit, or by at most 32 from a quaternion. `None`
+    /// Returns the heading, 2^-32 turn: off by at most one unit, or by at most 16 from a quaternion. `None`
     /// if it is invalid or the robot is tilted.
     #[inline(never)]
     pub fn heading(&self) -> Option<u32> {

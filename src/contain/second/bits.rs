@@ -219,6 +219,11 @@ impl Short {
             .then_some(mantissa.wrapping_shl(by.unsigned_abs()))
     }
 
+    #[cfg(test)]
+    pub fn value(self) -> f64 {
+        f64::from(self.mantissa) * 2f64.powi(self.exponent)
+    }
+
     /// Returns a number that is not below zero as an integer, rounded down. Returns the largest `u64` if
     /// the value is too large.
     pub fn whole(self) -> u64 {

@@ -30,10 +30,11 @@ const LARGEST_TURN: u64 = 116_929_449_004_694_807;
 const PI_Q30: u64 = 3_373_259_426;
 
 // The tolerances of the head of `super`.
-/// Each entry of C is rounded towards zero by less than 2.5: off the diagonal, less than this per row.
-const ROUNDING_OF_C: i32 = 5;
+/// Each entry of C is rounded down by less than 2.5. So with `d` the largest of them off the diagonal, C along a unit vector `v` is above the exact one by at
+/// most `d (1 - (v_1 + v_2 + v_3)^2)`: less than this.
+pub(super) const ROUNDING_OF_C: i32 = 3;
 /// The same for C rotated into the robot's axes, and from C to S.
-const ROUNDING_OF_S: i32 = 8;
+pub(super) const ROUNDING_OF_S: i32 = 8;
 /// Most by which both roundings together can lower a variance along a normal, times the normal's square,
 /// 2^28 and a little.
 const BELOW_ZERO: i64 = -(64 << 28);
@@ -153,7 +154,7 @@ struct FrameProjection {
 }
 
 impl Body {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         at: [0; 2],
         above_goal: 0,
         heading: 0,
@@ -251,7 +252,7 @@ impl Body {
 
     /// Computes C of an ellipsoid, lowered by its rounding.
     #[inline(always)]
-    fn take(&mut self, ellipsoid: &Ellipsoid, unit: i32, lever: i32) -> Option<()> {
+    pub(super) fn take(&mut self, ellipsoid: &Ellipsoid, unit: i32, lever: i32) -> Option<()> {
         let (plane, yaw) = (ellipsoid.plane, ellipsoid.yaw);
         let [.., tt] = ellipsoid.covariance;
         self.reach = tt.times(yaw.times(SQUARE_TURN)).whole();
@@ -436,7 +437,7 @@ fn angle(turn: u64) -> u32 {
 
 /// Returns C in the robot's axes, `R(-yaw) C R(yaw)`.
 #[inline(never)]
-fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance {
+pub(super) fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance {
     let along = |x: i32, y: i32| both(c, x, s, y);
     let across = |x: i32, y: i32| both(c, y, s.wrapping_neg(), x);
     let (ux, uy) = (along(*xx, *xy), along(*xy, *yy));
@@ -453,7 +454,7 @@ fn turned([xx, xy, yy, xt, yt, tt]: &Covariance, [c, s]: [i32; 2]) -> Covariance
 
 /// Returns S of a point with a lever over L, lowered by its rounding. The largest is below 2^30.6.
 #[inline(always)]
-fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3] {
+pub(super) fn spread([xx, xy, yy, xt, yt, tt]: &Covariance, [lx, ly]: [i32; 2]) -> [i32; 3] {
     let vx = xt.wrapping_add(share(*tt, lx));
     let vy = yt.wrapping_add(share(*tt, ly));
     [

@@ -3,7 +3,6 @@ use crate::contain::{Decision, decide};
 use crate::report::Heading;
 use crate::set::{CrossTerms, Estimate, Inflation, SplitWeight, Uncertainty};
 use crate::table::{Axes, Table};
-use core::f64::consts::TAU;
 use proptest::prelude::*;
 
 const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
@@ -61,26 +60,6 @@ fn the_words_are_far_apart_and_far_from_nothing() {
     for byte in INSIDE.to_le_bytes() {
         assert_eq!(byte.count_ones(), 4);
     }
-}
-
-/// The figures of the head of `turn.rs`.
-#[test]
-fn turns_keep_their_error() {
-    let (mut worst, mut worst_heading) = (0.0f64, 0i32);
-    for step in 0..1u32 << 20 {
-        let heading = (step << 12).wrapping_add(step.wrapping_mul(0x9e37_79b9) >> 20);
-        let [c, s] = turn::cosine_and_sine(heading);
-        let (sine, cosine) = (f64::from(heading) / 4_294_967_296.0 * TAU).sin_cos();
-        let unit = f64::from(1 << 30);
-        worst = worst.max((f64::from(c) / unit - cosine).abs());
-        worst = worst.max((f64::from(s) / unit - sine).abs());
-        let length = 0.98 + f64::from(step & 15) * 0.002;
-        let vector = [cosine, sine].map(|v| (v * length * unit).round() as i32);
-        let off = turn::heading(vector).wrapping_sub(heading) as i32;
-        worst_heading = worst_heading.max(off.abs());
-    }
-    assert!(worst <= 2f64.powi(-26), "2^{:.2}", worst.log2());
-    assert!((1..=24).contains(&worst_heading), "{worst_heading}");
 }
 
 #[test]
