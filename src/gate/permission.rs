@@ -135,14 +135,17 @@ pub(super) enum Check {
 impl FlowSignature {
     const START: Self = Self(0x5aa5);
 
-    /// The only signature of a permit.
-    pub const COMPLETE: Self = Self::START
+    /// The only signature of a report that counts towards a permit.
+    pub const WEIGHED: Self = Self::START
         .and(Check::Followed)
         .and(Check::Fresh)
         .and(Check::First)
         .and(Check::Second)
         .and(Check::FollowedAgain)
-        .and(Check::FreshAgain)
+        .and(Check::FreshAgain);
+
+    /// The only signature of a permit.
+    pub const COMPLETE: Self = Self::WEIGHED
         .and(Check::Qualified)
         .stored()
         .and(Check::Stands);

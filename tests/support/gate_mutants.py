@@ -51,6 +51,8 @@ MUTANTS = [
      "if false {\n            self.state = DecodedState::Inhibited(Reason::Silent).word();"),
     ("a word is not compared with its complement", "doubled.rs",
      "if self.word ^ self.complement == u32::MAX {", "if self.word ^ self.complement == u32::MAX || true {"),
+    ("a report that skipped a check counts", "machine/earning.rs",
+     "if flow != FlowSignature::WEIGHED {", "if flow != FlowSignature::WEIGHED && false {"),
     ("the sequence is not checked again", "machine/earning.rs",
      "if !self.follows_again(report) {", "if !self.follows_again(report) && false {"),
     ("the number of permits is not checked again", "machine/earning.rs",

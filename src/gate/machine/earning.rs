@@ -49,6 +49,10 @@ impl Gate<'_> {
             return Err(CorruptWord);
         }
         flow.past(Check::FreshAgain);
+        // Else a denial that is taken for a permit would qualify the next report.
+        if flow != FlowSignature::WEIGHED {
+            return Err(CorruptWord);
+        }
         self.permitted_at_ms = self.now_ms;
         let needed = u32::from(settings.permits_in_a_row);
         let so_far = match before.standing {
