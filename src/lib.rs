@@ -79,9 +79,24 @@ pub(crate) fn test_share(all: u32, interpreted: u32) -> u32 {
 #[cfg(test)]
 mod error_budget;
 
-mod messages;
+/// Implements `Display`, and `Error` unless `no error` is given, for an enum whose every variant has a constant text. Firmware that formats no error
+/// does not link it.
+macro_rules! messages {
+    (no error $name:ident { $($variant:ident => $message:literal,)+ }) => {
+        impl core::fmt::Display for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.write_str(match self {
+                    $(Self::$variant => $message,)+
+                })
+            }
+        }
+    };
+    ($name:ident { $($variant:ident => $message:literal,)+ }) => {
+        messages!(no error $name { $($variant => $message,)+ });
 
-mod parts;
+        impl core::error::Error for $name {}
+    };
+}
 
 pub mod num;
 

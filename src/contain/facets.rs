@@ -9,9 +9,9 @@ use super::slab::{DEEPEST, Section, Slab, U};
 use super::union;
 use crate::num::COS_SIN_ERROR_Q15;
 use crate::num::wide;
-use crate::parts;
 use crate::pose::Pose;
 use crate::set::PoseSet;
+use crate::table::parts;
 use crate::table::{Axes, Facet, Facets, Frame, MOST_SLABS, Piece};
 
 /// Largest `|x| + |y|` of a normal in any axes: 2^14 sqrt(1 + 2^-7) sqrt(2).

@@ -97,7 +97,7 @@ pub enum Cause {
     TooCostly,
 }
 
-crate::messages::messages!(Cause {
+messages!(Cause {
     TooLarge => "the pose-set is wider than the whole table on some axis, for every estimate",
     OffTable => "the estimate is not on the table",
     NotContained => "some pose of the pose-set is not proven inside the success set",

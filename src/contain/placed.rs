@@ -6,9 +6,9 @@
 
 use super::slab::{Middle, Root, U, Width};
 use crate::num::{BinaryAngle, product, sqrt_ceil};
-use crate::parts;
 use crate::pose::{Pose, REACH_UM};
 use crate::set::{Extent, Growth, PoseSet, SqrtFactor, Turn};
+use crate::table::parts;
 use crate::table::{Axes, Facet, Facets, Frame, NORMAL_BITS, Piece};
 
 /// The largest heading offset that is cut into slabs: one turn, 2^-24 turn.

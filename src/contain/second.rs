@@ -50,9 +50,9 @@
 //! the table has cells instead of facets, these poses are looked up there. Both are spot checks, not proofs. The share of wrong acceptances is
 //! measured.
 
-use crate::parts;
 use crate::report::PoseEstimate;
 use crate::set::{Growth, Trust};
+use crate::table::parts;
 
 use self::believed::Question;
 use self::bits::word32;

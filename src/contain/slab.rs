@@ -32,8 +32,8 @@
 
 use super::placed::{Placed, Seen, dot, q15};
 use crate::num::{product, sqrt_ceil, towards_zero, wide};
-use crate::parts;
 use crate::set::Turn;
+use crate::table::parts;
 use crate::table::{Axes, Facet, NORMAL_BITS};
 
 /// A section is beyond a facet if it is so by more than this, extent units.

@@ -3,8 +3,8 @@
 use super::placed::{Movement, Placed};
 use super::slab::{Section, U, squares};
 use crate::num::{product, sqrt_ceil, towards_zero};
-use crate::parts;
 use crate::table::Facets;
+use crate::table::parts;
 
 /// Headings on either side of the estimate's at which [`farthest`] evaluates facets.
 const SIDE: i32 = 8;

@@ -32,8 +32,8 @@ use super::facets::{middle_of, next_of};
 use super::placed::{ARC_SLACK, ONE_TURN, Placed};
 use super::slab::{DEEPEST, Root, Section, Slab, U, Width};
 use crate::num::{Divisor, product, sqrt_ceil};
-use crate::parts;
 use crate::pose::Pose;
+use crate::table::parts;
 use crate::table::{Axes, Facet, Facets, MOST_UNION_STEPS, Piece};
 
 /// Returns the most by which rounding in a weighted sum of two sections can lower a bound, extent units.

@@ -2,10 +2,10 @@
 
 use super::{GoalFramePoseSet, Margin, union};
 use crate::num::{ANGLE_UNITS_PER_Q24, sqrt_ceil};
-use crate::parts;
 use crate::pose::Pose;
 use crate::set::{Extent, PoseSet};
 use crate::table::Table;
+use crate::table::parts;
 
 /// One of each pair of opposite directions in which outermost poses are looked up.
 const DIRECTIONS: [[i8; 3]; 13] = [

@@ -53,7 +53,7 @@ pub enum InterlockFault {
     OldPermission,
 }
 
-crate::messages::messages!(InterlockFault {
+messages!(InterlockFault {
     Output => "the output pin reported an error",
     Input => "the read-back pin reported an error",
     NotFollowing => "the read-back did not follow the output in time: a contact is welded or broken, or a pin is stuck",

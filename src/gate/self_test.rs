@@ -2,10 +2,10 @@
 
 use super::Reason;
 use crate::contain::{self, Cause, Decision, second};
-use crate::parts;
 use crate::report::{Heading, PoseEstimate};
 use crate::set::{CrossTerms, Inflation, InputError, SplitWeight, Trust, Uncertainty};
 use crate::table::Table;
+use crate::table::parts;
 
 /// A small proven table of facets with borders of every kind: image edges, distance, obliqueness and a turned goal
 /// (`crates/posegate-host/tests/golden_tables.rs` makes it).

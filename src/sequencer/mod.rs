@@ -92,7 +92,7 @@ pub enum StopReason {
     NoEntry,
 }
 
-crate::messages::messages!(no error StopReason {
+messages!(no error StopReason {
     Done => "the work is done",
     GaveUp => "a task failed as often as its rule allows, and the plan has no alternative",
     NoEntry => "no entry of the plan is proven for the pose-set",

@@ -94,7 +94,7 @@ pub enum RulesError {
     Rule,
 }
 
-crate::messages::messages!(RulesError {
+messages!(RulesError {
     Length => "the length of the rule table differs from its header",
     Header => "the magic bytes, the version or another header field of the rule table is wrong",
     Checksum => "the checksum of the rule table is wrong: the bytes are damaged",

@@ -109,7 +109,7 @@ pub enum InputError {
     Tilted,
 }
 
-crate::messages::messages!(InputError {
+messages!(InputError {
     EstimateNotFinite => "a coordinate of the estimate is NaN or infinite",
     EstimateOutOfRange => "the estimate is more than 2000 m from the origin on an axis, or its yaw is 16,384 rad or more",
     CovarianceNotFinite => "an entry of the covariance is NaN or infinite",

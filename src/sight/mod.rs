@@ -89,7 +89,7 @@ pub enum FailedConstraint {
     Psi,
 }
 
-crate::messages::messages!(no error FailedConstraint {
+messages!(no error FailedConstraint {
     Distance => "the tag is farther away than d_max",
     Depth => "a corner of the tag is nearer than z_near, or behind the camera",
     Image => "a corner of the tag is outside of the image",

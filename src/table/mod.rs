@@ -54,7 +54,6 @@
 //! `[lo + i step, lo + (i + 1) step]`; the same applies to rows along y. See [`Grid`] for the layout.
 
 use crate::num::BinaryAngle;
-use crate::parts;
 use crate::pose::{GoalFrame, Pose};
 use crate::set::RadiusSquared;
 
@@ -77,6 +76,7 @@ mod cells;
 mod checksum;
 mod facets;
 mod grid;
+pub(crate) mod parts;
 mod sight;
 mod stored;
 mod worst;
@@ -123,7 +123,7 @@ pub enum TableError {
     NoCells,
 }
 
-crate::messages::messages!(TableError {
+messages!(TableError {
     TooShort => "the bytes are fewer than a table's header and checksum",
     Magic => "the first bytes are not `POSEGATE`",
     Version => "the format version is not one that this program reads",

@@ -134,7 +134,7 @@ pub enum WireError {
     Table = 4,
 }
 
-crate::messages::messages!(WireError {
+messages!(WireError {
     Frame => "the frame is longer than any message, or not COBS",
     Checksum => "the checksum of the frame is wrong",
     Content => "the message has another version, an unknown kind, a radius out of range or a wrong length",

@@ -13,8 +13,8 @@ use super::believed::{Ellipsoid, Question};
 use super::bits::{quotient, root, root32, short_by, wide, word16, word32};
 use super::spots::{FINER, outermost_hold};
 use super::turn::cosine_and_sine;
-use crate::parts;
 use crate::set::Uncertainty;
+use crate::table::parts;
 
 const HEAD: usize = 12;
 pub(super) type Facet = [u8; 6];
