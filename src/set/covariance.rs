@@ -77,6 +77,18 @@ const Q24_2: Unit = Unit {
 const LARGEST_LENGTH: i64 = 1 << 28;
 const LARGEST_YAW: i64 = 1 << 29;
 
+/// Returns the factor of `r2 P`, rounded outwards, and `r2 P`, or the reason why `p` is not a covariance. The squared radius may differ between
+/// the plane and yaw if the terms between them are zero.
+#[inline(always)]
+pub(super) fn factor(
+    p: &[[f64; 3]; 3],
+    reach: Reach,
+) -> Result<(SqrtFactor, ScaledCovariance), InputError> {
+    let target = target(p, reach)?;
+    let factor = target.factor().ok_or(InputError::CovarianceTooLarge)?;
+    Ok((factor, target))
+}
+
 /// Checks a covariance and returns `r2 P`.
 #[inline(always)]
 pub(super) fn target(p: &[[f64; 3]; 3], reach: Reach) -> Result<ScaledCovariance, InputError> {

@@ -4,9 +4,8 @@
 //! and y, 2^-11 in yaw). A pose that is reported as one of the given set needs the opposite, a bound from inside.
 //! No decision depends on this module.
 
-use super::covariance::{Correlations, ScaledCovariance, is_positive_definite, target};
-use super::trust::Reach;
-use super::{Extent, Growth, Inflation, InputError, SqrtFactor};
+use super::covariance::{Correlations, ScaledCovariance, is_positive_definite};
+use super::{Extent, Growth, Inflation, SqrtFactor};
 use crate::num::sqrt_ceil;
 
 /// A set that is contained in the given one.
@@ -17,14 +16,6 @@ pub(crate) enum Given {
     Ellipsoid(Target),
     /// A cylinder: micrometres, 2^-24 turn.
     Cylinder { translation_um: i32, yaw_q24: i32 },
-}
-
-/// Returns the factor of `r2 P`, rounded outwards, and a bound from inside, or the reason why `p` is not a covariance.
-/// The squared radius may differ between the plane and yaw if the terms between them are zero.
-pub(super) fn factor(p: &[[f64; 3]; 3], reach: Reach) -> Result<(SqrtFactor, Target), InputError> {
-    let target = target(p, reach)?;
-    let factor = target.factor().ok_or(InputError::CovarianceTooLarge)?;
-    Ok((factor, Target::of(&target)))
 }
 
 /// A lower bound of `r2 P`: um^2, um times 2^-24 turn, squares of 2^-24 turn, each below 2^60.

@@ -32,7 +32,7 @@ use crate::num::{
 };
 use crate::pose::Pose;
 
-use self::given::Given;
+use self::given::{Given, Target};
 use self::trust::Reach;
 
 pub use self::aging::{Aging, MOST_AGES};
@@ -291,9 +291,9 @@ impl PoseSet {
         covariance: &[[f64; 3]; 3],
         reach: Reach,
     ) -> Result<Self, InputError> {
-        let (factor, target) = given::factor(covariance, reach)?;
-        let extent = Extent::Gaussian(factor);
-        Ok(Self::given(mean, extent, Given::Ellipsoid(target)))
+        let (factor, target) = covariance::factor(covariance, reach)?;
+        let given = Given::Ellipsoid(Target::of(&target));
+        Ok(Self::given(mean, Extent::Gaussian(factor), given))
     }
 
     #[cfg_attr(small_code, inline(never))]

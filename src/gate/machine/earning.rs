@@ -29,7 +29,7 @@ impl Gate<'_> {
     }
 
     /// Adds one permit, and opens the gate if there are enough. Repeats the first checks from the complements:
-    /// `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree.
+    /// `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree, or if the signature is not that of every check before.
     pub(super) fn permit(
         &mut self,
         report: &Report,
