@@ -65,7 +65,7 @@ impl KnownAnswer {
 /// Decides known pose-sets on built-in tables by both evaluations. A faulty core, or a flipped bit in
 /// code that every decision executes, gives another answer.
 ///
-/// Cost: both evaluations of 13 estimates, 238,736 instructions on a Cortex-M4F (`./ci.sh budgets`). Runs when a gate is made; a main
+/// Cost: both evaluations of 13 estimates, 129,701 instructions on a Cortex-M4F (`./ci.sh budgets`). Runs when a gate is made; a main
 /// loop may call it again.
 ///
 /// # Errors
