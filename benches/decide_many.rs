@@ -1,5 +1,5 @@
 //! Measures `contain::many`: nanoseconds for one set on one core and on all, and the share of sets that the filter
-//! decides. Also measures the integer code on the same sets. Prints one JSON line for each figure; fails if
+//! permits. Also measures the integer code on the same sets. Prints one JSON line for each figure; fails if
 //! the goal for reference set A is missed or if any decision differs.
 //!
 //! `cargo bench --features std --bench decide_many`. A number is the best of 21 rounds over 100,000 sets, because other
@@ -92,7 +92,7 @@ fn measure(table: &Table<'_>, name: &str, population: &str, sets: &Sets, goal: f
     line("all cores", all, "ns/set", none);
     line("integer code alone, one core", by_integers, "ns/set", none);
     line(
-        "share decided by the filter",
+        "share permitted by the filter",
         share(certain.count()),
         "1",
         none,

@@ -34,8 +34,8 @@
 //! | tolerance, of s | at most |
 //! |---|---|
 //! | the first rounds estimate and rotated points to length units, and its cosines to 2^-15. The proof of a table raises every b by this, so that nothing outside of the proven set is accepted (`facet_clearance_q14`) | 0.72 to 1.1 units; where P rotates, 0.79 more and 5.7e-5 of the lever |
-//! | position to 2^-15 unit, cosine and sine to 2^-26 at a lever of 2^15 units; a quaternion's heading to 16 of 2^-32 turn, at the same lever; the same for the covariance's axes | 1/64 unit |
-//! | squared radius, variances and shares: down, by 2^-28 of their value | 2^-29 of the extent |
+//! | position to 2^-14 unit, cosine and sine to 2^-26 at a lever of 2^15 units; a quaternion's heading to 16 of 2^-32 turn, at the same lever; the same for the covariance's axes | 1/64 unit |
+//! | squared radius, variances and shares: down, by 1.5 of 2^-28 of their value | 0.75 of 2^-28 of the extent |
 //! | covariances down, to 28 bits of the largest variance (26 at least): each variance is lowered by 3, and by 8 more after rotations and levers, which matters if the set is far longer than its extent along the normal | 6e-4 of the longest extent |
 //! | headings of the arc | 32 of 2^-32 turn |
 //!

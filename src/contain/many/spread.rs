@@ -1,4 +1,4 @@
-//! A Gaussian pose-set in floats: the given set, and bounds of the set of integers that a decision uses instead.
+//! A Gaussian pose-set in floats: bounds of the set of integers that a decision uses instead.
 //!
 //! Lengths are in micrometres, headings in radians. The set of integers is `{ F u : |u| <= 1 }` with `F F' = T + R`, where T is
 //! `r2 P` and R has no negative direction. So R is at most three times its own diagonal, in every direction. The diagonal
@@ -29,6 +29,7 @@ const LENGTH: [f64; 2] = [1e-8, 16.0];
 const YAW: [f64; 2] = [1e-8, 36.0];
 /// Smallest determinant over the product of the variances.
 const LEAST_DETERMINANT: f64 = 5e-6;
+
 /// A symmetric matrix over x, y and yaw: um^2, um rad, rad^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Square {

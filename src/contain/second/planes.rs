@@ -20,7 +20,7 @@ const HEAD: usize = 12;
 pub(super) type Facet = [u8; 6];
 
 /// 10^12 and 10^6 with their top bits at bit 30, and the powers that undo the scaling.
-const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 9);
+pub(super) const SQUARE_MICRO: (i32, i32) = (0x746a_5288, 9);
 const WEIGHT_MICRO: (i32, i32) = (0x7a12_0000, -11);
 /// (2^32 / (2 pi))^2 with its top bit at bit 30, rounded down.
 const SQUARE_TURN: (i32, i32) = (1_740_684_680, 28);
@@ -30,8 +30,9 @@ const LARGEST_TURN: u64 = 116_929_449_004_694_807;
 const PI_Q30: u64 = 3_373_259_426;
 
 // The tolerances of the head of `super`.
-/// Each entry of C is rounded down by less than 2.5. So with `d` the largest of them off the diagonal, C along a unit vector `v` is above the exact one by at
-/// most `d (1 - (v_1 + v_2 + v_3)^2)`: less than this.
+/// Apart from a factor that all entries share, which only lowers C, an entry is down by less than 1.78 (0.25 of the covariance, 0.25 of its product, 0.28 of
+/// the weight, 1 of the shift) or, if it is below zero, up by less than 0.53. In the worst direction two entries off the diagonal are down and the third is up: C
+/// is above the exact one by less than `(0.53 + sqrt(0.53^2 + 8 1.78^2)) / 2`, which is 2.8.
 pub(super) const ROUNDING_OF_C: i32 = 3;
 /// The same for C rotated into the robot's axes, and from C to S.
 pub(super) const ROUNDING_OF_S: i32 = 8;
