@@ -259,195 +259,6 @@ typedef int32_t posegate_status;
 #endif // __cplusplus
 
 /**
- * Why a gate denies. Each reason has one cause and one thing to do about it.
- */
-enum posegate_reason
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint8_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-    /**
-     * Some pose of the pose-set is outside of the success set.
-     */
-    POSEGATE_REASON_NOT_CONTAINED = 1,
-    /**
-     * The pose-set is wider than the whole table.
-     */
-    POSEGATE_REASON_POSE_SET_TOO_LARGE = 2,
-    /**
-     * The estimate is not on the table.
-     */
-    POSEGATE_REASON_OUTSIDE_TABLE = 3,
-    /**
-     * A coordinate of the estimate is NaN or infinite.
-     */
-    POSEGATE_REASON_ESTIMATE_NOT_FINITE = 4,
-    /**
-     * The estimate is beyond 2000 m or 16,384 rad.
-     */
-    POSEGATE_REASON_ESTIMATE_OUT_OF_RANGE = 5,
-    /**
-     * An entry of the covariance is NaN or infinite.
-     */
-    POSEGATE_REASON_COVARIANCE_NOT_FINITE = 6,
-    /**
-     * The covariance was never filled.
-     */
-    POSEGATE_REASON_COVARIANCE_ZERO = 7,
-    /**
-     * The covariance differs from its transpose.
-     */
-    POSEGATE_REASON_COVARIANCE_NOT_SYMMETRIC = 8,
-    /**
-     * The covariance is not positive definite.
-     */
-    POSEGATE_REASON_COVARIANCE_NOT_POSITIVE_DEFINITE = 9,
-    /**
-     * The pose-set is beyond 268 m or 32 turns.
-     */
-    POSEGATE_REASON_COVARIANCE_TOO_LARGE = 10,
-    /**
-     * An extent of a bounded pose-set is not a positive number.
-     */
-    POSEGATE_REASON_BOUND_INVALID = 11,
-    /**
-     * The estimate is too old, or from the future.
-     */
-    POSEGATE_REASON_STALE = 12,
-    /**
-     * The gate has no valid table.
-     */
-    POSEGATE_REASON_TABLE_INVALID = 13,
-    /**
-     * The source says itself that it does not know its covariance.
-     */
-    POSEGATE_REASON_COVARIANCE_UNKNOWN = 14,
-    /**
-     * The orientation is no rotation.
-     */
-    POSEGATE_REASON_ORIENTATION_INVALID = 15,
-    /**
-     * The robot is tilted by more than 5 degrees.
-     */
-    POSEGATE_REASON_TILTED = 16,
-    /**
-     * The report is in another frame than its source was declared with.
-     */
-    POSEGATE_REASON_FRAME_MISMATCH = 17,
-    /**
-     * No source of that number was declared.
-     */
-    POSEGATE_REASON_SOURCE_UNKNOWN = 18,
-    /**
-     * Another source than that of the report before.
-     */
-    POSEGATE_REASON_SOURCE_CHANGED = 19,
-    /**
-     * A report is missing between this one and the one before.
-     */
-    POSEGATE_REASON_SEQUENCE_GAP = 20,
-    /**
-     * The sequence number stands still while the stamp moves.
-     */
-    POSEGATE_REASON_SEQUENCE_STUCK = 21,
-    /**
-     * The clock went backwards, or a stamp is not newer than all before.
-     */
-    POSEGATE_REASON_TIME_BACKWARDS = 22,
-    /**
-     * The same report again, which still permits; it counts for nothing.
-     */
-    POSEGATE_REASON_REPEATED = 23,
-    /**
-     * No report has come for longer than a permit may stand.
-     */
-    POSEGATE_REASON_SILENT = 24,
-    /**
-     * Not enough permits in a row yet.
-     */
-    POSEGATE_REASON_QUALIFYING = 25,
-    /**
-     * The gate was closed a short while ago and stays so for its hold time.
-     */
-    POSEGATE_REASON_HOLDING = 26,
-    /**
-     * The table is that of another task.
-     */
-    POSEGATE_REASON_WRONG_TASK = 27,
-    /**
-     * The table was made from another site file.
-     */
-    POSEGATE_REASON_WRONG_SITE = 28,
-    /**
-     * The table's bytes changed while the gate was running.
-     */
-    POSEGATE_REASON_TABLE_DAMAGED = 29,
-    /**
-     * The program's own bytes are not those that were sealed.
-     */
-    POSEGATE_REASON_CODE_DAMAGED = 30,
-    /**
-     * A word of the gate's memory differs from its complement, or its settings have changed.
-     */
-    POSEGATE_REASON_MEMORY_DAMAGED = 31,
-    /**
-     * The second evaluation does not confirm a permit.
-     */
-    POSEGATE_REASON_EVALUATIONS_DISAGREE = 32,
-    /**
-     * The interlock's output does not follow.
-     */
-    POSEGATE_REASON_INTERLOCK_FAULT = 33,
-    /**
-     * The self-test did not give the known answers.
-     */
-    POSEGATE_REASON_SELF_TEST_FAILED = 34,
-    /**
-     * A control cycle came later than the response time after the one before, while the gate was open.
-     */
-    POSEGATE_REASON_CYCLE_LATE = 35,
-    /**
-     * A report has more hypotheses than a gate weighs.
-     */
-    POSEGATE_REASON_TOO_MANY_HYPOTHESES = 36,
-    /**
-     * The odometry has a gap, or none has come for too long.
-     */
-    POSEGATE_REASON_ODOMETRY_GAP = 37,
-    /**
-     * An increment of the odometry is larger than the robot can move.
-     */
-    POSEGATE_REASON_ODOMETRY_JUMP = 38,
-    /**
-     * A stamp of the odometry is not newer than the one before.
-     */
-    POSEGATE_REASON_ODOMETRY_BACKWARDS = 39,
-    /**
-     * The odometry does not reach back to the stamp of the fix.
-     */
-    POSEGATE_REASON_ODOMETRY_TOO_SHORT = 40,
-    /**
-     * The hypotheses of a report leave out more than the confidence allows.
-     */
-    POSEGATE_REASON_ELSEWHERE_TOO_LIKELY = 41,
-    /**
-     * The cells were walked as far as the settings allow, without an answer.
-     */
-    POSEGATE_REASON_TOO_COSTLY = 42,
-    /**
-     * The fixes contradict the errors that the source claims.
-     */
-    POSEGATE_REASON_MODEL_CONTRADICTED = 43,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum posegate_reason posegate_reason;
-#else
-typedef uint8_t posegate_reason;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
  * What to do. 0 if nothing needs to be done.
  */
 enum posegate_advice_kind
@@ -707,6 +518,195 @@ enum posegate_state_kind
 typedef enum posegate_state_kind posegate_state_kind;
 #else
 typedef uint32_t posegate_state_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Why a gate denies. Each reason has one cause and one thing to do about it.
+ */
+enum posegate_reason
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Some pose of the pose-set is outside of the success set.
+     */
+    POSEGATE_REASON_NOT_CONTAINED = 1,
+    /**
+     * The pose-set is wider than the whole table.
+     */
+    POSEGATE_REASON_POSE_SET_TOO_LARGE = 2,
+    /**
+     * The estimate is not on the table.
+     */
+    POSEGATE_REASON_OUTSIDE_TABLE = 3,
+    /**
+     * A coordinate of the estimate is NaN or infinite.
+     */
+    POSEGATE_REASON_ESTIMATE_NOT_FINITE = 4,
+    /**
+     * The estimate is beyond 2000 m or 16,384 rad.
+     */
+    POSEGATE_REASON_ESTIMATE_OUT_OF_RANGE = 5,
+    /**
+     * An entry of the covariance is NaN or infinite.
+     */
+    POSEGATE_REASON_COVARIANCE_NOT_FINITE = 6,
+    /**
+     * The covariance was never filled.
+     */
+    POSEGATE_REASON_COVARIANCE_ZERO = 7,
+    /**
+     * The covariance differs from its transpose.
+     */
+    POSEGATE_REASON_COVARIANCE_NOT_SYMMETRIC = 8,
+    /**
+     * The covariance is not positive definite.
+     */
+    POSEGATE_REASON_COVARIANCE_NOT_POSITIVE_DEFINITE = 9,
+    /**
+     * The pose-set is beyond 268 m or 32 turns.
+     */
+    POSEGATE_REASON_COVARIANCE_TOO_LARGE = 10,
+    /**
+     * An extent of a bounded pose-set is not a positive number.
+     */
+    POSEGATE_REASON_BOUND_INVALID = 11,
+    /**
+     * The estimate is too old, or from the future.
+     */
+    POSEGATE_REASON_STALE = 12,
+    /**
+     * The gate has no valid table.
+     */
+    POSEGATE_REASON_TABLE_INVALID = 13,
+    /**
+     * The source says itself that it does not know its covariance.
+     */
+    POSEGATE_REASON_COVARIANCE_UNKNOWN = 14,
+    /**
+     * The orientation is no rotation.
+     */
+    POSEGATE_REASON_ORIENTATION_INVALID = 15,
+    /**
+     * The robot is tilted by more than 5 degrees.
+     */
+    POSEGATE_REASON_TILTED = 16,
+    /**
+     * The report is in another frame than its source was declared with.
+     */
+    POSEGATE_REASON_FRAME_MISMATCH = 17,
+    /**
+     * No source of that number was declared.
+     */
+    POSEGATE_REASON_SOURCE_UNKNOWN = 18,
+    /**
+     * Another source than that of the report before.
+     */
+    POSEGATE_REASON_SOURCE_CHANGED = 19,
+    /**
+     * A report is missing between this one and the one before.
+     */
+    POSEGATE_REASON_SEQUENCE_GAP = 20,
+    /**
+     * The sequence number stands still while the stamp moves.
+     */
+    POSEGATE_REASON_SEQUENCE_STUCK = 21,
+    /**
+     * The clock went backwards, or a stamp is not newer than all before.
+     */
+    POSEGATE_REASON_TIME_BACKWARDS = 22,
+    /**
+     * The same report again, which still permits; it counts for nothing.
+     */
+    POSEGATE_REASON_REPEATED = 23,
+    /**
+     * No report has come for longer than a permit may stand.
+     */
+    POSEGATE_REASON_SILENT = 24,
+    /**
+     * Not enough permits in a row yet.
+     */
+    POSEGATE_REASON_QUALIFYING = 25,
+    /**
+     * The gate was closed a short while ago and stays so for its hold time.
+     */
+    POSEGATE_REASON_HOLDING = 26,
+    /**
+     * The table is that of another task.
+     */
+    POSEGATE_REASON_WRONG_TASK = 27,
+    /**
+     * The table was made from another site file.
+     */
+    POSEGATE_REASON_WRONG_SITE = 28,
+    /**
+     * The table's bytes changed while the gate was running.
+     */
+    POSEGATE_REASON_TABLE_DAMAGED = 29,
+    /**
+     * The program's own bytes are not those that were sealed.
+     */
+    POSEGATE_REASON_CODE_DAMAGED = 30,
+    /**
+     * A word of the gate's memory differs from its complement, or its settings have changed.
+     */
+    POSEGATE_REASON_MEMORY_DAMAGED = 31,
+    /**
+     * The second evaluation does not confirm a permit.
+     */
+    POSEGATE_REASON_EVALUATIONS_DISAGREE = 32,
+    /**
+     * The interlock's output does not follow.
+     */
+    POSEGATE_REASON_INTERLOCK_FAULT = 33,
+    /**
+     * The self-test did not give the known answers.
+     */
+    POSEGATE_REASON_SELF_TEST_FAILED = 34,
+    /**
+     * A control cycle came later than the response time after the one before, while the gate was open.
+     */
+    POSEGATE_REASON_CYCLE_LATE = 35,
+    /**
+     * A report has more hypotheses than a gate weighs.
+     */
+    POSEGATE_REASON_TOO_MANY_HYPOTHESES = 36,
+    /**
+     * The odometry has a gap, or none has come for too long.
+     */
+    POSEGATE_REASON_ODOMETRY_GAP = 37,
+    /**
+     * An increment of the odometry is larger than the robot can move.
+     */
+    POSEGATE_REASON_ODOMETRY_JUMP = 38,
+    /**
+     * A stamp of the odometry is not newer than the one before.
+     */
+    POSEGATE_REASON_ODOMETRY_BACKWARDS = 39,
+    /**
+     * The odometry does not reach back to the stamp of the fix.
+     */
+    POSEGATE_REASON_ODOMETRY_TOO_SHORT = 40,
+    /**
+     * The hypotheses of a report leave out more than the confidence allows.
+     */
+    POSEGATE_REASON_ELSEWHERE_TOO_LIKELY = 41,
+    /**
+     * The cells were walked as far as the settings allow, without an answer.
+     */
+    POSEGATE_REASON_TOO_COSTLY = 42,
+    /**
+     * The fixes contradict the errors that the source claims.
+     */
+    POSEGATE_REASON_MODEL_CONTRADICTED = 43,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_reason posegate_reason;
+#else
+typedef uint8_t posegate_reason;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 

@@ -3,7 +3,6 @@
 //! No formula of the decision is symmetric by construction: facets, levers, slabs and several pieces have signs of their own.
 #![cfg(feature = "std")]
 
-#[allow(dead_code)] // This target uses a part.
 #[path = "../crates/posegate-testkit/src/oracle/mod.rs"]
 mod oracle;
 

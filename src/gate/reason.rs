@@ -111,54 +111,180 @@ pub enum Reason {
     ModelContradicted = 43,
 }
 
-impl Reason {
-    /// Every reason, in the order of the codes.
-    pub const ALL: [Self; 43] = [
-        Self::NotContained,
-        Self::PoseSetTooLarge,
-        Self::OutsideTable,
-        Self::EstimateNotFinite,
-        Self::EstimateOutOfRange,
-        Self::CovarianceNotFinite,
-        Self::CovarianceZero,
-        Self::CovarianceNotSymmetric,
-        Self::CovarianceNotPositiveDefinite,
-        Self::CovarianceTooLarge,
-        Self::BoundInvalid,
-        Self::Stale,
-        Self::TableInvalid,
-        Self::CovarianceUnknown,
-        Self::OrientationInvalid,
-        Self::Tilted,
-        Self::FrameMismatch,
-        Self::SourceUnknown,
-        Self::SourceChanged,
-        Self::SequenceGap,
-        Self::SequenceStuck,
-        Self::TimeBackwards,
-        Self::Repeated,
-        Self::Silent,
-        Self::Qualifying,
-        Self::Holding,
-        Self::WrongTask,
-        Self::WrongSite,
-        Self::TableDamaged,
-        Self::CodeDamaged,
-        Self::MemoryDamaged,
-        Self::EvaluationsDisagree,
-        Self::InterlockFault,
-        Self::SelfTestFailed,
-        Self::CycleLate,
-        Self::TooManyHypotheses,
-        Self::OdometryGap,
-        Self::OdometryJump,
-        Self::OdometryBackwards,
-        Self::OdometryTooShort,
-        Self::ElsewhereTooLikely,
-        Self::TooCostly,
-        Self::ModelContradicted,
-    ];
+/// Makes [`Reason::ALL`] and the texts of each reason: its variant, its name in `snake_case`, what to do in a form for programs, a sentence that says what
+/// happened, and one that says what to do.
+macro_rules! reasons {
+    ($($variant:ident $name:literal $advice:ident $meaning:literal $action:literal;)+) => {
+        impl Reason {
+            /// Every reason, in the order of the codes.
+            pub const ALL: [Self; 43] = [$(Self::$variant),+];
 
+            /// Returns the name in `snake_case`, the same in every output.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)+
+                }
+            }
+
+            /// Returns a sentence that says what happened.
+            #[must_use]
+            pub const fn meaning(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $meaning,)+
+                }
+            }
+
+            /// Returns a sentence that says what to do.
+            #[must_use]
+            pub const fn action(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $action,)+
+                }
+            }
+
+            const fn kind_of_advice(self) -> Advice {
+                match self {
+                    $(Self::$variant => Advice::$advice,)+
+                }
+            }
+        }
+    };
+}
+
+reasons! {
+    NotContained "not_contained" Relocalise
+        "Some pose where the robot may be is not inside the success set as the table holds it."
+        "Relocalise: look at a tag from where it is seen well, then ask again. The worst pose says on which side the set leaves.";
+    PoseSetTooLarge "pose_set_too_large" Relocalise
+        "The pose-set is wider than the whole table on some axis: no place of the robot could make it fit."
+        "Relocalise: the filter is far too unsure for this task; a localization task must come first.";
+    OutsideTable "outside_table" Restage
+        "The estimate itself lies outside of the table's extent: the robot is not near the task's goal."
+        "Restage: drive to the task's goal first. If the robot is there, the map frame or the table is wrong.";
+    EstimateNotFinite "estimate_not_finite" Service
+        "A coordinate of the estimate is NaN or infinite."
+        "Service: the filter has diverged or the message is wired wrongly; restart the filter and check the frame.";
+    EstimateOutOfRange "estimate_out_of_range" Service
+        "The estimate is more than 2000 m from the origin, or its yaw has been wound up beyond 16384 rad."
+        "Service: the filter has diverged or the message is wired wrongly; restart the filter and check the frame.";
+    CovarianceNotFinite "covariance_not_finite" Service
+        "An entry of the covariance is NaN or infinite."
+        "Service: check how the covariance is filled and indexed (x, y, yaw; m, rad); restart the filter.";
+    CovarianceZero "covariance_zero" Service
+        "Every entry of the covariance is zero: the source never filled it."
+        "Service: make the source fill its covariance; a detector that leaves it zero needs a bounded set from its error bound.";
+    CovarianceNotSymmetric "covariance_not_symmetric" Service
+        "The covariance differs from its transpose by more than rounding."
+        "Service: check how the covariance is filled and indexed (x, y, yaw; m, rad); restart the filter.";
+    CovarianceNotPositiveDefinite "covariance_not_positive_definite" Service
+        "The covariance is not positive definite: a variance is zero or negative, or a correlation is 1 or beyond."
+        "Service: check how the covariance is filled and indexed (x, y, yaw; m, rad); restart the filter.";
+    CovarianceTooLarge "covariance_too_large" Relocalise
+        "The pose-set that the covariance describes is more than 268 m or 32 turns wide."
+        "Relocalise: the filter does not know where the robot is.";
+    BoundInvalid "bound_invalid" Service
+        "An extent of the bounded pose-set is zero, negative, not a number, or 268 m or more."
+        "Service: give the error bound of the localization task (translation and yaw, both above zero).";
+    Stale "stale" Wait
+        "The estimate is older than the maximum age, or its stamp lies in the future."
+        "Wait for a fresh estimate. If it stays stale, service: the link, or the clocks of robot and controller disagree.";
+    TableInvalid "table_invalid" Service
+        "The gate has no table: its bytes are damaged, cut short, or of another format version."
+        "Service: flash a table that was made by this tool version for this task, and verify it.";
+    CovarianceUnknown "covariance_unknown" Service
+        "The source says that it does not know its covariance (NaN in the first entry)."
+        "Service: configure the source to tell its covariance, or give its reports a bounded set.";
+    OrientationInvalid "orientation_invalid" Service
+        "The orientation is no rotation: its quaternion is not of length 1, or NaN."
+        "Service: the message is wired wrongly (the order is x, y, z, w in ROS; w, x, y, z in MAVLink) or was never filled.";
+    Tilted "tilted" Restage
+        "The robot is tilted by more than 5 degrees, so its pose is none on the floor."
+        "Restage: bring the robot to level ground. If it is there, the IMU or its mounting is wrong.";
+    FrameMismatch "frame_mismatch" Service
+        "The report's numbers are in another frame than the one that its source was declared with."
+        "Service: publish the estimate in the map frame of the site, or declare the source with its frame.";
+    SourceUnknown "source_unknown" Service
+        "The report comes from a source that the gate was not told of."
+        "Service: declare the source, or stop it from sending to this gate.";
+    SourceChanged "source_changed" Wait
+        "The report comes from another source than the one before it: one source must earn the permit alone."
+        "Wait for reports of one source. If sources alternate, service: give each its own gate, or fuse them.";
+    SequenceGap "sequence_gap" Wait
+        "The sequence number is not the next one: a report was lost, or came twice out of order."
+        "Wait for consecutive reports. If gaps go on, service: the link loses messages.";
+    SequenceStuck "sequence_stuck" Service
+        "The sequence number stands still while the stamp moves: somebody stamps old estimates anew."
+        "Service: something between source and controller repeats estimates with fresh stamps.";
+    TimeBackwards "time_backwards" Wait
+        "The controller's clock went backwards, or the report is not newer than every one before it, whatever its source."
+        "Wait for the next reports. If it goes on, service: a clock is being set, or was never set.";
+    Repeated "repeated" Wait
+        "The same report came again (sequence number and stamp of the one before). It was looked at, still permits, and counts for nothing."
+        "Wait for a new report.";
+    Silent "silent" Wait
+        "No report has come yet, or none for longer than a permit may stand."
+        "Wait for a report. If none comes, service: the source has stopped, or the link is down.";
+    Qualifying "qualifying" Wait
+        "Every report so far permits, but they are not yet as many in a row as the gate asks for."
+        "Wait for the next reports.";
+    Holding "holding" Wait
+        "The gate was closed a short while ago, and stays so for the time that it was told to hold."
+        "Wait until the hold time is over.";
+    WrongTask "wrong_task" Service
+        "The table is valid, and that of another task than the controller expects."
+        "Service: flash the table of this task.";
+    WrongSite "wrong_site" Service
+        "The table is valid, and was made from another version of the site file than the controller expects."
+        "Service: build table and firmware from the same site file (`posegate table info` tells a table's digest).";
+    TableDamaged "table_damaged" Service
+        "The table's bytes changed while the gate was running: the scrub found another checksum."
+        "Service: the flash is failing; flash the table again and verify it.";
+    CodeDamaged "code_damaged" Service
+        "The program's own bytes are not those that were sealed, or it was never sealed: the check at start or the scrub found another checksum."
+        "Service: if the firmware was never sealed, seal it (`posegate seal`); else the flash is failing: flash the firmware again.";
+    MemoryDamaged "memory_damaged" Service
+        "A word of the gate's memory differs from its complement, its settings are not what they were, or the program did not go its proper way."
+        "Service: reset the controller; if it comes again, replace it.";
+    EvaluationsDisagree "evaluations_disagree" Service
+        "The second evaluation, by another formula from the same report, does not confirm the permit of the first."
+        "Service: the controller computes wrongly; reset it, and replace it if it comes again.";
+    InterlockFault "interlock_fault" Service
+        "The interlock's output could not be driven, or the read-back did not follow it in time."
+        "Service: check the relay, its contacts and the wiring of the read-back.";
+    SelfTestFailed "self_test_failed" Service
+        "The self-test did not give the known answers on its built-in table."
+        "Service: the controller computes wrongly; flash the firmware again, or replace the controller.";
+    CycleLate "cycle_late" Wait
+        "The gate was open, and the next control cycle came later than its response time allows."
+        "Wait for the next permits. If it comes back: shorten the control cycle, or set response_ms to its longest time.";
+    TooManyHypotheses "too_many_hypotheses" Service
+        "The report has more than eight hypotheses."
+        "Configure the source: report the hypotheses of largest weight, at most eight.";
+    OdometryGap "odometry_gap" Wait
+        "Increments of the odometry are missing: one came too long after the one before, or the newest is too old."
+        "Wait for the next fix. If it comes back: check the odometry's rate and its transport.";
+    OdometryJump "odometry_jump" Wait
+        "An increment of the odometry is larger than the robot's bounds of movement allow, or turns by more than 45 degrees: a reset, a wrong unit, a wheel that spins, or readings that are too rare."
+        "Wait for the next fix. If it comes back: check the units of the odometry and the bounds.";
+    OdometryBackwards "odometry_backwards" Wait
+        "A stamp of the odometry is not newer than that of the increment before."
+        "Wait for the next fix. If it comes back: check the clock of the odometry.";
+    OdometryTooShort "odometry_too_short" Wait
+        "The fix is older than the increments that are kept, so nobody knows how the robot moved since."
+        "Wait for the next fix. If it comes back: keep more increments, or make the fixes come sooner.";
+    ElsewhereTooLikely "elsewhere_too_likely" Relocalise
+        "The robot may be at none of the report's hypotheses, with a probability that the confidence does not allow."
+        "Improve the estimate first; or report more hypotheses, at most eight.";
+    TooCostly "too_costly" Relocalise
+        "The table's cells were looked up as often as the settings allow, without an answer: the pose-set is wide, or the cells are fine."
+        "Relocalise: a smaller pose-set takes fewer look-ups. If it comes back: build the table with facets or coarser cells, or raise most_runs and response_ms.";
+    ModelContradicted "model_contradicted" Service
+        "The fixes differ from the predictions by more than the errors that the source claims: a camera was knocked, a tag has moved, or the claimed covariance is too small."
+        "Service: check camera, tags and calibration, and learn the error model again; then reset the monitor.";
+}
+
+impl Reason {
     /// Returns the code of the reason on the wire. No reason has the code 0.
     #[must_use]
     pub const fn code(self) -> u8 {
@@ -172,349 +298,13 @@ impl Reason {
         Self::ALL.get(at).copied()
     }
 
-    /// Returns the name in `snake_case`, the same in every output.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::NotContained => "not_contained",
-            Self::PoseSetTooLarge => "pose_set_too_large",
-            Self::OutsideTable => "outside_table",
-            Self::EstimateNotFinite => "estimate_not_finite",
-            Self::EstimateOutOfRange => "estimate_out_of_range",
-            Self::CovarianceNotFinite => "covariance_not_finite",
-            Self::CovarianceZero => "covariance_zero",
-            Self::CovarianceNotSymmetric => "covariance_not_symmetric",
-            Self::CovarianceNotPositiveDefinite => "covariance_not_positive_definite",
-            Self::CovarianceTooLarge => "covariance_too_large",
-            Self::BoundInvalid => "bound_invalid",
-            Self::Stale => "stale",
-            Self::TableInvalid => "table_invalid",
-            Self::CovarianceUnknown => "covariance_unknown",
-            Self::OrientationInvalid => "orientation_invalid",
-            Self::Tilted => "tilted",
-            Self::FrameMismatch => "frame_mismatch",
-            Self::SourceUnknown => "source_unknown",
-            Self::SourceChanged => "source_changed",
-            Self::SequenceGap => "sequence_gap",
-            Self::SequenceStuck => "sequence_stuck",
-            Self::TimeBackwards => "time_backwards",
-            Self::Repeated => "repeated",
-            Self::Silent => "silent",
-            Self::Qualifying => "qualifying",
-            Self::Holding => "holding",
-            Self::WrongTask => "wrong_task",
-            Self::WrongSite => "wrong_site",
-            Self::TableDamaged => "table_damaged",
-            Self::CodeDamaged => "code_damaged",
-            Self::MemoryDamaged => "memory_damaged",
-            Self::EvaluationsDisagree => "evaluations_disagree",
-            Self::InterlockFault => "interlock_fault",
-            Self::SelfTestFailed => "self_test_failed",
-            Self::CycleLate => "cycle_late",
-            Self::TooManyHypotheses => "too_many_hypotheses",
-            Self::OdometryGap => "odometry_gap",
-            Self::OdometryJump => "odometry_jump",
-            Self::OdometryBackwards => "odometry_backwards",
-            Self::OdometryTooShort => "odometry_too_short",
-            Self::ElsewhereTooLikely => "elsewhere_too_likely",
-            Self::TooCostly => "too_costly",
-            Self::ModelContradicted => "model_contradicted",
-        }
-    }
-
-    /// Returns a sentence that says what happened.
-    #[must_use]
-    pub const fn meaning(self) -> &'static str {
-        match self {
-            Self::NotContained => {
-                "Some pose where the robot may be is not inside the success set as the table holds it."
-            }
-            Self::PoseSetTooLarge => {
-                "The pose-set is wider than the whole table on some axis: no place of the robot could make it fit."
-            }
-            Self::OutsideTable => {
-                "The estimate itself lies outside of the table's extent: the robot is not near the task's goal."
-            }
-            Self::EstimateNotFinite => "A coordinate of the estimate is NaN or infinite.",
-            Self::EstimateOutOfRange => {
-                "The estimate is more than 2000 m from the origin, or its yaw has been wound up beyond 16384 rad."
-            }
-            Self::CovarianceNotFinite => "An entry of the covariance is NaN or infinite.",
-            Self::CovarianceZero => {
-                "Every entry of the covariance is zero: the source never filled it."
-            }
-            Self::CovarianceNotSymmetric => {
-                "The covariance differs from its transpose by more than rounding."
-            }
-            Self::CovarianceNotPositiveDefinite => {
-                "The covariance is not positive definite: a variance is zero or negative, or a correlation is 1 or beyond."
-            }
-            Self::CovarianceTooLarge => {
-                "The pose-set that the covariance describes is more than 268 m or 32 turns wide."
-            }
-            Self::BoundInvalid => {
-                "An extent of the bounded pose-set is zero, negative, not a number, or 268 m or more."
-            }
-            Self::Stale => {
-                "The estimate is older than the maximum age, or its stamp lies in the future."
-            }
-            Self::TableInvalid => {
-                "The gate has no table: its bytes are damaged, cut short, or of another format version."
-            }
-            Self::CovarianceUnknown => {
-                "The source says that it does not know its covariance (NaN in the first entry)."
-            }
-            Self::OrientationInvalid => {
-                "The orientation is no rotation: its quaternion is not of length 1, or NaN."
-            }
-            Self::Tilted => {
-                "The robot is tilted by more than 5 degrees, so its pose is none on the floor."
-            }
-            Self::FrameMismatch => {
-                "The report's numbers are in another frame than the one that its source was declared with."
-            }
-            Self::SourceUnknown => "The report comes from a source that the gate was not told of.",
-            Self::SourceChanged => {
-                "The report comes from another source than the one before it: one source must earn the permit alone."
-            }
-            Self::SequenceGap => {
-                "The sequence number is not the next one: a report was lost, or came twice out of order."
-            }
-            Self::SequenceStuck => {
-                "The sequence number stands still while the stamp moves: somebody stamps old estimates anew."
-            }
-            Self::TimeBackwards => {
-                "The controller's clock went backwards, or the report is not newer than every one before it, whatever its source."
-            }
-            Self::Repeated => {
-                "The same report came again (sequence number and stamp of the one before). It was looked at, still permits, and counts for nothing."
-            }
-            Self::Silent => "No report has come yet, or none for longer than a permit may stand.",
-            Self::Qualifying => {
-                "Every report so far permits, but they are not yet as many in a row as the gate asks for."
-            }
-            Self::Holding => {
-                "The gate was closed a short while ago, and stays so for the time that it was told to hold."
-            }
-            Self::WrongTask => {
-                "The table is valid, and that of another task than the controller expects."
-            }
-            Self::WrongSite => {
-                "The table is valid, and was made from another version of the site file than the controller expects."
-            }
-            Self::TableDamaged => {
-                "The table's bytes changed while the gate was running: the scrub found another checksum."
-            }
-            Self::CodeDamaged => {
-                "The program's own bytes are not those that were sealed, or it was never sealed: the check at start or the scrub found another checksum."
-            }
-            Self::MemoryDamaged => {
-                "A word of the gate's memory differs from its complement, its settings are not what they were, or the program did not go its proper way."
-            }
-            Self::EvaluationsDisagree => {
-                "The second evaluation, by another formula from the same report, does not confirm the permit of the first."
-            }
-            Self::InterlockFault => {
-                "The interlock's output could not be driven, or the read-back did not follow it in time."
-            }
-            Self::SelfTestFailed => {
-                "The self-test did not give the known answers on its built-in table."
-            }
-            Self::CycleLate => {
-                "The gate was open, and the next control cycle came later than its response time allows."
-            }
-            Self::TooManyHypotheses => "The report has more than eight hypotheses.",
-            Self::OdometryGap => {
-                "Increments of the odometry are missing: one came too long after the one before, or the newest is too old."
-            }
-            Self::OdometryJump => {
-                "An increment of the odometry is larger than the robot's bounds of movement allow, or turns by more than 45 degrees: a reset, a wrong unit, a wheel that spins, or readings that are too rare."
-            }
-            Self::OdometryBackwards => {
-                "A stamp of the odometry is not newer than that of the increment before."
-            }
-            Self::OdometryTooShort => {
-                "The fix is older than the increments that are kept, so nobody knows how the robot moved since."
-            }
-            Self::ElsewhereTooLikely => {
-                "The robot may be at none of the report's hypotheses, with a probability that the confidence does not allow."
-            }
-            Self::TooCostly => {
-                "The table's cells were looked up as often as the settings allow, without an answer: the pose-set is wide, or the cells are fine."
-            }
-            Self::ModelContradicted => {
-                "The fixes differ from the predictions by more than the errors that the source claims: a camera was knocked, a tag has moved, or the claimed covariance is too small."
-            }
-        }
-    }
-
-    /// Returns a sentence that says what to do.
-    #[must_use]
-    pub const fn action(self) -> &'static str {
-        match self {
-            Self::NotContained => {
-                "Relocalise: look at a tag from where it is seen well, then ask again. The worst pose says on which side the set leaves."
-            }
-            Self::PoseSetTooLarge => {
-                "Relocalise: the filter is far too unsure for this task; a localization task must come first."
-            }
-            Self::OutsideTable => {
-                "Restage: drive to the task's goal first. If the robot is there, the map frame or the table is wrong."
-            }
-            Self::EstimateNotFinite | Self::EstimateOutOfRange => {
-                "Service: the filter has diverged or the message is wired wrongly; restart the filter and check the frame."
-            }
-            Self::CovarianceNotFinite
-            | Self::CovarianceNotSymmetric
-            | Self::CovarianceNotPositiveDefinite => {
-                "Service: check how the covariance is filled and indexed (x, y, yaw; m, rad); restart the filter."
-            }
-            Self::CovarianceZero => {
-                "Service: make the source fill its covariance; a detector that leaves it zero needs a bounded set from its error bound."
-            }
-            Self::CovarianceTooLarge => "Relocalise: the filter does not know where the robot is.",
-            Self::BoundInvalid => {
-                "Service: give the error bound of the localization task (translation and yaw, both above zero)."
-            }
-            Self::Stale => {
-                "Wait for a fresh estimate. If it stays stale, service: the link, or the clocks of robot and controller disagree."
-            }
-            Self::TableInvalid => {
-                "Service: flash a table that was made by this tool version for this task, and verify it."
-            }
-            Self::CovarianceUnknown => {
-                "Service: configure the source to tell its covariance, or give its reports a bounded set."
-            }
-            Self::OrientationInvalid => {
-                "Service: the message is wired wrongly (the order is x, y, z, w in ROS; w, x, y, z in MAVLink) or was never filled."
-            }
-            Self::Tilted => {
-                "Restage: bring the robot to level ground. If it is there, the IMU or its mounting is wrong."
-            }
-            Self::FrameMismatch => {
-                "Service: publish the estimate in the map frame of the site, or declare the source with its frame."
-            }
-            Self::SourceUnknown => {
-                "Service: declare the source, or stop it from sending to this gate."
-            }
-            Self::SourceChanged => {
-                "Wait for reports of one source. If sources alternate, service: give each its own gate, or fuse them."
-            }
-            Self::SequenceGap => {
-                "Wait for consecutive reports. If gaps go on, service: the link loses messages."
-            }
-            Self::SequenceStuck => {
-                "Service: something between source and controller repeats estimates with fresh stamps."
-            }
-            Self::TimeBackwards => {
-                "Wait for the next reports. If it goes on, service: a clock is being set, or was never set."
-            }
-            Self::Repeated => "Wait for a new report.",
-            Self::Silent => {
-                "Wait for a report. If none comes, service: the source has stopped, or the link is down."
-            }
-            Self::Qualifying => "Wait for the next reports.",
-            Self::Holding => "Wait until the hold time is over.",
-            Self::WrongTask => "Service: flash the table of this task.",
-            Self::WrongSite => {
-                "Service: build table and firmware from the same site file (`posegate table info` tells a table's digest)."
-            }
-            Self::TableDamaged => {
-                "Service: the flash is failing; flash the table again and verify it."
-            }
-            Self::CodeDamaged => {
-                "Service: if the firmware was never sealed, seal it (`posegate seal`); else the flash is failing: flash the firmware again."
-            }
-            Self::MemoryDamaged => "Service: reset the controller; if it comes again, replace it.",
-            Self::EvaluationsDisagree => {
-                "Service: the controller computes wrongly; reset it, and replace it if it comes again."
-            }
-            Self::InterlockFault => {
-                "Service: check the relay, its contacts and the wiring of the read-back."
-            }
-            Self::SelfTestFailed => {
-                "Service: the controller computes wrongly; flash the firmware again, or replace the controller."
-            }
-            Self::CycleLate => {
-                "Wait for the next permits. If it comes back: shorten the control cycle, or set response_ms to its longest time."
-            }
-            Self::TooManyHypotheses => {
-                "Configure the source: report the hypotheses of largest weight, at most eight."
-            }
-            Self::OdometryGap => {
-                "Wait for the next fix. If it comes back: check the odometry's rate and its transport."
-            }
-            Self::OdometryJump => {
-                "Wait for the next fix. If it comes back: check the units of the odometry and the bounds."
-            }
-            Self::OdometryBackwards => {
-                "Wait for the next fix. If it comes back: check the clock of the odometry."
-            }
-            Self::OdometryTooShort => {
-                "Wait for the next fix. If it comes back: keep more increments, or make the fixes come sooner."
-            }
-            Self::ElsewhereTooLikely => {
-                "Improve the estimate first; or report more hypotheses, at most eight."
-            }
-            Self::TooCostly => {
-                "Relocalise: a smaller pose-set takes fewer look-ups. If it comes back: build the table with facets or coarser cells, or raise most_runs and response_ms."
-            }
-            Self::ModelContradicted => {
-                "Service: check camera, tags and calibration, and learn the error model again; then reset the monitor."
-            }
-        }
-    }
-
     /// Returns what to do, in a form for programs. `look_at` is the tag by which this task is
     /// localized.
     #[must_use]
     pub const fn advice(self, look_at: Option<u32>) -> Advice {
-        match self {
-            Self::NotContained
-            | Self::PoseSetTooLarge
-            | Self::CovarianceTooLarge
-            | Self::ElsewhereTooLikely
-            | Self::TooCostly => match look_at {
-                Some(tag) => Advice::LookAtTag(tag),
-                None => Advice::Relocalise,
-            },
-            Self::OutsideTable | Self::Tilted => Advice::Restage,
-            Self::Stale
-            | Self::SourceChanged
-            | Self::SequenceGap
-            | Self::TimeBackwards
-            | Self::Repeated
-            | Self::Silent
-            | Self::Qualifying
-            | Self::Holding
-            | Self::CycleLate
-            | Self::OdometryGap
-            | Self::OdometryJump
-            | Self::OdometryBackwards
-            | Self::OdometryTooShort => Advice::Wait,
-            Self::EstimateNotFinite
-            | Self::EstimateOutOfRange
-            | Self::CovarianceNotFinite
-            | Self::CovarianceZero
-            | Self::CovarianceNotSymmetric
-            | Self::CovarianceNotPositiveDefinite
-            | Self::BoundInvalid
-            | Self::TableInvalid
-            | Self::TooManyHypotheses
-            | Self::CovarianceUnknown
-            | Self::OrientationInvalid
-            | Self::FrameMismatch
-            | Self::SourceUnknown
-            | Self::SequenceStuck
-            | Self::WrongTask
-            | Self::WrongSite
-            | Self::TableDamaged
-            | Self::CodeDamaged
-            | Self::MemoryDamaged
-            | Self::EvaluationsDisagree
-            | Self::InterlockFault
-            | Self::SelfTestFailed
-            | Self::ModelContradicted => Advice::Service,
+        match (self.kind_of_advice(), look_at) {
+            (Advice::Relocalise, Some(tag)) => Advice::LookAtTag(tag),
+            (advice, _) => advice,
         }
     }
 }

@@ -11,8 +11,7 @@ fn at_root(path: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
 }
 
-/// Returns the header that cbindgen generates from the crate and the reasons, without the macro for the Rust constant
-/// `Reason::ALL`, which has no meaning in C.
+/// Returns the header that cbindgen generates from the crate and the reasons.
 fn generated() -> String {
     let config = cbindgen::Config::from_file(at_root("cbindgen.toml")).expect("cbindgen.toml");
     let bindings = cbindgen::Builder::new()
@@ -24,11 +23,7 @@ fn generated() -> String {
     let mut header = Vec::new();
     bindings.write(&mut header);
     let header = String::from_utf8(header).expect("a header is UTF-8");
-    let paragraphs: Vec<&str> = header
-        .split("\n\n")
-        .filter(|paragraph| !paragraph.contains("#define posegate_reason_ALL"))
-        .collect();
-    paragraphs.join("\n\n").lines().map(as_c).collect()
+    header.lines().map(as_c).collect()
 }
 
 /// Returns a line with the suffix U that cbindgen omits: numbers are unsigned, as are their fields.
