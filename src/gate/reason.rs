@@ -199,7 +199,7 @@ reasons! {
         "The orientation is no rotation: its quaternion is not of length 1, or NaN."
         "Service: the message is wired wrongly (the order is x, y, z, w in ROS; w, x, y, z in MAVLink) or was never filled.";
     Tilted "tilted" Restage
-        "The robot is tilted by more than 5 degrees, so its pose is none on the floor."
+        "The robot is tilted by more than 5 degrees, so its pose is not a pose on the floor."
         "Restage: bring the robot to level ground. If it is there, the IMU or its mounting is wrong.";
     FrameMismatch "frame_mismatch" Service
         "The report's numbers are in another frame than the one that its source was declared with."
@@ -214,13 +214,13 @@ reasons! {
         "The sequence number is not the next one: a report was lost, or came twice out of order."
         "Wait for consecutive reports. If gaps go on, service: the link loses messages.";
     SequenceStuck "sequence_stuck" Service
-        "The sequence number stands still while the stamp moves: somebody stamps old estimates anew."
+        "The sequence number does not change while the stamp does: old estimates get new stamps."
         "Service: something between source and controller repeats estimates with fresh stamps.";
     TimeBackwards "time_backwards" Wait
         "The controller's clock went backwards, or the report is not newer than every one before it, whatever its source."
         "Wait for the next reports. If it goes on, service: a clock is being set, or was never set.";
     Repeated "repeated" Wait
-        "The same report came again (sequence number and stamp of the one before). It was looked at, still permits, and counts for nothing."
+        "The same report came again (sequence number and stamp of the previous one). It was evaluated, still permits, and does not count."
         "Wait for a new report.";
     Silent "silent" Wait
         "No report has come yet, or none for longer than a permit may stand."
@@ -236,7 +236,7 @@ reasons! {
         "Service: flash the table of this task.";
     WrongSite "wrong_site" Service
         "The table is valid, and was made from another version of the site file than the controller expects."
-        "Service: build table and firmware from the same site file (`posegate table info` tells a table's digest).";
+        "Service: build table and firmware from the same site file (`posegate table info` prints a table's digest).";
     TableDamaged "table_damaged" Service
         "The table's bytes changed while the gate was running: the scrub found another checksum."
         "Service: the flash is failing; flash the table again and verify it.";

@@ -1,8 +1,8 @@
-//! The roundings of a table: the edges of its slabs, and its goal.
+//! The rounding of a table: the edges of its slabs of headings.
 
 use super::Cells;
+use super::tests::CELLS;
 use crate::error_budget::{Random, Row, Search};
-use crate::num::BinaryAngle;
 use crate::test_share;
 
 #[test]
@@ -13,14 +13,9 @@ fn slab_edges_keep_their_error() {
         let slabs = random.log_within(1.0, 65_535.0) as u16;
         let span = random.log_within(f64::from(slabs), 4_294_967_296.0) as u64;
         let cells = Cells {
-            x_lo_um: 0,
-            y_lo_um: 0,
-            step_um: 1,
-            columns: 1,
-            rows: 1,
-            yaw_lo: BinaryAngle(0),
             yaw_span: span.max(slabs.into()),
             slabs,
+            ..CELLS
         };
         let k = (random.unit() * f64::from(slabs)) as u16;
         let exact = cells.yaw_span as f64 * f64::from(k) / f64::from(slabs);

@@ -12,14 +12,9 @@ fn heading_on_slab_edge_is_in_both_slabs() {
         (41, 40),
     ] {
         let cells = Cells {
-            x_lo_um: 0,
-            y_lo_um: 0,
-            step_um: 1,
-            columns: 1,
-            rows: 1,
-            yaw_lo: BinaryAngle(0),
             yaw_span: span,
             slabs,
+            ..CELLS
         };
         assert!(cells.are_valid());
         assert_eq!(cells.slab_edge(0), 0);
@@ -88,7 +83,7 @@ fn repair(bytes: &mut [u8]) {
     crc.copy_from_slice(&checksum(content).to_le_bytes());
 }
 
-const CELLS: Cells = Cells {
+pub(super) const CELLS: Cells = Cells {
     x_lo_um: -3_000,
     y_lo_um: -1_000,
     step_um: 500,
