@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// The lamps of the board: the interlock and the heartbeat.
-const LEDS: u32 = 0x4002_8000;
+pub const LEDS: u32 = 0x4002_8000;
 /// Address of the number of the cycle in which the firmware must stop; above all memory that the firmware uses.
 const STOP_AT: u32 = 0x2030_0000;
 pub const NEVER: u32 = u32::MAX;
@@ -33,6 +33,8 @@ const HUNDREDTHS: u32 = 0x4002_8014;
 /// A firmware hangs if it reaches no marker in this time of the board's clock; the whole schedule takes a tenth of it.
 /// The emulator counts 64 ns per instruction, so the same firmware hangs on every machine.
 const HANGS_AFTER: u32 = 100;
+/// Stops at corrupted numbers of cycles after which a firmware counts as one that loops.
+const MOST_STOPS: u32 = 1_000;
 /// Slices of waiting after which the board's clock is read.
 const A_LOOK: u32 = 5;
 
@@ -262,26 +264,35 @@ impl Machine {
         lamps.unwrap_or(Lamps(0))
     }
 
-    /// Returns `true` if a firmware that reaches no marker still changes its heartbeat. Its events meanwhile are in the
-    /// log.
-    pub fn beats(&mut self) -> bool {
-        let before = self.events().len();
-        match self.run() {
-            At::LockedUp => false,
-            // It stopped at a marker: the firmware runs.
-            At::Address(_) => true,
-            At::Hung => {
-                let all = self.events();
-                let lamps = |events: &[Event]| -> Vec<Lamps> {
-                    events.iter().filter_map(|event| event.lamps()).collect()
-                };
-                let (old, new) = all.split_at(before);
-                let mut seen = lamps(old).split_off(lamps(old).len().saturating_sub(1));
-                seen.extend(lamps(new));
-                let beats = |pair: &[Lamps]| pair[0].0 & HEARTBEAT != pair[1].0 & HEARTBEAT;
-                seen.windows(2).any(beats)
+    /// Lets a firmware with a fault run to its end. A corrupted number of a cycle may be the one that means never: then the firmware
+    /// stops for the harness, and goes on.
+    pub fn run_to_end(&mut self, firmware: &Firmware) -> Result<At, EmulatorEnded> {
+        for _ in 0..MOST_STOPS {
+            let at = self.run();
+            if at != At::Address(firmware.stop) {
+                return Ok(at);
             }
+            self.pass()?;
         }
+        Ok(At::Hung)
+    }
+
+    /// Returns `true` if a firmware that hangs goes on like this for as long again, and changes its heartbeat. Its events meanwhile are
+    /// in the log. One that reaches its end after that time has no heartbeat either.
+    pub fn beats(&mut self, firmware: &Firmware) -> bool {
+        let before = self.events().len();
+        if !self.run_to_end(firmware).is_ok_and(|at| at == At::Hung) {
+            return false;
+        }
+        let all = self.events();
+        let lamps = |events: &[Event]| -> Vec<Lamps> {
+            events.iter().filter_map(|event| event.lamps()).collect()
+        };
+        let (old, new) = all.split_at(before);
+        let mut seen = lamps(old).split_off(lamps(old).len().saturating_sub(1));
+        seen.extend(lamps(new));
+        let beats = |pair: &[Lamps]| pair[0].0 & HEARTBEAT != pair[1].0 & HEARTBEAT;
+        seen.windows(2).any(beats)
     }
 
     /// Discards all events so far.

@@ -24,6 +24,7 @@ use crate::golden::Golden;
 use crate::machine::{At, Machine};
 use crate::random::Random;
 use crate::tally::Tally;
+use crate::trial::{Class, End};
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
     let golden = Golden::of(&target);
     faults_take_effect(&target, &golden);
     hangs_are_detected(&target);
+    beats_are_seen(&target, &golden);
     let mut short = !damaged_starts(&target, each, seed);
     if each > FEW {
         short |= every_bit(&target, &golden) > 0;
@@ -94,7 +96,7 @@ fn faults_take_effect(firmware: &Firmware, golden: &Golden) {
     };
     for fault in [code, register] {
         let trial = trial::run(firmware, golden, &fault);
-        assert_ne!(trial.end, trial::End::Over, "without effect: {fault:?}");
+        assert_ne!(trial.end, End::Over, "without effect: {fault:?}");
     }
     // For memory, the latched situation in `memory` shows the effect.
 }
@@ -119,6 +121,40 @@ fn hangs_are_detected(firmware: &Firmware) {
     let running = machine.run_to(firmware, 10);
     let set = running.and_then(|()| machine.remote.set_register(remote::PC, NOWHERE));
     assert_eq!(set.map(|()| machine.run()).ok(), Some(At::Hung));
+}
+
+/// An open output with a heartbeat that goes on is a wrong permit, one whose firmware halts after a second of silence is not.
+fn beats_are_seen(firmware: &Firmware, golden: &Golden) {
+    // r0 is the lamps' register. The first loop writes 3 and 1 to it for ever, 100 times in a second. The second waits for 1.5 s, then
+    // goes to `halted`.
+    const BEATS: [u8; 16] = [
+        3, 0x21, 1, 0x60, 1, 0x21, 1, 0x60, 0x22, 0x46, 1, 0x3a, 0xfd, 0xd1, 0xf7, 0xe7,
+    ];
+    const WAITS: [u8; 8] = [1, 0x3a, 0xfd, 0xd1, 0x18, 0x47, 0, 0xbf];
+    for (code, class) in [
+        (&BEATS[..], Class::WrongPermit),
+        (&WAITS[..], Class::EndedHighWithoutHeartbeat),
+    ] {
+        let open = golden.samples.iter().position(|sample| sample.high);
+        let open = open.expect("a cycle that is open") as u32;
+        let mut machine = Machine::start(firmware, &[]);
+        let end = machine.run_to(firmware, open + 1).and_then(|()| {
+            machine.remote.write(firmware.done, code)?;
+            for (register, value) in [
+                (0, machine::LEDS),
+                (2, 12_000_000),
+                (3, firmware.halted | 1),
+                (4, 80_000),
+                (remote::PC, firmware.done),
+            ] {
+                machine.remote.set_register(register, value)?;
+            }
+            machine.run_to_end(firmware)
+        });
+        assert_eq!(end.ok(), Some(At::Hung), "{class:?}");
+        let trial = trial::classify(&mut machine, firmware, golden, End::Hung, String::new());
+        assert_eq!(trial.class, class);
+    }
 }
 
 /// Starts with a damaged or unsealed image. Returns `true` if all stayed closed, and reported the damage if the program

@@ -143,7 +143,7 @@ impl<'f> Rest<'f> {
             End::None
         } else if !self.machine.lamps()?.interlock() {
             End::Low
-        } else if at == At::Hung && !self.machine.beats() {
+        } else if at == At::Hung && !self.machine.beats(self.firmware) {
             End::HighWithoutHeartbeat
         } else {
             End::High

@@ -72,7 +72,7 @@ pub fn run(firmware: &Firmware, golden: &Golden, fault: &Fault) -> Trial {
     let mut machine = Machine::start(firmware, &[]);
     let mut fault_place = String::new();
     let end = observe(&mut machine, firmware, fault, &mut fault_place).unwrap_or(End::LockedUp);
-    classify(&mut machine, golden, end, fault_place)
+    classify(&mut machine, firmware, golden, end, fault_place)
 }
 
 fn observe(
@@ -83,16 +83,24 @@ fn observe(
 ) -> Result<End, EmulatorEnded> {
     machine.run_to(firmware, fault.cycle())?;
     *fault_place = fault.inject(machine, firmware)?;
-    match machine.run() {
-        At::Address(address) if address == firmware.over => Ok(End::Over),
-        At::Address(address) if address == firmware.halted => Ok(End::Halted),
+    Ok(match machine.run_to_end(firmware)? {
+        At::Address(address) if address == firmware.over => End::Over,
+        At::Address(address) if address == firmware.halted => End::Halted,
         // A broken marker stops here, like any loop.
-        At::Address(_) | At::Hung => Ok(End::Hung),
-        At::LockedUp => Ok(End::LockedUp),
-    }
+        At::Address(_) | At::Hung => End::Hung,
+        At::LockedUp => End::LockedUp,
+    })
 }
 
-fn classify(machine: &mut Machine, golden: &Golden, end: End, fault_place: String) -> Trial {
+/// Classifies a run that has ended. One that hangs is observed for as long again: an external watchdog lets the output open for as long as
+/// the heartbeat changes.
+pub fn classify(
+    machine: &mut Machine,
+    firmware: &Firmware,
+    golden: &Golden,
+    end: End,
+    fault_place: String,
+) -> Trial {
     let finished = Sample::all(Lamps::default(), &machine.events()).len();
     let open_at_the_end = match end {
         End::Over => false,
@@ -102,7 +110,7 @@ fn classify(machine: &mut Machine, golden: &Golden, end: End, fault_place: Strin
             .unwrap_or_else(|EmulatorEnded| machine.last_lamps())
             .interlock(),
     };
-    let beats = end == End::Hung && machine.beats();
+    let beats = end == End::Hung && machine.beats(firmware);
     let samples = Sample::all(Lamps::default(), &machine.events());
     // Endless cycles are judged one by one.
     let goes_on = beats && samples.len() > finished;
