@@ -34,27 +34,38 @@ const LARGEST: i64 = 1 << 56;
 /// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding in entries below 2^40.
 pub(super) const ROUNDED: i64 = 9;
 
-/// Returns the covariance of an estimate after a path `[x, y]`, micrometres in world axes, with the trust in its source applied: `G P G'`
-/// with the path's noise.
+/// The covariance of an estimate with the trust in its source applied, to be carried: um^2, um times 2^-24 turn, squares of 2^-24 turn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Carriable(ScaledCovariance);
+
+impl Carriable {
+    /// Reads a covariance once for all paths.
+    ///
+    /// # Errors
+    /// The [`InputError`] of the covariance.
+    pub fn of(covariance: &[[f64; 3]; 3], trust: Trust) -> Result<Self, InputError> {
+        const ONE: RadiusSquared = RadiusSquared(1 << 16);
+        let p = target(&trust.cross_terms.of(*covariance), Reach::of(ONE, trust))?;
+        // The entries beside the diagonal are within their slacks, also in the other half. Wider variances contain every such matrix.
+        let wider = |entry: i64, [a, b]: [i64; 2]| entry.saturating_add(a).saturating_add(b);
+        Ok(Self(ScaledCovariance {
+            xx: wider(p.xx, [p.xy_slack, p.xt_slack]),
+            yy: wider(p.yy, [p.xy_slack, p.yt_slack]),
+            tt: wider(p.tt, [p.xt_slack, p.yt_slack]),
+            ..p
+        }))
+    }
+}
+
+/// Returns the covariance of an estimate after a path `[x, y]`, micrometres in world axes: `G P G'` with the path's noise.
 ///
 /// # Errors
-/// The [`InputError`] of the covariance; [`InputError::CovarianceTooLarge`] if a number is out of range.
+/// [`InputError::CovarianceTooLarge`] if a number is out of range.
 pub(crate) fn carried(
-    covariance: &[[f64; 3]; 3],
-    trust: Trust,
+    Carriable(p): &Carriable,
     [dx, dy]: [i64; 2],
     noise: &PathNoise,
 ) -> Result<[[f64; 3]; 3], InputError> {
-    const ONE: RadiusSquared = RadiusSquared(1 << 16);
-    let p = target(&trust.cross_terms.of(*covariance), Reach::of(ONE, trust))?;
-    // The entries beside the diagonal are within their slacks, also in the other half. Wider variances contain every such matrix.
-    let wider = |entry: i64, [a, b]: [i64; 2]| entry.saturating_add(a).saturating_add(b);
-    let p = ScaledCovariance {
-        xx: wider(p.xx, [p.xy_slack, p.xt_slack]),
-        yy: wider(p.yy, [p.xy_slack, p.yt_slack]),
-        tt: wider(p.tt, [p.xt_slack, p.yt_slack]),
-        ..p
-    };
     let is_small = dx.unsigned_abs().max(dy.unsigned_abs()) <= LONGEST.unsigned_abs();
     let entries = [p.xx, p.yy, p.tt, p.xy, p.xt, p.yt];
     let noises = [noise.xx, noise.yy, noise.tt, noise.xy, noise.xt, noise.yt];
@@ -170,7 +181,7 @@ mod tests {
                 }
             }
             let noise = PathNoise { xx: 400, xy: 100, yy: 900, xt: 50, yt: -20, tt: 90 };
-            let found = carried(&p, Trust::FULL, step, &noise).unwrap();
+            let found = carried(&Carriable::of(&p, Trust::FULL).unwrap(), step, &noise).unwrap();
             let [x, y] = step.map(|v| v as f64 * 1e-6);
             let g = [[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]];
             let q24 = TAU / 16_777_216.0;

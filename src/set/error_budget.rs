@@ -184,7 +184,9 @@ fn carried_covariance() {
             inflation,
             cross_terms,
         };
-        let Ok(carried) = super::carried(&p, trust, by, &noise) else {
+        let Ok(carried) =
+            super::Carriable::of(&p, trust).and_then(|p| super::carried(&p, by, &noise))
+        else {
             continue;
         };
         let found = matrix(|i, j| Exact::float(carried[i][j]));
@@ -277,7 +279,8 @@ fn rounding_of_carried_rows() {
         let one = RadiusSquared::from_q16(1 << 16).unwrap();
         let (Ok(t), Ok(found)) = (
             covariance::target(&p, Reach::of(one, Trust::FULL)),
-            super::carried(&p, Trust::FULL, by, &PathNoise::default()),
+            super::Carriable::of(&p, Trust::FULL)
+                .and_then(|p| super::carried(&p, by, &PathNoise::default())),
         ) else {
             continue;
         };

@@ -40,7 +40,7 @@ pub use self::factor::SqrtFactor;
 pub use self::growth::Growth;
 pub use self::trust::{CrossTerms, Inflation, SplitWeight, Trust};
 
-pub(crate) use self::carried::{PathNoise, carried, metres, radians};
+pub(crate) use self::carried::{Carriable, PathNoise, carried, metres, radians};
 pub(crate) use self::common::{Common, Turn, broad_um};
 pub(crate) use self::covariance::ScaledCovariance;
 pub(crate) use self::growth::scaled_yaw;

@@ -49,8 +49,9 @@
 use crate::gate::{Evidence, Reason};
 use crate::motion::MotionBounds;
 use crate::num::BinaryAngle;
-use crate::report::{Heading, PoseEstimate, Report};
-use crate::set::{self, Growth, PathNoise, RadiusSquared, Trust, Uncertainty};
+use crate::pose::Pose;
+use crate::report::{FrameId, Heading, PoseEstimate, Report};
+use crate::set::{self, Carriable, Growth, PathNoise, RadiusSquared, Trust, Uncertainty};
 use crate::task::Risk;
 
 pub use self::increment::Increment;
@@ -115,8 +116,47 @@ impl Tracked {
 /// A fix, and the path since its stamp.
 #[derive(Clone, Copy, Debug)]
 struct Fix {
-    report: Report,
+    source: u8,
+    frame: FrameId,
+    sequence: u32,
+    stamp_ms: u32,
+    /// What is carried, or why the estimate is not valid.
+    start: Result<Start, Reason>,
     way: Way,
+}
+
+/// The estimate of a fix, read once: its pose, and its set with the trust applied.
+#[derive(Clone, Copy, Debug)]
+struct Start {
+    mean: Pose,
+    spread: Carriable,
+    /// The bounded part of the set, which is carried separately from the noise of the path, since that is an ellipsoid.
+    cylinder: Growth,
+}
+
+impl Start {
+    fn of(belief: &PoseEstimate, trust: Trust) -> Result<Self, Reason> {
+        const NOTHING: [[f64; 3]; 3] = [[1e-12, 0.0, 0.0], [0.0, 1e-12, 0.0], [0.0, 0.0, 1e-12]];
+        let mean = belief.mean()?;
+        let (spread, cylinder) = match belief.spread.as_ref().ok_or(Reason::CovarianceUnknown)? {
+            Uncertainty::Gaussian(covariance) => (Carriable::of(covariance, trust)?, Growth::NONE),
+            Uncertainty::Bounded {
+                translation_m,
+                yaw_rad,
+            } => {
+                let cylinder = Growth::of(*translation_m, *yaw_rad)
+                    .filter(|growth| growth.translation_um() > 0 && growth.yaw_q24() > 0)
+                    .ok_or(Reason::BoundInvalid)?;
+                let inflated = cylinder.inflated(trust.inflation);
+                (Carriable::of(&NOTHING, Trust::FULL)?, inflated)
+            }
+        };
+        Ok(Self {
+            mean,
+            spread,
+            cylinder,
+        })
+    }
 }
 
 /// Carries the newest fix along the odometry. N is the number of increments that are kept for late fixes.
@@ -206,7 +246,7 @@ impl<const N: usize> Tracker<N> {
         self.newest_ms = Some(step.stamp_ms);
         let most = self.settings.maximum_fix_age_ms;
         self.fix
-            .take_if(|fix| step.stamp_ms.wrapping_sub(fix.report.stamp_ms) as i32 > most as i32);
+            .take_if(|fix| step.stamp_ms.wrapping_sub(fix.stamp_ms) as i32 > most as i32);
         if let Some(fix) = &mut self.fix {
             fix.way.add(&step, step.driven_q8(), passed, &self.noise);
         }
@@ -244,11 +284,11 @@ impl<const N: usize> Tracker<N> {
     pub fn fix(&mut self, report: &Report) -> Result<(), Reason> {
         let newest = self.newest_ms.ok_or(Reason::Silent)?;
         if let Some(fix) = &self.fix
-            && !(1..1 << 31).contains(&report.stamp_ms.wrapping_sub(fix.report.stamp_ms))
+            && !(1..1 << 31).contains(&report.stamp_ms.wrapping_sub(fix.stamp_ms))
         {
             return Err(Reason::TimeBackwards);
         }
-        if let Some(Fix { report: last, .. }) = &self.fix {
+        if let Some(last) = &self.fix {
             let wrong = if report.source != last.source {
                 Some(Reason::SourceChanged)
             } else if report.frame != last.frame {
@@ -306,7 +346,11 @@ impl<const N: usize> Tracker<N> {
             way.leave_out(self.settings.bounds.within(1));
         }
         self.fix = Some(Fix {
-            report: *report,
+            source: report.source,
+            frame: report.frame,
+            sequence: report.sequence,
+            stamp_ms: report.stamp_ms,
+            start: Start::of(&report.belief, self.settings.trust),
             way,
         });
         Ok(())
@@ -316,68 +360,60 @@ impl<const N: usize> Tracker<N> {
     ///
     /// # Errors
     /// [`Reason::Silent`] without a fix; [`Reason::OdometryGap`] if the newest odometry is too old; [`Reason::Stale`] if the fix is;
-    /// and the reasons of an estimate that is not valid.
+    /// and the reasons of a fix whose estimate is not valid.
     pub fn tracked(&mut self, now_ms: u32) -> Result<Tracked, Reason> {
         let newest = self.newest_ms.ok_or(Reason::Silent)?;
-        let Some(Fix { report, way }) = &self.fix else {
+        let Some(fix) = &self.fix else {
             return Err(Reason::Silent);
         };
         if !(now_ms.wrapping_sub(newest) <= self.settings.maximum_gap_ms) {
             return Err(Reason::OdometryGap);
         }
-        if !(now_ms.wrapping_sub(report.stamp_ms) <= self.settings.maximum_fix_age_ms) {
+        if !(now_ms.wrapping_sub(fix.stamp_ms) <= self.settings.maximum_fix_age_ms) {
             return Err(Reason::Stale);
         }
         // A fix that is newer than the odometry is not carried; its stamp is the newer one.
-        let ahead = report.stamp_ms.wrapping_sub(newest);
+        let ahead = fix.stamp_ms.wrapping_sub(newest);
         let stamp_ms = if ahead < 1 << 31 {
-            report.stamp_ms
+            fix.stamp_ms
         } else {
             newest
         };
-        let (belief, beside) = self.carried(&report.belief, way)?;
+        let (belief, beside) = self.carried(&fix.start?, &fix.way)?;
+        let (source, frame) = (fix.source, fix.frame);
         if self.given_ms != Some(stamp_ms) {
             self.sequence = self.sequence.wrapping_add(1);
         }
         self.given_ms = Some(stamp_ms);
         Ok(Tracked {
             report: Report {
-                stamp_ms,
+                source,
+                frame,
                 sequence: self.sequence,
+                stamp_ms,
                 belief,
-                ..*report
             },
             beside,
         })
     }
 
-    fn carried(&self, belief: &PoseEstimate, way: &Way) -> Result<(PoseEstimate, Growth), Reason> {
-        let mean = belief.mean()?;
+    fn carried(&self, start: &Start, way: &Way) -> Result<(PoseEstimate, Growth), Reason> {
+        let mean = start.mean;
         let [dx, dy] = way.in_world(mean.yaw);
         let x = i64::from(mean.x_um).wrapping_add(dx);
         let y = i64::from(mean.y_um).wrapping_add(dy);
         let yaw = mean.yaw.plus(BinaryAngle(way.turn()));
         let noise = way.noise_in_world(mean.yaw);
         let mut beside = way.slip(&self.noise);
-        let spread = match belief.spread.as_ref().ok_or(Reason::CovarianceUnknown)? {
-            Uncertainty::Gaussian(covariance) => {
-                set::carried(covariance, self.settings.trust, [dx, dy], &noise)?
-            }
-            Uncertainty::Bounded {
-                translation_m,
-                yaw_rad,
-            } => {
-                // The cylinder is carried separately from the noise of the path, which is an ellipsoid.
-                let cylinder = Growth::of(*translation_m, *yaw_rad)
-                    .filter(|growth| growth.translation_um() > 0 && growth.yaw_q24() > 0)
-                    .ok_or(Reason::BoundInvalid)?;
-                let inflated = cylinder.inflated(self.settings.trust.inflation);
-                let swung = way.swung(inflated.yaw_q24());
-                beside = beside.plus(inflated).plus(Growth::new(swung, 0));
-                let nothing = [[1e-12, 0.0, 0.0], [0.0, 1e-12, 0.0], [0.0, 0.0, 1e-12]];
-                set::carried(&nothing, Trust::FULL, [0, 0], &noise)?
-            }
+        // A cylinder has no covariance that the path could turn.
+        let by = if start.cylinder == Growth::NONE {
+            [dx, dy]
+        } else {
+            let swung = way.swung(start.cylinder.yaw_q24());
+            beside = beside.plus(start.cylinder).plus(Growth::new(swung, 0));
+            [0, 0]
         };
+        let spread = set::carried(&start.spread, by, &noise)?;
         beside = beside.plus(way.curvature(&spread, self.settings.radius_squared));
         let belief = PoseEstimate {
             x_m: set::metres(x),

@@ -168,13 +168,13 @@ impl posegate_state {
 }
 
 impl posegate_step {
-    const DENIED: Self = Self {
+    pub(super) const DENIED: Self = Self {
         permission: posegate_permission::DENIED,
         state: posegate_state::NOWHERE,
         reason: 0,
     };
 
-    fn of(step: Step) -> Self {
+    pub(super) fn of(step: Step) -> Self {
         Self {
             permission: posegate_permission::of(step.permission),
             state: posegate_state::of(step.state),
@@ -215,7 +215,9 @@ impl posegate_advice {
 /// # Safety
 /// As for [`open`], for as long as `'a`; no other reference to the gate is in use; the caller's word can be written
 /// to.
-unsafe fn held<'a>(storage: *mut posegate_gate) -> Result<&'a mut Gate<'static>, posegate_status> {
+pub(super) unsafe fn held<'a>(
+    storage: *mut posegate_gate,
+) -> Result<&'a mut Gate<'static>, posegate_status> {
     // SAFETY: the caller's promise; sealed storage has been written. An address with a flipped bit is not
     // dereferenced.
     unsafe {

@@ -201,6 +201,7 @@ fn step_on(
 #[test]
 fn c_tracker_equals_rust_tracker() {
     let (gate_c, mut gate) = (gate_of_c(SEE_T7), gate_of_rust(SEE_T7));
+    let (gate_direct, mut gate_of_direct) = (gate_of_c(SEE_T7), gate_of_rust(SEE_T7));
     let (tracker_c, mut tracker) = (tracker_of_c(), tracker_of_rust());
     let mut seen = BTreeSet::new();
     let (mut opened, mut sequence, mut newest) = (0, 0, 0);
@@ -250,6 +251,14 @@ fn c_tracker_equals_rust_tracker() {
             assert_eq!(reason, expected, "{cycle}");
             seen.insert(reason);
         }
+        // A second gate, which steps on the tracker itself.
+        let direct = zeroed::<posegate_step>();
+        // SAFETY: valid pointers.
+        let direct = unsafe {
+            let status = posegate_gate_step_tracked(gate_direct, now, tracker_c, direct);
+            assert_eq!(status, posegate_status::Ok);
+            *direct
+        };
         let found = zeroed::<posegate_tracked>();
         // SAFETY: valid pointers.
         let found = unsafe {
@@ -258,7 +267,20 @@ fn c_tracker_equals_rust_tracker() {
             *found
         };
         seen.insert(found.reason);
-        match tracker.tracked(now) {
+        let tracked = tracker.tracked(now);
+        let expected = match &tracked {
+            Ok(tracked) => gate_of_direct.step_on(now, &tracked.evidence()),
+            Err(_) => gate_of_direct.tick(now),
+        };
+        let verdict = tracked
+            .as_ref()
+            .map_or_else(|reason| Err(*reason), |_| expected.verdict);
+        let reason = verdict.map_or_else(|reason| reason.code(), |()| 0);
+        assert_eq!(direct.reason, u32::from(reason), "{cycle}");
+        // SAFETY: a valid pointer.
+        let permits = unsafe { posegate_permission_is_permit(&direct.permission, now) };
+        assert_eq!(permits == POSEGATE_PERMIT, expected.permission.is_permit());
+        match tracked {
             Ok(tracked) => {
                 assert_eq!(found.reason, 0, "{cycle}");
                 let step = gate.step_on(now, &tracked.evidence());
@@ -504,6 +526,16 @@ fn bad_pointers_are_errors_and_close() {
         let not_initialised = posegate_status::NotInitialised;
         let status = posegate_tracker_tracked(zeroed(), 0, zeroed());
         assert_eq!(status, not_initialised);
+        // A gate that steps on no tracker closes.
+        let (gate, step) = (gate_of_c(SEE_T7), zeroed::<posegate_step>());
+        for (tracker, expected) in [
+            (zeroed(), not_initialised),
+            (core::ptr::null_mut(), posegate_status::Null),
+        ] {
+            let status = posegate_gate_step_tracked(gate, 2_000, tracker, step);
+            assert_eq!(status, expected);
+            assert_eq!((*step).reason, u32::from(Reason::Silent.code()));
+        }
         let status = posegate_tracker_init(zeroed(), core::ptr::null(), 0, &settings);
         assert_eq!(status, posegate_status::Null);
         let status = posegate_tracker_init(zeroed(), table, length - 1, &settings);

@@ -529,6 +529,14 @@ fn functions() -> Vec<Function> {
         p[1].cast()
     );
     function!(
+        posegate_gate_step_tracked,
+        [gate(), tracker(), output::<posegate_step>()],
+        |p| p[0].cast(),
+        100,
+        p[1].cast(),
+        p[2].cast()
+    );
+    function!(
         posegate_monitor_fix,
         [
             monitor(),
