@@ -22,6 +22,13 @@ pub const fn wide(a: u32, b: u32) -> u64 {
     }
 }
 
+/// Returns `a b / 2^DOWN`, rounded down; its 64 lower bits. Not inlined: it is long, and a covariance takes many.
+#[must_use]
+#[inline(never)]
+pub fn shifted_product<const DOWN: u32>(a: i64, b: i64) -> i64 {
+    i128::from(a).wrapping_mul(i128::from(b)).wrapping_shr(DOWN) as i64
+}
+
 /// Returns the product from four products of halves.
 ///
 /// Not inlined: the call costs less than the registers that it would take from the caller.

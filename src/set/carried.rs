@@ -4,6 +4,7 @@
 
 use super::covariance::{ScaledCovariance, target};
 use super::{InputError, RadiusSquared, Reach, Trust};
+use crate::num::shifted_product;
 
 /// The variances and covariances that a path adds: um^2, um times 2^-24 turn, squares of 2^-24 turn, in world axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +28,7 @@ const Q24_2: Unit = (11_378_879_155_978_302_163, -106);
 const UM: Unit = (9_671_406_556_917_033_398, -83);
 const TURN: Unit = (14_488_038_916_154_245_685, -93);
 /// 2 pi times 2^32: 2^-24 turn in radians, unit 2^-56.
-const LEVER_Q56: i128 = 26_986_075_409;
+const LEVER_Q56: i64 = 26_986_075_409;
 /// The longest path, micrometres, and the largest variance of the yaw.
 const LONGEST: i64 = 1 << 26;
 const LARGEST: i64 = 1 << 56;
@@ -74,13 +75,9 @@ pub(crate) fn carried(
         return Err(InputError::CovarianceTooLarge);
     }
     // Um per 2^-24 turn of the yaw's error, unit 2^-56: below 2^60.7.
-    let a = i128::from(dy).wrapping_neg().wrapping_mul(LEVER_Q56);
-    let b = i128::from(dx).wrapping_mul(LEVER_Q56);
-    // Below 2^117 and 2^122.
-    let by = |lever: i128, entry: i64| {
-        let product = lever.wrapping_mul(i128::from(entry)) >> 56;
-        product as i64
-    };
+    let a = dy.wrapping_neg().wrapping_mul(LEVER_Q56);
+    let b = dx.wrapping_mul(LEVER_Q56);
+    let by = shifted_product::<56>;
     let (att, btt) = (by(a, p.tt), by(b, p.tt));
     // A product is rounded by less than a unit, and one of a product by less than a unit and the lever: with m the larger lever, xx, yy and
     // xy are off by m + 3, the entries with the yaw by 1. So the errors of a row are at most 2 m + 7.

@@ -48,7 +48,7 @@
 
 use crate::gate::{Evidence, Reason};
 use crate::motion::MotionBounds;
-use crate::num::BinaryAngle;
+use crate::num::{BinaryAngle, shifted_product};
 use crate::pose::Pose;
 use crate::report::{FrameId, Heading, PoseEstimate, Report};
 use crate::set::{self, Carriable, Growth, PathNoise, RadiusSquared, Trust, Uncertainty};
@@ -439,13 +439,11 @@ fn unevenness([after, whole]: [u32; 2]) -> u32 {
 
 /// Returns the noise of a path, in the robot's axes at its start, rotated into world axes.
 fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
-    let (c, s) = (i128::from(c), i128::from(s));
-    // Below 2^30 and 2^60 each, so below 2^121.
-    let by = |a: i128, b: i128, value: i64| {
-        let product = a.wrapping_mul(b).wrapping_mul(i128::from(value));
-        product >> 60
-    };
-    let rounded = |sum: i128, more: i64| (sum as i64).wrapping_add(more);
+    let (c, s) = (i64::from(c), i64::from(s));
+    // Below 2^60 each, so a product is at most as large as its entry.
+    let [cc, cs, ss] = [c.wrapping_mul(c), c.wrapping_mul(s), s.wrapping_mul(s)];
+    let by = shifted_product::<60>;
+    let once = shifted_product::<30>;
     let PathNoise {
         xx,
         xy,
@@ -454,32 +452,24 @@ fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
         yt,
         tt,
     } = *noise;
-    let once = |a: i128, value: i64| a.wrapping_mul(i128::from(value)) >> 30;
     // Cosine and sine are within 2 of 2^-30: 2^-27 of the largest entry.
     let slack = (xx.max(yy) >> 26).wrapping_add(8);
     let across = (xt.saturating_abs().max(yt.saturating_abs()) >> 28).wrapping_add(2);
     PathNoise {
-        xx: rounded(
-            by(c, c, xx)
-                .wrapping_sub(by(c, s, xy).wrapping_mul(2))
-                .wrapping_add(by(s, s, yy)),
-            slack.wrapping_add(across),
-        ),
-        yy: rounded(
-            by(s, s, xx)
-                .wrapping_add(by(c, s, xy).wrapping_mul(2))
-                .wrapping_add(by(c, c, yy)),
-            slack.wrapping_add(across),
-        ),
-        xy: rounded(
-            by(c, s, xx)
-                .wrapping_sub(by(c, s, yy))
-                .wrapping_add(by(c, c, xy))
-                .wrapping_sub(by(s, s, xy)),
-            0,
-        ),
-        xt: rounded(once(c, xt).wrapping_sub(once(s, yt)), 0),
-        yt: rounded(once(s, xt).wrapping_add(once(c, yt)), 0),
+        xx: by(cc, xx)
+            .wrapping_sub(by(cs, xy).wrapping_mul(2))
+            .wrapping_add(by(ss, yy))
+            .wrapping_add(slack.wrapping_add(across)),
+        yy: by(ss, xx)
+            .wrapping_add(by(cs, xy).wrapping_mul(2))
+            .wrapping_add(by(cc, yy))
+            .wrapping_add(slack.wrapping_add(across)),
+        xy: by(cs, xx)
+            .wrapping_sub(by(cs, yy))
+            .wrapping_add(by(cc, xy))
+            .wrapping_sub(by(ss, xy)),
+        xt: once(c, xt).wrapping_sub(once(s, yt)),
+        yt: once(s, xt).wrapping_add(once(c, yt)),
         tt: tt.wrapping_add(across.wrapping_mul(2)),
     }
 }

@@ -55,12 +55,16 @@ pub(super) struct Noise {
     turn_slip_per_um_q32: u64,
 }
 
-/// Squares of a deviation, unit 2^-20 of its square root's unit: of 1 the square is 2^40.
-fn square_q40(deviation: f64) -> Option<u128> {
-    let float = Float::of(deviation)?;
-    let up = float.scaled(1 << 20, 0, Rounding::AwayFromZero)?;
+/// Returns the square of a deviation in the unit of a variance, of which `per_unit` are one, rounded up. `None` if the deviation is below zero,
+/// not a number or beyond 1000, or the variance is beyond 2^50.
+#[inline(never)]
+fn variance(deviation: f64, per_unit: u64) -> Option<u64> {
+    let up = Float::of(deviation)?.scaled(1 << 20, 0, Rounding::AwayFromZero)?;
     let up = u64::try_from(up).ok().filter(|up| *up < 1 << 30)?;
-    Some(u128::from(up).wrapping_mul(u128::from(up)))
+    let product = u128::from(up.wrapping_mul(up)).wrapping_mul(u128::from(per_unit));
+    let down = u64::try_from(product >> 40).ok()?.checked_add(1)?;
+    let is_zero = deviation.to_bits() << 1 == 0;
+    Some(if is_zero { 0 } else { down }).filter(|v| *v < 1 << 50)
 }
 
 /// Readings below this, to either side, cannot be taken for a turn of at most an eighth of a turn, 2^-24 turn: 7/8 of a turn.
@@ -72,14 +76,17 @@ const DEVIATIONS: u64 = 16;
 const WHOLE: u64 = 1 << 16;
 
 /// Returns `value / (1 - share)`, the share with unit 2^-16, rounded up. `None` unless the share is below 1.
+#[inline(never)]
 fn of_the_rest(value: u64, share_q16: u64) -> Option<u64> {
-    let rest = u128::from(WHOLE.checked_sub(share_q16).filter(|rest| *rest > 0)?);
-    let product = u128::from(value).wrapping_mul(u128::from(WHOLE));
-    let up = product.wrapping_add(rest.wrapping_sub(1));
-    u64::try_from(up.checked_div(rest)?).ok()
+    let rest = WHOLE.checked_sub(share_q16).filter(|rest| *rest > 0)?;
+    // In 64 bits: the whole part of the quotient, and the rest's, which is below the unit.
+    let whole = value.checked_div(rest)?.checked_mul(WHOLE)?;
+    let part = value.checked_rem(rest)?.wrapping_mul(WHOLE);
+    whole.checked_add(part.wrapping_add(rest.wrapping_sub(1)).checked_div(rest)?)
 }
 
 /// A value times a factor, rounded up. `None` if it is below zero, not a number, or beyond 2^40.
+#[inline(never)]
 fn scaled(value: f64, factor: u128) -> Option<u64> {
     let up = Float::of(value)?.scaled(factor, 0, Rounding::AwayFromZero)?;
     u64::try_from(up).ok().filter(|up| *up < 1 << 40)
@@ -91,14 +98,6 @@ impl Noise {
     /// With a share s a length L that is reported is at most `L / (1 - s)` as driven, so an error of `s` times the driven length is at
     /// most `s / (1 - s)` times the reported one. Turns are alike, with the additional turn per metre.
     pub fn of(errors: &OdometryErrors) -> Option<Self> {
-        let variance = |deviation: f64, per_unit: u128| {
-            let product = square_q40(deviation)?.checked_mul(per_unit)?;
-            let down = (product >> 40).checked_add(1)?;
-            let is_zero = deviation.to_bits() << 1 == 0;
-            u64::try_from(if is_zero { 0 } else { down })
-                .ok()
-                .filter(|v| *v < 1 << 50)
-        };
         let [slip, turn_slip] = [
             scaled(errors.slip, WHOLE.into())?,
             scaled(errors.turn_slip, WHOLE.into())?,
