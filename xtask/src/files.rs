@@ -85,6 +85,17 @@ pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result {
     write(to, bytes(from)?)
 }
 
+/// Removes a file, if it is there.
+pub fn remove(path: impl AsRef<Path>) -> Result {
+    let path = path.as_ref();
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(format!("{}: {error}", path.display()).into())
+        }
+        _ => Ok(()),
+    }
+}
+
 pub fn make_folder(path: impl AsRef<Path>) -> Result {
     let path = path.as_ref();
     fs::create_dir_all(path).map_err(|error| format!("{}: {error}", path.display()).into())

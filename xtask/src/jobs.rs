@@ -21,6 +21,7 @@ pub mod package;
 pub mod planning;
 pub mod python;
 pub mod recorded;
+pub mod robot;
 pub mod ros2;
 pub mod slurm;
 pub mod stamps;

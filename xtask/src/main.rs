@@ -2,6 +2,7 @@
 //! recordings. Logs go to stderr, results to stdout as JSON lines. Missing tools are installed, or the job fails with the
 //! command that installs them.
 
+mod archive;
 mod arguments;
 mod board;
 mod files;
@@ -9,6 +10,7 @@ mod jobs;
 mod need;
 mod report;
 mod shell;
+mod stack;
 
 use crate::arguments::Arguments;
 use crate::shell::{Result, say};
@@ -204,6 +206,12 @@ const JOBS: &[Job] = &[
         "",
         "the C boundary: header, archive, and C firmware by Make and by CMake",
         jobs::c::c,
+    ),
+    job(
+        "robot",
+        "",
+        "a whole program in C with the archive as released: flash, stack, instructions of each call, on three cores",
+        jobs::robot::robot,
     ),
     job(
         "wasm",

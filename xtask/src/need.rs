@@ -2,7 +2,7 @@
 //! installs them.
 
 use crate::files::target_folder;
-use crate::shell::{Result, cmd, program_at, say};
+use crate::shell::{Cmd, Result, cmd, program_at, say};
 use std::path::{Path, PathBuf};
 
 /// The cores that the checks of the library run on.
@@ -19,6 +19,14 @@ pub fn targets(names: &[&str]) -> Result {
         }
     }
     Ok(())
+}
+
+/// Returns the linker that comes with the compiler.
+pub fn linker() -> Result<Cmd> {
+    let sysroot = cmd("rustc --print sysroot").read()?;
+    let host = cmd("rustc --print host-tuple").read()?;
+    let folder = Path::new(sysroot.trim()).join("lib/rustlib");
+    Ok(program_at(&folder.join(host.trim()).join("bin/rust-lld")))
 }
 
 /// Installs the emulator if it is missing.

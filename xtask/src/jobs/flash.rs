@@ -158,13 +158,7 @@ fn archive(target: &str) -> PathBuf {
 
 /// Returns the bytes of code, constants and initial values of a program that contains these functions and what they call.
 fn linked(archive: &Path, functions: &[&str], layout: &Path, image: &Path) -> Result<u64> {
-    let sysroot = cmd("rustc --print sysroot").read()?;
-    let host = cmd("rustc --print host-tuple").read()?;
-    let linker = Path::new(sysroot.trim())
-        .join("lib/rustlib")
-        .join(host.trim())
-        .join("bin/rust-lld");
-    program_at(&linker)
+    need::linker()?
         .words("-flavor gnu --oformat=binary --gc-sections --entry=posegate_abi_version -T")
         .arg(layout)
         .args(

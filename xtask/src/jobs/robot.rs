@@ -1,0 +1,212 @@
+//! `robot`: what a whole program in C takes, with the archive as released.
+
+use crate::archive::{self, Core};
+use crate::arguments::Arguments;
+use crate::files::{self, Scratch};
+use crate::jobs::test::build_suite;
+use crate::need;
+use crate::report::Report;
+use crate::shell::{Cmd, Result, cmd, program_at};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+const FOLDER: &str = "examples/c/robot";
+const TASKS: [&str; 3] = ["dock", "see-t7", "wait"];
+const DIGEST: &str = "site_digest.h";
+
+/// The cores of the program: how a user names them, the emulator with its board and what an instruction takes, the objects of the board,
+/// and where its memories begin if not where the linker script has them.
+pub struct Board {
+    pub core: &'static str,
+    emulator: (&'static str, &'static str),
+    sources: &'static [&'static str],
+    memory: &'static str,
+}
+
+const ON_ARM: &[&str] = &["examples/c/startup.c", "examples/c/board.c"];
+
+pub const BOARDS: [Board; 3] = [
+    Board {
+        core: "cortex-m4f",
+        emulator: (
+            "qemu-system-arm",
+            "-M mps2-an386 -semihosting-config enable=on,target=native -icount shift=6",
+        ),
+        sources: ON_ARM,
+        memory: "",
+    },
+    Board {
+        core: "cortex-m0plus",
+        emulator: (
+            "qemu-system-arm",
+            "-M mps2-an385 -semihosting-config enable=on,target=native -icount shift=6",
+        ),
+        sources: ON_ARM,
+        memory: "",
+    },
+    Board {
+        core: "rv32imc",
+        emulator: (
+            "qemu-system-riscv32",
+            "-M virt -bios none -serial stdio -icount shift=0",
+        ),
+        sources: &["examples/c/robot/virt.c"],
+        memory: "-Wl,--defsym=flash_origin=0x80000000,--defsym=ram_origin=0x80800000",
+    },
+];
+
+impl Board {
+    pub fn core(&self) -> Result<&'static Core> {
+        Core::named(self.core)
+    }
+
+    /// Compiles and links a program of these sources, and `more` options, with an archive.
+    pub fn link(
+        &self,
+        sources: &[&str],
+        more: &str,
+        archive: &Path,
+        elf: &Path,
+        includes: &Path,
+    ) -> Result {
+        let core = self.core()?;
+        core.tool("gcc")?
+            .words(core.flags)
+            .words("-Os -g -std=c99 -pedantic -Wall -Wextra -Wconversion -Wshadow -Werror -ffreestanding -ffunction-sections -fdata-sections -nostdlib")
+            .words("-T examples/c/link.ld -Wl,-z,noexecstack -Wl,--gc-sections -Wl,--no-warn-rwx-segments -Iinclude -Iexamples/c -Iexamples/c/robot")
+            .words(self.memory)
+            .words(more)
+            .arg("-I")
+            .arg(includes)
+            .arg(format!("-Wa,-I,{}", includes.display()))
+            .args(self.sources)
+            .args(sources)
+            .arg(archive)
+            .words("-lc -lgcc")
+            .arg("-o")
+            .arg(elf)
+            .run()
+    }
+
+    /// Returns the command that runs a program in the emulator.
+    pub fn emulate(&self, elf: &Path) -> Result<Cmd> {
+        let (emulator, board) = self.emulator;
+        let package = match emulator {
+            "qemu-system-arm" => "qemu-system-arm",
+            _ => "qemu-system-misc",
+        };
+        need::command(emulator, package)?;
+        Ok(cmd(emulator)
+            .words("-display none -monitor none")
+            .words(board)
+            .arg("-kernel")
+            .arg(elf)
+            .limit(600))
+    }
+
+    /// Returns the bytes of code, constants and initial values of a program.
+    fn flash(&self, elf: &Path) -> Result<u64> {
+        let sizes = self.core()?.tool("size")?.arg(elf).read()?;
+        let line = sizes.lines().nth(1).unwrap_or_default();
+        let mut numbers = line.split_whitespace().map(str::parse::<u64>);
+        match (numbers.next(), numbers.next()) {
+            (Some(Ok(text)), Some(Ok(data))) => Ok(text + data),
+            _ => Err(format!("no sizes in: {sizes}").into()),
+        }
+    }
+}
+
+/// Builds the program for each core with the archive as released, runs it, and prints what it costs. The tables of the program must be
+/// those of its site file.
+pub fn robot(_: &Arguments) -> Result {
+    tables()?;
+    let mut report = Report::default();
+    for board in &BOARDS {
+        of_board(board, "turning", "3", &mut report)?;
+    }
+    report.finish()
+}
+
+/// Returns the figures of the program with an archive, by their names, and prints them.
+pub fn of_board(
+    board: &Board,
+    parts: &str,
+    level: &str,
+    report: &mut Report,
+) -> Result<Vec<(String, u64)>> {
+    let features = features(parts)?;
+    let archive = archive::build(board.core()?, features, level)?;
+    let folder = Scratch::new()?;
+    digest(&folder)?;
+    let sources = ["main.c", "measure.c", "tables.S"].map(|name| format!("{FOLDER}/{name}"));
+    let sources = sources.each_ref().map(String::as_str);
+    let (elf, empty) = (folder.join("robot.elf"), folder.join("empty.elf"));
+    board.link(&sources, "", &archive, &elf, folder.path())?;
+    board.link(&sources, "-DEMPTY_LOOP", &archive, &empty, folder.path())?;
+    let output = board.emulate(&elf)?.read()?;
+    let mut figures = vec![(
+        "flash over an empty loop".to_owned(),
+        board.flash(&elf)? - board.flash(&empty)?,
+    )];
+    for line in output.lines() {
+        let figure: Value =
+            serde_json::from_str(line).map_err(|_| format!("the program prints: {line}"))?;
+        match (figure["name"].as_str(), figure["value"].as_u64()) {
+            (Some(name), Some(value)) => figures.push((name.to_owned(), value)),
+            _ => return Err(format!("the program prints: {line}").into()),
+        }
+    }
+    for (name, value) in &figures {
+        report.note(
+            &format!("robot, {}, {parts}, opt-level {level}: {name}", board.core),
+            value,
+            "",
+        );
+    }
+    Ok(figures)
+}
+
+/// Returns the features of a set of parts.
+pub fn features(parts: &str) -> Result<&'static str> {
+    archive::PARTS
+        .iter()
+        .find(|(name, _)| *name == parts)
+        .map(|(_, features)| *features)
+        .ok_or_else(|| format!("no parts {parts}").into())
+}
+
+/// Writes the header with the digest that the program expects of its tables.
+fn digest(folder: &Scratch) -> Result {
+    let sum = cmd("sha256sum").arg(format!("{FOLDER}/site.toml")).read()?;
+    let bytes: Vec<String> = (0..32)
+        .filter_map(|at| sum.get(2 * at..2 * at + 2))
+        .map(|byte| format!("0x{byte}"))
+        .collect();
+    files::write(
+        folder.join(DIGEST),
+        format!("#define SITE_DIGEST {{{}}}\n", bytes.join(",")),
+    )
+}
+
+/// Fails if a table of the program is not what the program `posegate` builds of its site file.
+fn tables() -> Result {
+    build_suite("--bin posegate").run()?;
+    let folder = Scratch::new()?;
+    for task in TASKS {
+        let (committed, fresh) = (table(task), folder.join(task));
+        program_at(&files::tested("posegate"))
+            .words("table build --task")
+            .args([task, "-o"])
+            .arg(&fresh)
+            .arg(format!("{FOLDER}/site.toml"))
+            .run()?;
+        if files::bytes(&committed)? != files::bytes(&fresh)? {
+            return Err(format!("{0} is not what its site file makes: posegate table build {FOLDER}/site.toml --task {task} -o {0}", committed.display()).into());
+        }
+    }
+    Ok(())
+}
+
+fn table(task: &str) -> PathBuf {
+    Path::new(FOLDER).join(task).with_extension("posegate")
+}
