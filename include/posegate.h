@@ -1583,6 +1583,21 @@ posegate_status posegate_gate_init(struct posegate_gate *gate,
                                    uint32_t now_ms);
 
 /**
+ * Gives a gate another table and other settings, within one control cycle: it is then closed as after `posegate_gate_init`, without
+ * another run of the self-test. A gate that is latched stays latched, unless its table was the reason.
+ *
+ * Errors: as for `posegate_gate_init`. After an error the storage is not initialised, so every function denies.
+ *
+ * # Safety
+ * As for `posegate_gate_init`.
+ */
+posegate_status posegate_gate_change_table(struct posegate_gate *gate,
+                                           const uint8_t *table,
+                                           size_t length,
+                                           const struct posegate_settings *settings,
+                                           uint32_t now_ms);
+
+/**
  * Evaluates a report at the controller's time `now_ms`.
  *
  * An invalid report (a null pointer, a number that is not in its enum) is an error. It closes the gate as a report

@@ -117,10 +117,55 @@ impl<'a> Gate<'a> {
         settings: &'a Settings<'a>,
         now_ms: u32,
     ) -> Result<Self, InvalidParameter> {
+        Self::after(self_test(), table, settings, now_ms)
+    }
+
+    /// Returns `Ok` if the self-test has passed and nothing is latched besides the reason why the gate has no table; else the reason that is
+    /// latched. For [`Gate::after`].
+    ///
+    /// # Errors
+    /// The [`Reason`] that stays latched.
+    pub fn is_sound(&self) -> Result<(), Reason> {
+        if self.check_settings().is_err() {
+            return Err(Reason::MemoryDamaged);
+        }
+        match (self.state(), self.table) {
+            (State::Latched(Reason::SelfTestFailed), _) => Err(Reason::SelfTestFailed),
+            (State::Latched(reason), Err(of_table)) if reason == of_table => Ok(()),
+            (State::Latched(reason), _) => Err(reason),
+            _ => Ok(()),
+        }
+    }
+
+    /// Makes a closed gate as [`Gate::new`] does, without the self-test, whose result is given: for a change of the table in one control cycle.
+    ///
+    /// ```
+    /// # use posegate::gate::{Gate, InvalidParameter, Settings};
+    /// # fn change<'a>(gate: &Gate<'a>, next: &'a [u8], settings: &'a Settings<'a>, now_ms: u32) -> Result<Gate<'a>, InvalidParameter> {
+    /// Gate::after(gate.is_sound(), next, settings, now_ms)
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`InvalidParameter`] if the settings are invalid.
+    pub fn after(
+        is_sound: Result<(), Reason>,
+        table: &'a [u8],
+        settings: &'a Settings<'a>,
+        now_ms: u32,
+    ) -> Result<Self, InvalidParameter> {
         settings.check()?;
-        let mut gate = Self {
+        let parsed = match is_sound {
+            Err(Reason::SelfTestFailed) => Err(Reason::SelfTestFailed),
+            _ => checked(table, settings),
+        };
+        let state = match is_sound.err().or(parsed.err()) {
+            None => DecodedState::Inhibited(Reason::Silent),
+            Some(reason) => DecodedState::Latched(reason),
+        };
+        Ok(Self {
             bytes: table,
-            table: Err(Reason::TableInvalid),
+            table: parsed,
             settings,
             checked: RedundantWord::new(settings.digest()),
             table_crc: RedundantWord::new(table::stored_checksum(table)),
@@ -128,14 +173,12 @@ impl<'a> Gate<'a> {
             now_ms: RedundantWord::new(now_ms),
             closed_at_ms: RedundantWord::new(now_ms),
             permitted_at_ms: RedundantWord::new(now_ms),
-            state: RedundantWord::new(0),
+            state: state.word(),
             last_source: RedundantWord::new(NO_SOURCE),
             last_sequence: RedundantWord::new(0),
             newest_stamp_ms: RedundantWord::new(0),
             scrub: Scrub::new(),
-        };
-        gate.start();
-        Ok(gate)
+        })
     }
 
     /// Checks the table again and restarts the gate, closed. This is the only way out of a latched fault. A reset is
@@ -151,14 +194,6 @@ impl<'a> Gate<'a> {
         }
         *self = Self::new(self.bytes, self.settings, now_ms)?;
         Ok(())
-    }
-
-    fn start(&mut self) {
-        self.table = self_test().and_then(|()| checked(self.bytes, self.settings));
-        match self.table {
-            Ok(_) => self.enter_inhibited(Reason::Silent),
-            Err(reason) => self.state = DecodedState::Latched(reason).word(),
-        }
     }
 
     /// Returns the table, or the reason why the gate has none.

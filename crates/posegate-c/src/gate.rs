@@ -305,6 +305,7 @@ unsafe fn fill(
     given: &posegate_settings,
     counter: *mut u32,
     now_ms: u32,
+    is_sound: Result<(), Reason>,
 ) -> Result<(), posegate_status> {
     const UNUSED: Source = Source {
         frame: FrameId::UNNAMED,
@@ -349,7 +350,8 @@ unsafe fn fill(
         (&raw mut (*held).count).write(counter.read_volatile());
         (&raw mut (*held).counter).write(counter);
         (&raw mut (*held).counter_complement).write(!counter.addr());
-        (&raw mut (*held).gate).write(Gate::new(table, settings, now_ms)?);
+        let gate = Gate::after(is_sound, table, settings, now_ms)?;
+        (&raw mut (*held).gate).write(gate);
     }
     Ok(())
 }
@@ -404,7 +406,44 @@ pub unsafe extern "C" fn posegate_gate_init(
         let (held, table) = (held?, table?);
         apart?;
         counted?;
-        fill(held, table, &given?, counter, now_ms)?;
+        let (given, tested) = (given?, gate::self_test());
+        fill(held, table, &given, counter, now_ms, tested)?;
+        close(gate);
+        Ok(())
+    })
+}
+
+/// Gives a gate another table and other settings, within one control cycle: it is then closed as after `posegate_gate_init`, without
+/// another run of the self-test. A gate that is latched stays latched, unless its table was the reason.
+///
+/// Errors: as for `posegate_gate_init`. After an error the storage is not initialised, so every function denies.
+///
+/// # Safety
+/// As for `posegate_gate_init`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_gate_change_table(
+    gate: *mut posegate_gate,
+    table: *const u8,
+    length: usize,
+    settings: *const posegate_settings,
+    now_ms: u32,
+) -> posegate_status {
+    // SAFETY: the caller's promise. The counter is that of the gate, which was checked when it was made.
+    posegate_status::of(|| unsafe {
+        let apart =
+            separate(gate, settings).and(disjoint(gate, size_of::<posegate_gate>(), table, length));
+        let given = read(settings);
+        let is_sound = held(gate).map(|gate| gate.is_sound());
+        let counter = open(gate).map(|held| ((*held).counter, (*held).counter_complement));
+        let place = take(gate)?;
+        let in_flash = bytes(table, length)?;
+        apart?;
+        let (is_sound, (counter, complement)) = (is_sound?, counter?);
+        if counter.addr() != !complement {
+            return Err(posegate_status::NotInitialised);
+        }
+        disjoint(counter, size_of::<u32>(), table, length)?;
+        fill(place, in_flash, &given?, counter, now_ms, is_sound)?;
         close(gate);
         Ok(())
     })

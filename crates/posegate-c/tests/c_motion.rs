@@ -739,3 +739,76 @@ fn c_monitor_equals_rust_monitor() {
         assert_eq!(status, posegate_status::NotInitialised);
     }
 }
+
+/// A gate that is given another table is closed, and then answers as a new gate with that table.
+#[test]
+fn a_changed_gate_is_a_new_one_with_the_other_table() {
+    let of = |bytes: &'static [u8]| {
+        let mut settings = settings_of_c(&Table::parse(bytes).unwrap());
+        // The robot stands still, so both docks fit.
+        settings.sources[0].motion = posegate_motion::StandsStill as u32;
+        settings.sources[0].along_m_s = 0.0;
+        settings.sources[0].turn_rad_s = 0.0;
+        leaked(settings) as *const posegate_settings
+    };
+    let [gate, fresh] = [(SEE_T7, 0), (DOCK, 3005)].map(|(bytes, now_ms): (&'static [u8], u32)| {
+        let gate = zeroed();
+        let (table, length) = (bytes.as_ptr(), bytes.len());
+        // SAFETY: valid pointers.
+        let status =
+            unsafe { posegate_gate_init(gate, table, length, of(bytes), leaked(0), now_ms) };
+        assert_eq!(status, posegate_status::Ok);
+        gate
+    });
+    let change = |gate: *mut posegate_gate, bytes: &'static [u8], settings, now_ms| {
+        // SAFETY: valid pointers, or null for the settings.
+        unsafe { posegate_gate_change_table(gate, bytes.as_ptr(), bytes.len(), settings, now_ms) }
+    };
+    let step = |gate, sequence: u32| {
+        let now = 10 * sequence;
+        // Inside both success sets.
+        let mut belief = belief_of_c(0.0, 0.0, 0.0);
+        belief.spread = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-7];
+        step_on(
+            gate,
+            now,
+            &evidence_of_c(report_of_c(sequence, now, belief), &[]),
+        )
+    };
+    for sequence in 1..300 {
+        let _ = step(gate, sequence);
+    }
+    let is_permit = |(status, step): (posegate_status, posegate_step), now_ms| {
+        assert_eq!(status, posegate_status::Ok);
+        // SAFETY: a valid pointer.
+        unsafe { posegate_permission_is_permit(&step.permission, now_ms) == POSEGATE_PERMIT }
+    };
+    let opened = step(gate, 300);
+    assert_eq!(opened.1.reason, 0);
+    assert!(is_permit(opened, 3000));
+    assert_eq!(change(gate, DOCK, of(DOCK), 3005), posegate_status::Ok);
+    for sequence in 301..600 {
+        let (changed, expected) = (step(gate, sequence), step(fresh, sequence));
+        assert_eq!(changed.1.reason, expected.1.reason, "{sequence}");
+        let now = 10 * sequence;
+        assert_eq!(
+            is_permit(changed, now),
+            is_permit(expected, now),
+            "{sequence}"
+        );
+    }
+    assert!(is_permit(step(gate, 600), 6000));
+    // The settings are those of another task.
+    assert_eq!(change(gate, DOCK, of(SEE_T7), 6005), posegate_status::Ok);
+    assert!(!is_permit(step(gate, 601), 6010));
+    // After an error nothing is left that could permit.
+    assert_eq!(
+        change(gate, DOCK, core::ptr::null(), 6015),
+        posegate_status::Null
+    );
+    let (status, denied) = step(gate, 602);
+    assert_eq!(status, posegate_status::NotInitialised);
+    // SAFETY: a valid pointer.
+    let permits = unsafe { posegate_permission_is_permit(&denied.permission, 6020) };
+    assert_ne!(permits, POSEGATE_PERMIT);
+}

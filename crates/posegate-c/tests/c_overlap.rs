@@ -471,6 +471,15 @@ fn functions() -> Vec<Function> {
         p[2].cast()
     );
     function!(
+        posegate_gate_change_table,
+        [gate(), raw(DOCK), input(settings())],
+        |p| p[0].cast(),
+        p[1],
+        DOCK.len(),
+        p[2].cast(),
+        100
+    );
+    function!(
         posegate_gate_step,
         [
             gate(),

@@ -642,6 +642,7 @@ fn a_shorter_table_in_the_same_place_is_refused() {
 }
 
 mod aging;
+mod change;
 mod hypotheses;
 
 /// Cells are walked no farther than the settings allow; facets have no such limit.
