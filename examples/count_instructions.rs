@@ -194,6 +194,15 @@ mod firmware {
         largest: [0.2, 0.2, 1.6],
     };
 
+    fn goal_of(table: &Table<'_>) -> Estimate {
+        let goal_pose = table.goal().pose;
+        Estimate {
+            x_m: f64::from(goal_pose.x_um) * 1e-6,
+            y_m: f64::from(goal_pose.y_um) * 1e-6,
+            yaw_rad: f64::from(goal_pose.yaw.signed()) * (PI / 2_147_483_648.0),
+        }
+    }
+
     /// Prints the cost of the most expensive decision that a search finds, and the bound that the table gives.
     fn worst(
         counter: &mut Counter,
@@ -202,13 +211,7 @@ mod firmware {
         (bounds, dear): (Bounds, Genes),
         tries: u32,
     ) -> Result<(), Failure> {
-        let goal_pose = table.goal().pose;
-        let about = Estimate {
-            x_m: f64::from(goal_pose.x_um) * 1e-6,
-            y_m: f64::from(goal_pose.y_um) * 1e-6,
-            yaw_rad: f64::from(goal_pose.yaw.signed()) * (PI / 2_147_483_648.0),
-        };
-        let mut search = Search::new(0x9e37_79b9_7f4a_7c15, about, bounds, dear);
+        let mut search = Search::new(0x9e37_79b9_7f4a_7c15, goal_of(table), bounds, dear);
         let by_facets = table.grid().is_none();
         let mut deepest = 0;
         // The movement of the most expensive set so far.
@@ -312,6 +315,71 @@ mod firmware {
             Some(set) if !by_facets => runs(counter, name, table, &set),
             _ => Ok(()),
         }
+    }
+
+    /// Prints the cost of the most expensive second evaluation that a search finds among sets that the first permits, and the bound that the
+    /// table gives. Half of the tries are grown by a movement.
+    fn confirmation(
+        counter: &mut Counter,
+        name: &str,
+        bytes: &[u8],
+        bounds: Bounds,
+        tries: u32,
+    ) -> Result<(), Failure> {
+        let table = &Table::parse(bytes).map_err(|_| "the table does not parse")?;
+        let mut search = Search::new(0x9e37_79b9_7f4a_7c15, goal_of(table), bounds, MIDDLE);
+        let radius = table.radius_squared();
+        for number in 0..tries {
+            let Some(mut set) = search.next(number >= tries / 4, radius) else {
+                continue;
+            };
+            let grown = number % 2 == 1;
+            let movement = if grown {
+                Growth::new(1_000, 16_384)
+            } else {
+                Growth::NONE
+            };
+            let is_inside = |set: &PoseSet| decide(table, &set.grown(movement)) == Decision::Inside;
+            if number % FITTED == 0
+                && let Some(fitted) = search.fitted(radius, is_inside)
+            {
+                set = fitted;
+            }
+            if is_inside(&set) {
+                let belief = search.belief();
+                let opinion = || {
+                    second::opinion_after(
+                        black_box(bytes),
+                        black_box(&belief),
+                        Trust::FULL,
+                        movement,
+                    )
+                };
+                let cost = counter.count(opinion)?.0;
+                search.found(cost);
+            }
+        }
+        let bound = u64::from(table.worst_case().confirmation_m4f());
+        counter.line(
+            "most expensive second opinion found,",
+            name,
+            search.cost(),
+            "instructions",
+            None,
+        );
+        counter.line(
+            "bound by the table, second opinion,",
+            name,
+            bound,
+            "instructions",
+            None,
+        );
+        // Cores without wide products take up to four times as many.
+        let most = if M4F { bound } else { 4 * bound };
+        if search.cost() > most {
+            return Err("a second opinion costs more than the table's worst case");
+        }
+        Ok(())
     }
 
     /// Prints the cost of a decision's most expensive run, with that of the slab it may begin: the difference of two limits of runs.
@@ -574,6 +642,20 @@ mod firmware {
                 (EVERY_HEADING, MIDDLE),
                 TRIES / 8,
             )?;
+        }
+        for (name, bytes, bounds) in [
+            ("see-t7", SEE_T7, ABOUT),
+            ("dock", DOCK, ABOUT),
+            ("see-bay", SEE_BAY, EVERY_HEADING),
+            ("corner", CORNER, EVERY_HEADING),
+            ("see-t7 grid", SEE_T7_GRID, ABOUT),
+        ] {
+            let tries = if bytes.len() > 2_000 {
+                TRIES_OF_CELLS
+            } else {
+                TRIES / 12
+            };
+            confirmation(&mut counter, name, bytes, bounds, tries)?;
         }
         let circle = parse(WHOLE_CIRCLE)?;
         let home = circle.goal().pose;

@@ -1,7 +1,8 @@
 //! A search for the pose-set with the most expensive decision: half of the tries are random, half are near
 //! the most expensive set so far.
 
-use posegate::set::{Estimate, PoseSet, RadiusSquared};
+use posegate::report::PoseEstimate;
+use posegate::set::{Estimate, PoseSet, RadiusSquared, Trust, Uncertainty};
 
 /// Range of the estimates about a table's goal, to either side, and largest deviations: m, m, rad.
 #[derive(Clone, Copy)]
@@ -64,6 +65,11 @@ impl Search {
 
     /// Returns the set of the genes.
     fn set(&self, radius: RadiusSquared) -> Option<PoseSet> {
+        self.belief().pose_set(radius, Trust::FULL).ok()
+    }
+
+    /// Returns the estimate of the genes.
+    pub fn belief(&self) -> PoseEstimate {
         let [x, y, yaw, a, b, c, xy, x_yaw, y_yaw, kind] = self.genes;
         let at = |gene: f64, range: f64| (2.0 * gene - 1.0) * range;
         let Bounds { range, largest } = self.bounds;
@@ -78,7 +84,11 @@ impl Search {
             size(c) * largest[2],
         ];
         if kind < 0.15 {
-            return PoseSet::bounded(estimate, 3.0 * dx, 2.0 * dyaw).ok();
+            let wide = Uncertainty::Bounded {
+                translation_m: 3.0 * dx,
+                yaw_rad: 2.0 * dyaw,
+            };
+            return PoseEstimate::new(estimate, wide);
         }
         let [xy, x_yaw, y_yaw] = [xy, x_yaw, y_yaw].map(|gene| at(gene, 0.9));
         let (xy, x_yaw, y_yaw) = (xy * dx * dy, x_yaw * dx * dyaw, y_yaw * dy * dyaw);
@@ -87,7 +97,7 @@ impl Search {
             [xy, dy * dy, y_yaw],
             [x_yaw, y_yaw, dyaw * dyaw],
         ];
-        PoseSet::gaussian(estimate, covariance, radius).ok()
+        PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance))
     }
 
     /// Returns the last set, enlarged as far as it stays inside: bisects a range of factors ten times.

@@ -87,22 +87,24 @@ impl Walked {
 
     /// Returns the reach of the set for yaw offsets in a window.
     fn reach(&self, [low, high]: [i64; 2]) -> Reach {
-        let along = |row: fn(&SqrtFactor) -> [i32; 3]| {
-            let most = self.factor.as_ref().map_or(0, |factor| {
+        let along = |row: Option<[i32; 3]>| {
+            let most = row.zip(self.factor).map_or(0, |(row, factor)| {
                 let yaw = i64::from(factor.yaw);
                 // Before the movement's turn.
                 let part = [low.wrapping_sub(self.swing), high.wrapping_add(self.swing)]
                     .map(|v| v.max(yaw.wrapping_neg()).min(yaw));
-                let row = row(factor);
                 reach(row, factor.yaw, held(row, factor.yaw, part))
             });
             most.wrapping_add(self.radius)
         };
+        let x = self.factor.map(|factor| factor.x);
+        let y = self.factor.map(|factor| factor.y);
+        let opposite = |row: Option<[i32; 3]>| row.map(|row| row.map(i32::wrapping_neg));
         Reach {
-            left: along(|factor| factor.x.map(i32::wrapping_neg)),
-            right: along(|factor| factor.x),
-            bottom: along(|factor| factor.y.map(i32::wrapping_neg)),
-            top: along(|factor| factor.y),
+            left: along(opposite(x)),
+            right: along(x),
+            bottom: along(opposite(y)),
+            top: along(y),
         }
     }
 }

@@ -36,6 +36,10 @@ pub struct WorstCase {
     /// Runs of cells, and rows without a run, of all slabs. For a whole circle of headings they count twice,
     /// and the runs of the fullest slab twice more.
     pub runs: u32,
+    /// Facets of points that turn with the heading, which the second evaluation may try at every section.
+    pub turning_facets: u32,
+    /// Outermost poses that the second evaluation looks up, if there are several pieces, or cells.
+    pub spots: u32,
 }
 
 /// Instructions of each step: a decision, a piece, a frame, a facet in world axes and in robot axes, a slab of headings, a slab of
@@ -47,7 +51,38 @@ type Prices = [u32; 8];
 const M4F: Prices = [800, 40, 100, 250, 420, 600, 3_500, 150];
 const M0_PLUS: Prices = [2_200, 60, 160, 800, 1_600, 1_300, 10_500, 250];
 
+/// Sections of one facet in the second evaluation: three to find the touching heading, and seventeen headings with the robot turned either
+/// way.
+const SECTIONS: u32 = 3 + 3 * 17;
+/// Poses that the second evaluation looks up.
+const SPOTS: u32 = 27;
+/// Instructions of the second evaluation on a Cortex-M4F: itself and a piece, a facet, a section, a pose, and a frame and a facet at it.
+const CONFIRMATION: [u32; 7] = [3_500, 100, 250, 700, 1_600, 100, 60];
+
 impl WorstCase {
+    /// Returns an upper bound of the instructions of the second evaluation on a Cortex-M4F, which confirms each permit; as
+    /// [`WorstCase::instructions_m4f`], searched.
+    #[must_use]
+    pub fn confirmation_m4f(&self) -> u32 {
+        let [own, piece, facet, section, spot, frame_at, facet_at] = CONFIRMATION;
+        let facets = self.world_facets.saturating_add(self.robot_facets);
+        let at = [(self.frames, frame_at), (facets, facet_at)]
+            .into_iter()
+            .fold(spot, |sum, (count, price)| {
+                sum.saturating_add(count.saturating_mul(price))
+            });
+        [
+            (self.pieces, piece),
+            (facets, facet),
+            (self.turning_facets.saturating_mul(SECTIONS), section),
+            (self.spots, at),
+        ]
+        .into_iter()
+        .fold(own, |sum, (count, price)| {
+            sum.saturating_add(count.saturating_mul(price))
+        })
+    }
+
     /// Returns an upper bound of the instructions of a decision on a Cortex-M4F, built with the `firmware`
     /// profile.
     #[must_use]
@@ -121,6 +156,9 @@ impl Table<'_> {
                     Axes::Robot => &mut worst.robot_facets,
                 };
                 *sum = sum.saturating_add(facets);
+                if frame.axes == Axes::Robot || (frame.x, frame.y) != (0, 0) {
+                    worst.turning_facets = worst.turning_facets.saturating_add(facets);
+                }
             }
         }
         if self.facets().is_some_and(|layout| layout.lever() > 0) {
@@ -133,6 +171,9 @@ impl Table<'_> {
                 .saturating_add(layout.uncounted_steps());
             let slabs = steps.saturating_mul(SLABS_OF_STEP);
             worst.heading_slabs = worst.heading_slabs.saturating_add(slabs);
+        }
+        if worst.pieces != 1 {
+            worst.spots = SPOTS;
         }
         if let Some(grid) = self.grid() {
             let cells = self.cells();
@@ -179,7 +220,12 @@ mod tests {
             heading_slabs: 9,
             slabs: 13,
             runs: 11,
+            turning_facets: 4,
+            spots: 27,
         };
+        let at = 1_600 + 3 * 100 + 12 * 60;
+        let confirmation = 3_500 + 2 * 100 + 12 * 250 + 4 * 54 * 700 + 27 * at;
+        assert_eq!(worst.confirmation_m4f(), confirmation);
         let m4f = 800 + 2 * 40 + 3 * 100 + 5 * 250 + 7 * 420 + 9 * 600 + 13 * 3_500 + 11 * 150;
         assert_eq!(worst.instructions_m4f(), m4f);
         let m0_plus =
@@ -220,6 +266,7 @@ mod tests {
         let expected = WorstCase {
             slabs: 2,
             runs: 6,
+            spots: 27,
             ..WorstCase::default()
         };
         assert_eq!(worst, expected);

@@ -208,6 +208,12 @@ const JOBS: &[Job] = &[
         jobs::c::c,
     ),
     job(
+        "costs",
+        "",
+        "flash, stack and instructions of a gate in C on three cores, against the figures that `posegate table cost` has",
+        jobs::robot::costs,
+    ),
+    job(
         "robot",
         "",
         "a whole program in C with the archive as released: flash, stack, instructions of each call, on three cores",

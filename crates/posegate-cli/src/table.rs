@@ -8,10 +8,11 @@ use posegate::verify::{
     BuildError, Coverage, ExpectedTable, Proof, VerifyError, build as build_table, coverage,
     verify, volume,
 };
+use posegate_host::controller_cost::{self, Level};
 use posegate_host::doctor::{Warning, examine};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::printable::printable_json;
-use posegate_host::site::{Site, TableSpec, Task};
+use posegate_host::site::{Core, Site, TableSpec, Task};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -34,6 +35,11 @@ pub enum Command {
         after_help = "Example:\n  posegate table export dock.posegate --format c -o dock_table.h"
     )]
     Export(Export),
+    /// Tells the flash, the stack and the instructions that a gate in C takes with a table
+    #[command(
+        after_help = "Example:\n  posegate table cost dock.posegate --tracker --core cortex-m4f"
+    )]
+    Cost(Cost),
 }
 
 #[derive(clap::Args)]
@@ -113,8 +119,27 @@ enum Format {
     Rust,
 }
 
+#[derive(clap::Args)]
+pub struct Cost {
+    /// The table; `-` for standard input
+    table: Input,
+    /// The processor core
+    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(Core::ALL.map(Core::name)))]
+    core: String,
+    /// With a tracker: fixes are carried along odometry
+    #[arg(long)]
+    tracker: bool,
+    /// The level of optimization of the archive
+    #[arg(long, default_value = "3", value_parser = ["3", "s"])]
+    level: String,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
 pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
+        Command::Cost(arguments) => cost(arguments, files),
         Command::Build(arguments) => build(arguments, files),
         Command::Info(arguments) => info(arguments, files),
         Command::Verify(arguments) => check(arguments, files),
@@ -402,6 +427,49 @@ fn info(arguments: &Info, files: &Files) -> Outcome {
         let pretty = serde_json::to_string_pretty(&facts).map_err(Failure::input)?;
         print(&printable_json(&pretty))?;
     }
+    Ok(answer(true))
+}
+
+fn cost(arguments: &Cost, files: &Files) -> Outcome {
+    let (bytes, name) = files.read(&arguments.table)?;
+    let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
+    let core = Core::ALL
+        .into_iter()
+        .find(|core| core.name() == arguments.core);
+    let level = match arguments.level.as_str() {
+        "s" => Level::Small,
+        _ => Level::Fast,
+    };
+    let core = core.ok_or_else(|| Failure::input("no such core"))?;
+    let cost = controller_cost::cost(&table, core, level, arguments.tracker);
+    let total = cost.flash_of_gate + cost.flash_of_tracker + cost.flash_of_table;
+    if arguments.json {
+        print_json(&json!({
+            "parts": cost.parts,
+            "flash": {"gate": cost.flash_of_gate, "tracker": cost.flash_of_tracker, "table": cost.flash_of_table, "total": total},
+            "stack": {"init": cost.stack_of_init, "step": cost.stack_of_step, "tracked": cost.stack_of_tracked},
+            "cycle": {"without_fix": cost.without_fix, "with_fix": cost.with_fix, "change_of_table": cost.change_of_table},
+        }))?;
+        return Ok(answer(true));
+    }
+    print(&format_args!(
+        "{name} on {}, archive `{}-{}`:\n\
+         flash: gate {}, tracker {}, table {}, total {total} bytes\n\
+         stack: init {}, step {}, tracker {} bytes\n\
+         a cycle takes at most {} instructions, {} with a fix; a change of table {}",
+        arguments.core,
+        cost.parts,
+        arguments.level,
+        cost.flash_of_gate,
+        cost.flash_of_tracker,
+        cost.flash_of_table,
+        cost.stack_of_init,
+        cost.stack_of_step,
+        cost.stack_of_tracked,
+        cost.without_fix,
+        cost.with_fix,
+        cost.change_of_table,
+    ))?;
     Ok(answer(true))
 }
 

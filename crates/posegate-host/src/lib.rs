@@ -25,6 +25,8 @@ pub mod log;
 
 pub mod site;
 
+pub mod controller_cost;
+
 pub mod inscribe;
 
 pub mod plan;

@@ -72,6 +72,7 @@ static struct cost of_init = {.name = "init"};
 static struct cost of_change = {.name = "change of table"};
 static struct cost of_odometry = {.name = "odometry"};
 static struct cost of_fix = {.name = "fix"};
+static struct cost of_late_fix = {.name = "fix that is 62 increments old"};
 static struct cost of_step = {.name = "step on the tracker"};
 static struct cost of_permission = {.name = "permission"};
 static struct cost of_cycle = {.name = "cycle without a fix"};
@@ -127,8 +128,8 @@ static void arm(uint32_t task, struct cost *cost)
     }
 }
 
-/* A fix of the localization, as it was FIX_AGE_MS ago: the robot drives 0.3 mm in a cycle. */
-static posegate_report fix_of_map(double moved_m)
+/* A fix of the localization as it was then: the robot has moved since. */
+static posegate_report fix_of_map(uint32_t age_ms, double moved_m)
 {
     static const posegate_report empty = {0};
     posegate_compact compact = {.x_m = (float)(x_m - moved_m), .xx = 2e-5F, .yy = 1.5e-5F, .yaw_yaw = 1e-4F, .xy = 1e-6F};
@@ -138,7 +139,7 @@ static posegate_report fix_of_map(double moved_m)
     }
     report.frame = frame_map;
     report.sequence = sequence;
-    report.stamp_ms = now_ms - FIX_AGE_MS;
+    report.stamp_ms = now_ms - age_ms;
     sequence++;
     return report;
 }
@@ -159,7 +160,7 @@ static bool cycle(uint32_t number)
     COUNT(of_odometry, total, status = posegate_tracker_odometry(&tracker, &increment, &broken));
     if (with_fix) {
         uint32_t refused = 0U;
-        posegate_report fix = fix_of_map(drives ? 0.0003 * (FIX_AGE_MS / CYCLE_MS) : 0.0);
+        posegate_report fix = fix_of_map(FIX_AGE_MS, drives ? 0.0003 * (FIX_AGE_MS / CYCLE_MS) : 0.0);
         COUNT(of_fix, total, status = posegate_tracker_fix(&tracker, &fix, &refused));
         if ((status != POSEGATE_STATUS_OK) || (refused != 0U)) {
             fail("a fix is refused");
@@ -219,11 +220,32 @@ static void program(uint32_t *open, uint32_t *first_open)
         }
         now_ms += CYCLE_MS;
     }
+    /* The robot stands; then a fix comes for nearly all increments that are kept. */
+    for (uint32_t number = 0U; number < 64U; number++) {
+        posegate_increment increment = {.begins_ms = odometry_ms, .stamp_ms = now_ms};
+        uint32_t broken;
+        odometry_ms = now_ms;
+        if ((posegate_tracker_odometry(&tracker, &increment, &broken) != POSEGATE_STATUS_OK) || (broken != 0U)) {
+            fail("an increment is refused");
+        }
+        now_ms += CYCLE_MS;
+    }
+    now_ms -= CYCLE_MS;
+    {
+        uint32_t refused = 0U;
+        uint32_t total = 0U;
+        posegate_status status;
+        posegate_report fix = fix_of_map(62U * CYCLE_MS, 0.0);
+        COUNT(of_late_fix, total, status = posegate_tracker_fix(&tracker, &fix, &refused));
+        if ((status != POSEGATE_STATUS_OK) || (refused != 0U)) {
+            fail("a late fix is refused");
+        }
+    }
 }
 
 int main(void)
 {
-    const struct cost *const costs[] = {&of_init, &of_change, &of_odometry, &of_fix,
+    const struct cost *const costs[] = {&of_init, &of_change, &of_odometry, &of_fix, &of_late_fix,
                                         &of_step, &of_permission, &of_cycle, &of_fix_cycle};
     uint32_t open = 0U;
     uint32_t first_open = 0U;

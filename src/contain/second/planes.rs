@@ -11,7 +11,7 @@
 
 use super::believed::{Ellipsoid, Question};
 use super::bits::{quotient, root, root32, short_by, wide, word16, word32};
-use super::spots::{FINER, outermost_hold};
+use super::spots::{Among, FINER, outermost_hold};
 use super::turn::cosine_and_sine;
 use crate::set::Uncertainty;
 use crate::table::parts;
@@ -543,7 +543,7 @@ pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Opti
         goal: word32(table, 24)?,
         layout,
     };
-    outermost_hold(question, &|offset| place.is_in_a_piece(offset))
+    outermost_hold(question, &Among::Pieces(place))
 }
 
 #[inline(never)]
@@ -559,7 +559,7 @@ fn in_one(table: &[u8], layout: &Layout<'_>, question: &Question<'_>) -> Option<
 }
 
 /// An estimate among pieces.
-struct Place<'a> {
+pub(super) struct Place<'a> {
     /// From the goal in world axes, 2^-3 um.
     at: [i64; 2],
     /// 2^-32 turn.
@@ -572,7 +572,7 @@ struct Place<'a> {
 impl Place<'_> {
     /// Returns `true` if a piece contains the pose at an offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
     #[inline(never)]
-    fn is_in_a_piece(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
+    pub(super) fn is_in_a_piece(&self, [dx, dy, turn]: [i64; 3]) -> Option<bool> {
         let [x, y] = self.at;
         let unit = self.layout.unit.unsigned_abs();
         // 2^-14 length units. Beyond the reach of every layout: 2^30 of them.

@@ -10,8 +10,10 @@
 
 use super::believed::{Cylinder, Ellipsoid, Question};
 use super::bits::{Short, quotient, root, word16, word32};
+use super::planes::Place;
 use crate::num;
 use crate::set::Uncertainty;
+use crate::table::parts;
 
 /// Lengths are in 2^-3 um, at most 2^31 of them.
 pub(super) const FINER: i32 = 3;
@@ -48,7 +50,7 @@ static DIRECTIONS: [[i8; 3]; 13] = [
 ];
 
 /// The cells and the set's estimate among them.
-struct Cells<'a> {
+pub(super) struct Cells<'a> {
     table: &'a [u8],
     grid: &'a [u8],
     /// The estimate relative to the goal in world axes, and its heading above the lower end of the yaw
@@ -69,38 +71,53 @@ pub(super) fn hold(table: &[u8], grid: &[u8], question: &Question<'_>) -> Option
             .wrapping_sub(word32(table, 24)?)
             .wrapping_sub(word32(table, 52)?),
     };
-    outermost_hold(question, &|offset| cells.covers(offset))
+    outermost_hold(question, &Among::Cells(cells))
 }
 
-/// Returns `true` if a pose of the set is found: its offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
-type Lookup<'a> = &'a dyn Fn([i64; 3]) -> Option<bool>;
+/// Where poses are looked up. No call goes through a pointer, so the deepest stack is known.
+pub(super) enum Among<'a> {
+    Cells(Cells<'a>),
+    Pieces(Place<'a>),
+}
 
-/// Returns `true` if the estimate and every outermost pose of the set is found.
+impl Among<'_> {
+    /// Returns `true` if a pose of the set is covered: its offset from the estimate, 2^-3 um, 2^-3 um, 2^-32 turn.
+    #[inline(never)]
+    fn has(&self, offset: [i64; 3]) -> Option<bool> {
+        match self {
+            Self::Cells(cells) if parts::CELLS => cells.covers(offset),
+            Self::Pieces(place) if parts::UNIONS => place.is_in_a_piece(offset),
+            _ => None,
+        }
+    }
+}
+
+/// Returns `true` if the estimate and every outermost pose of the set is covered.
 #[inline(never)]
-pub(super) fn outermost_hold(question: &Question<'_>, is_found: Lookup<'_>) -> Option<bool> {
-    if !is_found([0; 3])? {
+pub(super) fn outermost_hold(question: &Question<'_>, among: &Among<'_>) -> Option<bool> {
+    if !among.has([0; 3])? {
         return Some(false);
     }
     match question.belief.spread.as_ref()? {
         Uncertainty::Gaussian(covariance) => {
             let scaled = Scaled::of(&question.ellipsoid(covariance)?)?;
-            of_ellipsoid(&scaled, question, is_found)
+            of_ellipsoid(&scaled, question, among)
         }
         Uncertainty::Bounded {
             translation_m,
             yaw_rad,
-        } => of_cylinder(&question.cylinder(*translation_m, *yaw_rad)?, is_found),
+        } => of_cylinder(&question.cylinder(*translation_m, *yaw_rad)?, among),
     }
 }
 
 #[inline(never)]
-fn of_ellipsoid(scaled: &Scaled, question: &Question<'_>, is_found: Lookup<'_>) -> Option<bool> {
+fn of_ellipsoid(scaled: &Scaled, question: &Question<'_>, among: &Among<'_>) -> Option<bool> {
     for direction in &DIRECTIONS {
         let Some(offset) = scaled.outermost(direction.map(i64::from)) else {
             continue;
         };
         let offset = moved(question, offset);
-        if !(is_found(offset)? && is_found(offset.map(i64::wrapping_neg))?) {
+        if !(among.has(offset)? && among.has(offset.map(i64::wrapping_neg))?) {
             return Some(false);
         }
     }
@@ -129,7 +146,7 @@ fn moved(question: &Question<'_>, [x, y, turn]: [i64; 3]) -> [i64; 3] {
 }
 
 #[inline(never)]
-fn of_cylinder(cylinder: &Cylinder, is_found: Lookup<'_>) -> Option<bool> {
+fn of_cylinder(cylinder: &Cylinder, among: &Among<'_>) -> Option<bool> {
     let radius = drawn_in((cylinder.radius_q8 >> 5) as i64);
     let diagonal = radius.wrapping_mul(DIAGONAL) >> 16;
     let yaw = drawn_in(cylinder.yaw);
@@ -142,7 +159,7 @@ fn of_cylinder(cylinder: &Cylinder, is_found: Lookup<'_>) -> Option<bool> {
     for turn in [yaw.wrapping_neg(), 0, yaw] {
         for [x, y] in around {
             let opposite = [x.wrapping_neg(), y.wrapping_neg(), turn];
-            if !(is_found([x, y, turn])? && is_found(opposite)?) {
+            if !(among.has([x, y, turn])? && among.has(opposite)?) {
                 return Some(false);
             }
         }

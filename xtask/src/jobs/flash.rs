@@ -2,11 +2,11 @@
 
 use crate::arguments::Arguments;
 use crate::board::{self, Level};
-use crate::files::{Scratch, target_folder};
+use crate::files::{self, Scratch, target_folder};
 use crate::jobs::test::ran;
 use crate::need;
 use crate::report::Report;
-use crate::shell::{Result, cmd, program_at};
+use crate::shell::{Result, cmd};
 use std::path::{Path, PathBuf};
 
 const ALL_PARTS: &str = "cells,headings,sight,unions";
@@ -30,7 +30,7 @@ const TRACKER: [&str; 4] = [
     "posegate_tracker_init",
     "posegate_tracker_odometry",
     "posegate_tracker_fix",
-    "posegate_gate_step_on",
+    "posegate_gate_step_tracked",
 ];
 /// A linker script that places all sections one after the other.
 const LAYOUT: &str = "SECTIONS {
@@ -84,10 +84,6 @@ pub fn smallest_and_largest(_: &Arguments) -> Result {
 
 fn of_gates(report: &mut Report, parts: &[(&str, &str)]) -> Result {
     need::targets(&TARGETS)?;
-    let folder = Scratch::new()?;
-    let image = folder.join("gate.bin");
-    let layout = folder.join("layout.ld");
-    std::fs::write(&layout, LAYOUT)?;
     for level in ["s", "3"] {
         for &(name, features) in parts {
             // One core shows what each part takes; for the others the smallest and the largest gate are enough.
@@ -99,7 +95,7 @@ fn of_gates(report: &mut Report, parts: &[(&str, &str)]) -> Result {
             build_archives(targets, level, features)?;
             for target in targets {
                 let archive = archive(target);
-                let bytes = linked(&archive, &GATE, &layout, &image)?;
+                let bytes = of(&archive, &GATE)?;
                 let name = format!("flash of a gate in C, {name}, {target}, opt-level {level}");
                 match (features, ceilings(target, level)) {
                     ("", [alone, _]) => report.at_most(&name, bytes, "B", alone),
@@ -108,7 +104,7 @@ fn of_gates(report: &mut Report, parts: &[(&str, &str)]) -> Result {
                 }
                 if features.is_empty() {
                     let functions: Vec<&str> = GATE.into_iter().chain(TRACKER).collect();
-                    let more = linked(&archive, &functions, &layout, &image)? - bytes;
+                    let more = of(&archive, &functions)? - bytes;
                     report.note(&format!("{name}: its tracker"), more, "B");
                 }
             }
@@ -157,9 +153,21 @@ fn archive(target: &str) -> PathBuf {
 }
 
 /// Returns the bytes of code, constants and initial values of a program that contains these functions and what they call.
-fn linked(archive: &Path, functions: &[&str], layout: &Path, image: &Path) -> Result<u64> {
+pub fn of(archive: &Path, functions: &[&str]) -> Result<u64> {
+    let folder = Scratch::new()?;
+    let image = folder.join("gate.bin");
+    link(archive, functions, "--oformat=binary", &image)?;
+    files::size(&image)
+}
+
+/// Links a program that contains these functions and what they call.
+pub fn link(archive: &Path, functions: &[&str], format: &str, image: &Path) -> Result {
+    let layout = image.with_extension("ld");
+    files::write(&layout, LAYOUT)?;
     need::linker()?
-        .words("-flavor gnu --oformat=binary --gc-sections --entry=posegate_abi_version -T")
+        .words("-flavor gnu --gc-sections --entry=posegate_abi_version")
+        .words(format)
+        .arg("-T")
         .arg(layout)
         .args(
             functions
@@ -169,10 +177,7 @@ fn linked(archive: &Path, functions: &[&str], layout: &Path, image: &Path) -> Re
         .arg(archive)
         .arg("-o")
         .arg(image)
-        .run()?;
-    Ok(std::fs::metadata(image)
-        .map_err(|error| format!("{}: {error}", image.display()))?
-        .len())
+        .run()
 }
 
 /// Parts of a decision, and the functions, types and modules of `posegate::contain` that are in each.

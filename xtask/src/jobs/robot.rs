@@ -1,13 +1,16 @@
-//! `robot`: what a whole program in C takes, with the archive as released.
+//! `robot` and `costs`: what a whole program in C takes, with the archive as released.
 
 use crate::archive::{self, Core};
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch};
+use crate::jobs::flash;
 use crate::jobs::test::build_suite;
 use crate::need;
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd, program_at};
+use crate::stack::Program;
 use serde_json::Value;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 const FOLDER: &str = "examples/c/robot";
@@ -164,6 +167,122 @@ pub fn of_board(
         );
     }
     Ok(figures)
+}
+
+const FIGURES: &str = "crates/posegate-host/src/controller_cost/figures.txt";
+const COLUMNS: &str = "# What a gate in C takes, made by POSEGATE_BLESS=1 ./ci.sh costs. Flash and stack in bytes, calls in instructions of examples/c/robot.
+# core level parts flash_of_gate flash_of_tracker stack_of_init stack_of_step stack_of_tracked init odometry fix late_fix step change
+";
+const GATE: [&str; 5] = [
+    "posegate_gate_init",
+    "posegate_gate_change_table",
+    "posegate_gate_step",
+    "posegate_gate_tick",
+    "posegate_permission_is_permit",
+];
+const TRACKER: [&str; 4] = [
+    "posegate_tracker_init",
+    "posegate_tracker_odometry",
+    "posegate_tracker_fix",
+    "posegate_gate_step_tracked",
+];
+
+/// Measures what a gate in C takes on each core, at both levels of optimization, with each set of parts, and compares it with the figures
+/// from which `posegate table cost` and the documents take theirs. A figure may differ by 2 %, as by another compiler of C.
+pub fn costs(_: &Arguments) -> Result {
+    let mut found = COLUMNS.to_owned();
+    let mut report = Report::default();
+    for board in &BOARDS {
+        for level in ["3", "s"] {
+            // A gate of boxes cannot take the dock of the program: its calls take no more than those of the next.
+            let mut calls = String::new();
+            for parts in ["turning", "boxes", "all"] {
+                let row = costs_of(board, parts, level, &mut calls, &mut report)?;
+                writeln!(found, "{} {level} {parts} {row}", board.core)?;
+            }
+        }
+    }
+    if std::env::var_os("POSEGATE_BLESS").is_some() {
+        files::write(FIGURES, &found)?;
+    }
+    let known = files::read(FIGURES)?;
+    let differ = |(a, b): (&str, &str)| match (a.parse::<u64>(), b.parse::<u64>()) {
+        (Ok(a), Ok(b)) => 50 * a.abs_diff(b) > a,
+        _ => a != b,
+    };
+    let mut wrong = known.lines().count().abs_diff(found.lines().count());
+    for (a, b) in known.lines().zip(found.lines()) {
+        if a.split(' ').zip(b.split(' ')).any(differ) {
+            eprintln!("{FIGURES}: {a}\nmeasured: {b}");
+            wrong += 1;
+        }
+    }
+    report.at_most(
+        "rows of figures that differ from what is measured",
+        wrong,
+        "rows",
+        0,
+    );
+    report.finish()
+}
+
+/// Returns a row of figures after its names.
+fn costs_of(
+    board: &Board,
+    parts: &str,
+    level: &str,
+    calls: &mut String,
+    report: &mut Report,
+) -> Result<String> {
+    if parts != "boxes" {
+        let figures = of_board(board, parts, level, report)?;
+        let figure = |name: &str| {
+            let found = figures.iter().find(|(own, _)| own == name);
+            found
+                .map(|(_, value)| value.to_string())
+                .ok_or_else(|| format!("the program prints no {name}"))
+        };
+        let names = [
+            "init, most",
+            "odometry, most",
+            "fix, most",
+            "fix that is 62 increments old, most",
+            "step on the tracker, most",
+            "change of table, most",
+        ];
+        *calls = names
+            .map(figure)
+            .into_iter()
+            .collect::<std::result::Result<Vec<_>, _>>()?
+            .join(" ");
+    }
+    let archive = archive::build(board.core()?, features(parts)?, level)?;
+    let gate = flash::of(&archive, &GATE)?;
+    let both: Vec<&str> = GATE.into_iter().chain(TRACKER).collect();
+    let tracker = flash::of(&archive, &both)? - gate;
+    let folder = Scratch::new()?;
+    let elf = folder.join("all.elf");
+    flash::link(&archive, &both, "", &elf)?;
+    let program = Program::of(
+        &board
+            .core()?
+            .tool("objdump")?
+            .words("-d --no-show-raw-insn")
+            .arg(&elf)
+            .read()?,
+    );
+    let deepest = |names: &[&str]| -> Result<u64> {
+        names
+            .iter()
+            .try_fold(0, |most, name| Ok(program.deepest(name)?.max(most)))
+    };
+    let stacks = [
+        deepest(&GATE[..2])?,
+        deepest(&GATE[2..])?,
+        deepest(&TRACKER)?,
+    ];
+    let [init, step, tracked] = stacks;
+    Ok(format!("{gate} {tracker} {init} {step} {tracked} {calls}"))
 }
 
 /// Returns the features of a set of parts.

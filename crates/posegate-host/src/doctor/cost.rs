@@ -42,6 +42,7 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
         let core = match controller.core {
             Core::CortexM4F => "Cortex-M4F",
             Core::CortexM0Plus => "Cortex-M0+",
+            Core::Rv32Imc => "RV32IMC",
         };
         if cycles > f64::from(controller.cycles_per_decision) {
             all.push(warn(
