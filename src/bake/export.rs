@@ -58,7 +58,7 @@ fn facts(table: &Table<'_>) -> [String; 6] {
             worst.instructions_m4f(),
             worst.instructions_m0_plus()
         ),
-        match table.parts().as_slice() {
+        match table.parts().names().collect::<Vec<_>>().as_slice() {
             [] => "It needs none of the crate's optional features.".to_owned(),
             parts => format!("It needs the crate's features {}.", parts.join(", ")),
         },

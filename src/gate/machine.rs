@@ -110,6 +110,9 @@ impl<'a> Gate<'a> {
     /// the whole table. A table that is damaged, of another task or of another site gives a gate that denies with
     /// that reason: a controller with damaged flash must still answer.
     ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
+    ///
     /// # Errors
     /// [`InvalidParameter`] if a parameter would switch a check off, or keep the gate closed for ever.
     pub fn new(
@@ -120,7 +123,7 @@ impl<'a> Gate<'a> {
         settings.check()?;
         let mut gate = Self {
             bytes: table,
-            table: Err(Reason::TableInvalid),
+            table: Err(Reason::TableDamaged),
             settings,
             checked: RedundantWord::new(settings.digest()),
             table_crc: RedundantWord::new(table::stored_checksum(table)),
@@ -141,6 +144,9 @@ impl<'a> Gate<'a> {
     /// Checks the table again and restarts the gate, closed. This is the only way out of a latched fault. A reset is
     /// a manual action: never call it from a timer. If the settings have changed, latches [`Reason::MemoryDamaged`]:
     /// restart the controller.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     ///
     /// # Errors
     /// [`InvalidParameter`] if the settings are invalid; the gate stays as it was.
@@ -164,7 +170,7 @@ impl<'a> Gate<'a> {
     /// Returns the table, or the reason why the gate has none.
     ///
     /// # Errors
-    /// [`Reason::TableInvalid`], [`Reason::WrongTask`], [`Reason::WrongSite`] or [`Reason::SelfTestFailed`].
+    /// [`Reason::TableDamaged`], [`Reason::TableTooNew`], [`Reason::PartMissing`], [`Reason::WrongTask`], [`Reason::WrongSite`] or [`Reason::SelfTestFailed`].
     pub const fn table(&self) -> Result<&Table<'a>, Reason> {
         match &self.table {
             Ok(table) => Ok(table),
@@ -173,11 +179,17 @@ impl<'a> Gate<'a> {
     }
 
     /// Evaluates a report at the controller's time `now_ms`.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
         self.step_on(now_ms, &Evidence::of(report))
     }
 
     /// As [`Gate::step`], for a report with several hypotheses, or a report that was carried along odometry.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     #[inline(always)]
     pub fn step_on(&mut self, now_ms: u32, evidence: &Evidence<'_>) -> Step {
         let verdict = self
@@ -191,6 +203,9 @@ impl<'a> Gate<'a> {
 
     /// Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
     /// reports stop.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     pub fn tick(&mut self, now_ms: u32) -> Step {
         if self.process_tick(now_ms).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -201,6 +216,9 @@ impl<'a> Gate<'a> {
     /// Ends a permit, and the permits counted so far, at the controller's time `now_ms`. Call it if something else
     /// has closed the interlock for a cause that may pass, such as a watchdog or a mode of the machine. The gate then
     /// qualifies again as after a denial. With [`super::Restart::OnReset`] an open gate waits for the reset.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     pub fn inhibit(&mut self, now_ms: u32, reason: Reason) -> Step {
         if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -487,7 +505,7 @@ impl<'a> Gate<'a> {
 
 /// Parses a table, checks that it is for the task and site that the controller expects, and limits its walks.
 fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Reason> {
-    let table = Table::parse(bytes).map_err(|_| Reason::TableInvalid)?;
+    let table = Table::parse(bytes)?;
     if table.task() != settings.task {
         return Err(Reason::WrongTask);
     }

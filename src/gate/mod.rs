@@ -35,8 +35,9 @@
 use crate::contain::{self, Cause, Decision, Margin};
 use crate::pose::Pose;
 use crate::set::{InputError, PoseSet};
-use crate::table::Table;
+use crate::table::{Table, TableError};
 
+pub use self::clock::Clock;
 pub use self::evidence::{Evidence, MOST_HYPOTHESES};
 pub use self::interlock::{Interlock, InterlockFault, NoPin};
 pub use self::machine::{Gate, Step};
@@ -49,6 +50,7 @@ pub use self::self_test::self_test;
 pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
 pub use self::state::State;
 
+mod clock;
 mod doubled;
 mod elsewhere;
 mod evidence;
@@ -130,6 +132,16 @@ impl From<Cause> for Reason {
             Cause::OffTable => Self::OutsideTable,
             Cause::NotContained => Self::NotContained,
             Cause::TooCostly => Self::TooCostly,
+        }
+    }
+}
+
+impl From<TableError> for Reason {
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::TooNew => Self::TableTooNew,
+            TableError::NoCells => Self::PartMissing,
+            _ => Self::TableDamaged,
         }
     }
 }

@@ -374,6 +374,9 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 /// Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
 /// gate, and its functions deny.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
 /// read, and the counter can be written, now and as long as the gate is used.
@@ -416,6 +419,9 @@ pub unsafe extern "C" fn posegate_gate_init(
 /// of an unknown source does. If `step` is null or misaligned, the report is still evaluated: the gate must
 /// close even if the caller gets no answer.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -448,6 +454,9 @@ pub unsafe extern "C" fn posegate_gate_step(
 /// Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each error closes
 /// the gate.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -476,6 +485,9 @@ pub unsafe extern "C" fn posegate_gate_step_on(
 /// Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
 /// reports stop. The time also advances if `step` is null or misaligned.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -499,6 +511,9 @@ pub unsafe extern "C" fn posegate_gate_tick(
 /// manual action: never call it from a timer.
 ///
 /// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
+///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
@@ -526,6 +541,9 @@ pub unsafe extern "C" fn posegate_gate_reset(
 ///
 /// Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
+///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.

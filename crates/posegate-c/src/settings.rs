@@ -1,6 +1,6 @@
 //! The settings of a gate: a constant in flash.
 
-use super::memory::{Plain, write};
+use super::memory::{Plain, unused, write};
 use super::posegate_status;
 use core::ffi::c_char;
 use posegate::gate::{Restart, Settings, Source};
@@ -77,7 +77,7 @@ pub struct posegate_source {
     pub share_q8: u32,
     /// A `posegate_motion`.
     pub motion: u32,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u32,
     /// The largest speed along the robot's axis, m/s, in either direction. Every possible movement counts, also without a
     /// command.
@@ -220,6 +220,7 @@ impl posegate_source {
         const ALL_UNKNOWN: u32 = posegate_cross_terms::AllUnknown as u32;
         const STANDS_STILL: u32 = posegate_motion::StandsStill as u32;
         const MOVES: u32 = posegate_motion::Moves as u32;
+        unused(self.reserved)?;
         let share = u8::try_from(self.share_q8)
             .ok()
             .and_then(SplitWeight::from_q8);

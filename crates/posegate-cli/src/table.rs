@@ -356,7 +356,7 @@ fn facts(table: &Table<'_>) -> Value {
             "covered_cells": covered,
         },
         "sight": table.sight_record().map(|record| sight(&record)),
-        "parts": table.parts(),
+        "parts": table.parts().names().collect::<Vec<_>>(),
         "worst_case": {
             "m4f": worst.instructions_m4f(),
             "m0plus": worst.instructions_m0_plus(),

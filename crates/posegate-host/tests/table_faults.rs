@@ -91,7 +91,7 @@ fn another_version_has_its_own_error() {
     let mut bytes = table("dock");
     bytes[8] = 2;
     repair(&mut bytes);
-    assert_eq!(Table::parse(&bytes).err(), Some(TableError::Version));
+    assert_eq!(Table::parse(&bytes).err(), Some(TableError::TooNew));
     let mut bytes = table("dock");
     bytes[0] = b'p';
     repair(&mut bytes);
