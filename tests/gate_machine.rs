@@ -599,7 +599,7 @@ fn wrong_table_is_latched_at_start() {
         ..settings
     };
     let other_site = Settings {
-        site_digest: [7; 32],
+        task_digest: [7; 32],
         ..settings
     };
     let zeros = [0; 300];

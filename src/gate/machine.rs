@@ -107,7 +107,7 @@ type Weighed = Result<Result<(), Reason>, CorruptWord>;
 
 impl<'a> Gate<'a> {
     /// Makes a closed gate on the bytes of a table, at the controller's time `now_ms`. Runs [`self_test`] and checks
-    /// the whole table. A table that is damaged, of another task or of another site gives a gate that denies with
+    /// the whole table. A table that is damaged, of another task or with another task digest gives a gate that denies with
     /// that reason: a controller with damaged flash must still answer.
     ///
     /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
@@ -384,7 +384,7 @@ impl<'a> Gate<'a> {
         Ok(before)
     }
 
-    /// Returns `true` if the table in flash still has the mark that it had at the start: its length, site digest and
+    /// Returns `true` if the table in flash still has the mark that it had at the start: its length, task digest and
     /// checksum. Another valid table has another length, or another checksum at the same place; it has the same mark
     /// with a probability of 2^-32. [`Gate::scrub`] detects changes that leave the mark unchanged. A table that was
     /// refused at the start may change.
@@ -509,7 +509,7 @@ fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Re
     if table.task() != settings.task {
         return Err(Reason::WrongTask);
     }
-    if !table.is_of_site(&settings.site_digest) {
+    if !table.is_of_task(&settings.task_digest) {
         return Err(Reason::WrongSite);
     }
     Ok(table.within(settings.most_runs))

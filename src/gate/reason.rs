@@ -78,7 +78,7 @@ pub enum Reason {
     Holding = 26,
     /// The table is that of another task.
     WrongTask = 27,
-    /// The table was made from another site file.
+    /// The table has another task digest: it was made for another goal, set or confidence.
     WrongSite = 28,
     /// The bytes are not a table, or changed while the gate was running.
     TableDamaged = 29,
@@ -242,8 +242,8 @@ reasons! {
         "The table is valid, and that of another task than the controller expects."
         "Service: flash the table of this task.";
     WrongSite "wrong_site" Service
-        "The table is valid, and was made from another version of the site file than the controller expects."
-        "Service: build table and firmware from the same site file (`posegate table info` prints a table's digest).";
+        "The table is valid, and was made for another goal, success set or confidence of the task than the controller expects (its task digest differs)."
+        "Service: build table and firmware from the same site file (`posegate table info` prints a table's task digest).";
     TableDamaged "table_damaged" Service
         "The bytes are not a table (never written, cut short, or with a wrong checksum), or they changed while the gate was running."
         "Service: flash the table again and verify it. If it comes back, the flash is failing, or something writes to it.";

@@ -43,7 +43,7 @@
 //! | 76 | u32, u32 | facet layout: offset from the start, length; 0, 0 if there is none |
 //! | 84 | f64 | epsilon, the site's confidence (information; the radius decides) |
 //! | 92 | u32 | sight record of 140 bytes: offset from the start; 0 if there is none |
-//! | 96 | 32 bytes | SHA-256 of the site file |
+//! | 96 | 32 bytes | task digest (`SuccessSet::digest`), SHA-256 of what decides: set, goal, confidence. Opaque to readers, which only compare it; older tools wrote the SHA-256 of the site file |
 //! | 128 | 32 bytes | task name, UTF-8, zeros after it |
 //! | 160 | 16 bytes | version of the tool that made it, UTF-8, zeros after it |
 //! | 176 | | the layouts, and the sight record ([`SightRecord`] has its bytes) |
@@ -93,8 +93,8 @@ pub const MAGIC: [u8; 8] = *b"POSEGATE";
 pub const VERSION: u16 = 1;
 /// Bytes of the header.
 pub const HEADER_LENGTH: usize = 176;
-/// Offset of the site's digest in the header.
-const SITE_DIGEST_AT: usize = 96;
+/// Offset of the task's digest in the header.
+const TASK_DIGEST_AT: usize = 96;
 /// Bytes of the checksum at the end.
 pub const CRC_LENGTH: usize = 4;
 /// Largest distance of a cell from the goal on an axis, micrometres (2^27, 134 m).
@@ -340,14 +340,22 @@ impl<'a> Table<'a> {
         padded_name(self.bytes, 160, 16).unwrap_or_default()
     }
 
-    /// Returns the SHA-256 of the site file from which the table was made.
+    /// Returns the task digest: SHA-256 of the set, the goal and the confidence from which the table was made. A controller only compares it.
     #[must_use]
-    pub fn site_digest(&self) -> [u8; 32] {
+    pub fn task_digest(&self) -> [u8; 32] {
         bytes_at(self.bytes, 96).unwrap_or([0; 32])
     }
 
-    /// Returns `true` if the table was made from the site file with this SHA-256.
-    pub(crate) fn is_of_site(&self, digest: &[u8; 32]) -> bool {
+    /// Returns the table digest: SHA-256 of all bytes. It identifies a table, such as in the signature of an update; a gate does not use it.
+    #[cfg(feature = "std")]
+    #[must_use]
+    pub fn digest(&self) -> [u8; 32] {
+        use sha2::Digest;
+        sha2::Sha256::digest(self.bytes).into()
+    }
+
+    /// Returns `true` if the table was made for the task with this digest.
+    pub(crate) fn is_of_task(&self, digest: &[u8; 32]) -> bool {
         self.bytes
             .get(96..128)
             .is_some_and(|own| own == digest.as_slice())

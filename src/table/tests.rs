@@ -122,7 +122,7 @@ fn table_reads_back_written_header() {
     assert_eq!(table.epsilon(), 0.99);
     assert_eq!(table.task(), "dock");
     assert_eq!(table.tool_version(), "0.1.0");
-    assert_eq!(table.site_digest(), [7; 32]);
+    assert_eq!(table.task_digest(), [7; 32]);
     let crc = checksum(&bytes[..bytes.len() - CRC_LENGTH]);
     assert_eq!(table.crc(), crc);
     assert_eq!(table.bytes(), bytes);

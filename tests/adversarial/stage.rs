@@ -47,7 +47,6 @@ pub fn stage(rng: &mut Rng, layout: Layout) -> Stage {
             success: &success,
             spec,
             epsilon: EPSILON,
-            site_digest: DIGEST,
         };
         match build(&order, &|| ()) {
             Ok((bytes, _)) => {
@@ -73,7 +72,6 @@ impl Stage {
             task: TASK,
             success: &self.success,
             epsilon: EPSILON,
-            site_digest: DIGEST,
         };
         verify(&self.bytes, &claim, &|| ()).is_ok()
     }

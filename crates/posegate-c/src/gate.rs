@@ -244,7 +244,7 @@ pub(super) unsafe fn held<'a>(
 fn digest(settings: &Settings<'_>) -> u32 {
     let Settings {
         task,
-        site_digest,
+        task_digest,
         sources,
         maximum_age_ms,
         response_ms,
@@ -269,7 +269,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
     ];
     let of_settings = [
         task.as_bytes(),
-        site_digest,
+        task_digest,
         numbers.map(u32::to_le_bytes).as_flattened(),
     ]
     .into_iter()
@@ -332,7 +332,7 @@ unsafe fn fill(
         let task = task.get(..length).unwrap_or_default();
         (&raw mut (*held).settings).write(Settings {
             task: core::str::from_utf8(task).map_err(|_| posegate_status::Task)?,
-            site_digest: given.site_digest,
+            task_digest: given.task_digest,
             sources: sources.get(..count).unwrap_or_default(),
             maximum_age_ms: given.maximum_age_ms,
             response_ms: given.response_ms,
@@ -364,7 +364,7 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 
 /// Initialises storage for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
 ///
-/// A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
+/// A table that is damaged, of another task or with another task digest is not an error. It gives a gate that denies with
 /// that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
 /// borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
 /// word of the caller in which the gate counts its calls. Its first value may be any number. The caller must not save

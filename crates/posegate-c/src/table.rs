@@ -13,8 +13,8 @@ pub struct posegate_table_info {
     pub task: [c_char; 36],
     /// The version of the tool that made the table, zero-terminated.
     pub tool_version: [c_char; 20],
-    /// SHA-256 of the site file from which the table was made.
-    pub site_digest: [u8; 32],
+    /// The task digest: SHA-256 of the set, the goal and the confidence from which the table was made.
+    pub task_digest: [u8; 32],
     /// The squared radius of the site's confidence, unit 2^-16.
     pub radius_squared_q16: u32,
     /// The CRC-32C at the end of the table.
@@ -53,7 +53,7 @@ impl posegate_table_info {
     const NONE: Self = Self {
         task: [0; 36],
         tool_version: [0; 20],
-        site_digest: [0; 32],
+        task_digest: [0; 32],
         radius_squared_q16: 0,
         crc: 0,
         parts: 0,
@@ -93,7 +93,7 @@ pub unsafe extern "C" fn posegate_table_check(
             Ok(posegate_table_info {
                 task: text(table.task()),
                 tool_version: text(table.tool_version()),
-                site_digest: table.site_digest(),
+                task_digest: table.task_digest(),
                 radius_squared_q16: table.radius_squared().q16(),
                 crc: table.crc(),
                 parts: parts.bits(),

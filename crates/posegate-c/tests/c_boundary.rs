@@ -78,7 +78,7 @@ fn source() -> posegate_source {
 fn settings() -> posegate_settings {
     posegate_settings {
         task: name("dock"),
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: [
             source(),
             posegate_source {
@@ -151,7 +151,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
     ];
     Box::leak(Box::new(Settings {
         task: "dock",
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: Box::leak(Box::new(sources)),
         maximum_age_ms: 200,
         response_ms: 30,
@@ -792,7 +792,7 @@ fn gate_without_its_table_latches_with_reason() {
     let mut damaged = DOCK.to_vec();
     damaged[200] ^= 1;
     let mut other_site = settings();
-    other_site.site_digest[31] ^= 1;
+    other_site.task_digest[31] ^= 1;
     let cases: [(&[u8], posegate_settings, Reason); 4] = [
         (&[], settings(), Reason::TableDamaged),
         (&damaged, settings(), Reason::TableDamaged),
@@ -1776,7 +1776,7 @@ fn table_info_frames_and_checksums_equal_rust() {
             |text: &[core::ffi::c_char]| CStr::from_ptr(text.as_ptr()).to_str().unwrap().to_owned();
         assert_eq!(text(&(*info).task), "dock");
         assert_eq!(text(&(*info).tool_version), table.tool_version());
-        assert_eq!((*info).site_digest, table.site_digest());
+        assert_eq!((*info).task_digest, table.task_digest());
         assert_eq!((*info).crc, table.crc());
         assert_eq!((*info).radius_squared_q16, table.radius_squared().q16());
         assert_eq!(((*info).parts, (*info).missing_parts), (0, 0));

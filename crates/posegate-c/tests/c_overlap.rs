@@ -121,7 +121,7 @@ fn settings() -> posegate_settings {
     };
     posegate_settings {
         task: name("dock"),
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: ["map", "odom", "", ""].map(source),
         source_count: 2,
         maximum_age_ms: 200,
@@ -989,7 +989,7 @@ fn restored_gate_copy_is_refused() {
     }
     // After another start, successful or not, an old copy is refused, too.
     let mut latched = settings();
-    latched.site_digest[0] ^= 1;
+    latched.task_digest[0] ^= 1;
     let mut refused = settings();
     refused.permits_in_a_row = 0;
     for (settings, expected) in [

@@ -139,7 +139,6 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         success: &chosen.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let refused = |error| Failure::table(&arguments.site, &arguments.task, error);
     let slabs = u64::from(bake::check(&order).map_err(refused)?.slabs);
@@ -171,6 +170,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     let covered = coverage(&table, &chosen.success);
     if arguments.json {
         let mut facts = facts(&table);
+        facts["site_digest"] = json!(site.digest_text());
         facts["covered"] = json!(covered.share);
         facts["file"] = json!(file);
         facts["proven"] = of_proof(proof);
@@ -279,7 +279,6 @@ fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure
         task: name,
         success: &task(site, name)?.success,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     })
 }
 
@@ -298,7 +297,8 @@ fn of_proof(proof: Proof) -> Value {
     json!({"runs": proof.runs, "cells": proof.cells, "corners": proof.corners})
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Returns bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
@@ -322,7 +322,8 @@ fn facts(table: &Table<'_>) -> Value {
         "task": table.task(),
         "format_version": posegate::table::VERSION,
         "tool_version": table.tool_version(),
-        "site_digest": hex(&table.site_digest()),
+        "task_digest": hex(&table.task_digest()),
+        "table_digest": hex(&table.digest()),
         "crc32c": format!("{:08x}", table.crc()),
         "bytes": table.bytes().len(),
         "epsilon": table.epsilon(),
