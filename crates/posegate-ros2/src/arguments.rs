@@ -252,7 +252,10 @@ mod tests {
         };
         assert_eq!(arguments.table, PathBuf::from("dock.posegate"));
         assert_eq!(arguments.task_digest.as_deref(), Some("abc"));
-        for older in ["a.posegate --site-digest abc", "a.posegate --site-digest=abc"] {
+        for older in [
+            "a.posegate --site-digest abc",
+            "a.posegate --site-digest=abc",
+        ] {
             let Ok(Command::Run(arguments)) = parse(older) else {
                 panic!("{older}");
             };

@@ -13,7 +13,7 @@ use posegate_host::site::Site;
 use std::path::Path;
 
 /// Every parameter.
-const NAMES: [&str; 44] = [
+const NAMES: [&str; 45] = [
     "camera",
     "camera_info_reliability",
     "corner_sigma_px",
