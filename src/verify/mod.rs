@@ -9,7 +9,7 @@
 //! ```
 //! use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 //! use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
-//! use posegate::verify::{ExpectedTable, build, verify};
+//! use posegate::verify::{ExpectedTable, VerifyError, build, verify};
 //!
 //! let success = SuccessSet {
 //!     goal: PoseDeg { x: 0.0, y: 0.0, yaw_deg: 0.0 },
@@ -37,7 +37,7 @@
 //! let mut smaller = success.clone();
 //! smaller.shape = Shape::Box(BoxSet { x: [-0.07, 0.07], y: [-0.06, 0.06], yaw_deg: [-4.0, 4.0] });
 //! let claim = ExpectedTable { task: "dock", success: &smaller, epsilon: 0.99 };
-//! assert!(verify(&bytes, &claim, &|| ()).is_err());
+//! assert!(matches!(verify(&bytes, &claim, &|| ()), Err(VerifyError::Facet(_))));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -12,7 +12,6 @@ use posegate::verify::{BuildError, ExpectedTable, build, verify};
 
 const TASK: &str = "adversarial";
 const EPSILON: f64 = 0.99;
-const DIGEST: [u8; 32] = [7; 32];
 
 /// A world with its proven table.
 pub struct Stage {
