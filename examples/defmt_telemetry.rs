@@ -88,7 +88,7 @@ mod firmware {
         defmt::info!("{}", table);
         let settings = Settings {
             task: "dock",
-            site_digest: table.site_digest(),
+            task_digest: table.task_digest(),
             sources: &SOURCES,
             maximum_age_ms: 200,
             response_ms: 20,

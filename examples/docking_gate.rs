@@ -21,7 +21,7 @@ mod board;
 mod firmware {
     use crate::board::{Led, robot::Robot};
     use cortex_m_rt::{ExceptionFrame, entry, exception};
-    use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, site_digest};
+    use posegate::gate::{Gate, Interlock, Reason, Restart, Settings, Source, task_digest};
     use posegate::motion::MotionBounds;
     use posegate::report::FrameId;
     use posegate::set::{Aging, Trust};
@@ -29,11 +29,11 @@ mod firmware {
     /// Made by `posegate table build`.
     static TABLE: &[u8] = include_bytes!("tables/dock.posegate");
 
-    /// What the controller expects. The digest is that of the site file: `posegate table info` prints it.
+    /// What the controller expects. The digest is that of the task: `posegate table info` prints it.
     static SETTINGS: Settings<'static> = Settings {
         task: "dock",
-        site_digest: site_digest(
-            "edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38",
+        task_digest: task_digest(
+            "dd45d89b69c82c2f50ab8b974603f4c9f2ac254b3d9c7f82d2aa95c1b3de263c",
         )
         .expect("64 digits"),
         sources: &[Source {

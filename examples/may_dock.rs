@@ -3,7 +3,7 @@
 
 // readme: begin
 use embedded_hal::digital::OutputPin;
-use posegate::gate::{Gate, Interlock, Reason, Settings, Source, site_digest};
+use posegate::gate::{Gate, Interlock, Reason, Settings, Source, task_digest};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Report};
 use posegate::set::{Aging, Trust};
@@ -11,10 +11,10 @@ use posegate::set::{Aging, Trust};
 /// Made by `posegate table build`, kept in flash.
 static TABLE: &[u8] = include_bytes!("../examples/tables/dock.posegate");
 
-/// What the controller expects. The digest is that of the site file: `posegate table info` prints it.
+/// What the controller expects. The digest is that of the task: `posegate table info` prints it.
 static SETTINGS: Settings<'static> = Settings {
     task: "dock",
-    site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
+    task_digest: task_digest("dd45d89b69c82c2f50ab8b974603f4c9f2ac254b3d9c7f82d2aa95c1b3de263c")
         .expect("64 digits"),
     sources: &[Source {
         frame: FrameId::of("map"),

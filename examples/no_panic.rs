@@ -92,7 +92,7 @@ mod controller {
     fn gate(bytes: &[u8]) {
         let settings = black_box(Settings {
             task: "dock",
-            site_digest: [0; 32],
+            task_digest: [0; 32],
             sources: &SOURCES,
             maximum_age_ms: 2,
             response_ms: 1,

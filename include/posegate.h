@@ -19,9 +19,14 @@
 #include <stdint.h>
 
 /**
+ * Number of 64-bit words of a `posegate_clock`.
+ */
+#define POSEGATE_CLOCK_WORDS 5U
+
+/**
  * Largest number of hypotheses of one report, the report's own estimate included.
  */
-#define POSEGATE_MOST_HYPOTHESES MOST_HYPOTHESES
+#define POSEGATE_MOST_HYPOTHESES 8U
 
 /**
  * Largest number of hypotheses in addition to the report's own.
@@ -64,6 +69,16 @@
 #define POSEGATE_DENY 0U
 
 /**
+ * Number of 64-bit words of a `posegate_sequencer`.
+ */
+#define POSEGATE_SEQUENCER_WORDS 4U
+
+/**
+ * Number of pointers of a `posegate_sequencer`.
+ */
+#define POSEGATE_SEQUENCER_POINTERS 6U
+
+/**
  * Bytes of a name. A shorter name is padded with zeros, as a C initialiser does.
  */
 #define POSEGATE_NAME_LENGTH 32U
@@ -86,7 +101,7 @@
 /**
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
-#define POSEGATE_ABI_VERSION 5U
+#define POSEGATE_ABI_VERSION 6U
 
 /**
  * Number of 64-bit words of a `posegate_tracker`.
@@ -138,11 +153,11 @@ enum posegate_status
      */
     POSEGATE_STATUS_BAD_LENGTH = -4,
     /**
-     * A number that is not in its enum, or out of its range.
+     * A number that is not in its enum or out of its range, or a field `reserved` that is not 0.
      */
     POSEGATE_STATUS_BAD_VALUE = -5,
     /**
-     * The bytes are not a table: damaged, cut short, or of another format version.
+     * The bytes are not a table: damaged or cut short.
      */
     POSEGATE_STATUS_TABLE_INVALID = -6,
     /**
@@ -234,6 +249,18 @@ enum posegate_status
      */
     POSEGATE_STATUS_AGING = -27,
     /**
+     * The table is whole, and its format version is above that which this archive reads.
+     */
+    POSEGATE_STATUS_TABLE_TOO_NEW = -28,
+    /**
+     * The table has cells and no facets, and this archive is built without the part `cells`.
+     */
+    POSEGATE_STATUS_PART_MISSING = -29,
+    /**
+     * The counter of a clock stands still.
+     */
+    POSEGATE_STATUS_CLOCK_STOPPED = -30,
+    /**
      * A frame longer than any message, or not COBS.
      */
     POSEGATE_STATUS_WIRE_FRAME = -31,
@@ -249,6 +276,10 @@ enum posegate_status
      * A message names a table that does not exist.
      */
     POSEGATE_STATUS_WIRE_TABLE = -34,
+    /**
+     * The bytes are not the rules of a plan: damaged, cut short, or of another format version.
+     */
+    POSEGATE_STATUS_RULES_INVALID = -35,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -350,6 +381,39 @@ typedef uint32_t posegate_cross_terms;
 #endif // __cplusplus
 
 /**
+ * What to do next. 0 is not a value.
+ */
+enum posegate_instruction_kind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Ask the gate of the task; if it permits, look at the tag. Afterwards the estimate is the observation.
+     */
+    POSEGATE_INSTRUCTION_KIND_LOOK = 1,
+    /**
+     * Drive to a pose.
+     */
+    POSEGATE_INSTRUCTION_KIND_DRIVE = 2,
+    /**
+     * Ask the gate of the task; if it permits, do the task.
+     */
+    POSEGATE_INSTRUCTION_KIND_WORK = 3,
+    /**
+     * Do nothing.
+     */
+    POSEGATE_INSTRUCTION_KIND_INHIBIT = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_instruction_kind posegate_instruction_kind;
+#else
+typedef uint32_t posegate_instruction_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * The movement of the robot while an estimate is used, from its stamp until its permission ends. 0 is not a value.
  */
 enum posegate_motion
@@ -401,6 +465,39 @@ enum posegate_heading
 typedef enum posegate_heading posegate_heading;
 #else
 typedef uint32_t posegate_heading;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * A part of the gate, which an archive contains or not: a feature of the package `posegate-c`.
+ */
+enum posegate_part
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Decisions on cells. A table that needs them is refused without them: `POSEGATE_STATUS_PART_MISSING`.
+     */
+    POSEGATE_PART_CELLS = 1,
+    /**
+     * Facets on points that turn with the robot, heading by heading.
+     */
+    POSEGATE_PART_HEADINGS = 2,
+    /**
+     * The view of a tag.
+     */
+    POSEGATE_PART_SIGHT = 4,
+    /**
+     * Pose-sets that only several pieces of facets contain together.
+     */
+    POSEGATE_PART_UNIONS = 8,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_part posegate_part;
+#else
+typedef uint32_t posegate_part;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -522,6 +619,35 @@ typedef uint32_t posegate_state_kind;
 #endif // __cplusplus
 
 /**
+ * Why a sequencer inhibits. 0 if it does not, and if an error was returned.
+ */
+enum posegate_stop
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * The work is done.
+     */
+    POSEGATE_STOP_DONE = 1,
+    /**
+     * A task failed as often as its rule allows and the plan has no alternative, or a condition failed more than 1,000 times.
+     */
+    POSEGATE_STOP_GAVE_UP = 2,
+    /**
+     * No entry of the plan is proven for the pose-set: improve the estimate, then ask again.
+     */
+    POSEGATE_STOP_NO_ENTRY = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_stop posegate_stop;
+#else
+typedef uint32_t posegate_stop;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * Why a gate denies. Each reason has one cause and one thing to do about it.
  */
 enum posegate_reason
@@ -578,7 +704,8 @@ enum posegate_reason
      */
     POSEGATE_REASON_STALE = 12,
     /**
-     * The gate has no valid table.
+     * No longer reported, kept for the logs of older firmware: the gate has no valid table. Its parts are [`Self::TableDamaged`],
+     * [`Self::TableTooNew`] and [`Self::PartMissing`].
      */
     POSEGATE_REASON_TABLE_INVALID = 13,
     /**
@@ -638,11 +765,11 @@ enum posegate_reason
      */
     POSEGATE_REASON_WRONG_TASK = 27,
     /**
-     * The table was made from another site file.
+     * The table has another task digest: it was made for another goal, set or confidence.
      */
     POSEGATE_REASON_WRONG_SITE = 28,
     /**
-     * The table's bytes changed while the gate was running.
+     * The bytes are not a table, or changed while the gate was running.
      */
     POSEGATE_REASON_TABLE_DAMAGED = 29,
     /**
@@ -701,6 +828,18 @@ enum posegate_reason
      * The fixes contradict the errors that the source claims.
      */
     POSEGATE_REASON_MODEL_CONTRADICTED = 43,
+    /**
+     * The table has a later format version than the gate reads.
+     */
+    POSEGATE_REASON_TABLE_TOO_NEW = 44,
+    /**
+     * The table needs a part of the gate that this firmware does not contain.
+     */
+    POSEGATE_REASON_PART_MISSING = 45,
+    /**
+     * The counter of the controller's clock stands still.
+     */
+    POSEGATE_REASON_CLOCK_STOPPED = 46,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -837,6 +976,18 @@ typedef struct posegate_compact {
 } posegate_compact;
 
 /**
+ * Storage of a clock. It converts a wrapping counter of ticks to the `now_ms` of a gate, without drift, and reports a counter that stands still.
+ *
+ * `posegate_clock_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
+ */
+typedef struct posegate_clock {
+    /**
+     * Private.
+     */
+    uint64_t words[POSEGATE_CLOCK_WORDS];
+} posegate_clock;
+
+/**
  * Storage of a gate, which evaluates reports, keeps state, and decides whether the interlock may open.
  *
  * `posegate_gate_init` initialises it. Do not move it: a copy at another place is refused, and so is zeroed
@@ -897,7 +1048,7 @@ typedef struct posegate_source {
      */
     uint32_t motion;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint32_t reserved;
     /**
@@ -929,9 +1080,9 @@ typedef struct posegate_settings {
      */
     char task[POSEGATE_NAME_LENGTH];
     /**
-     * SHA-256 of the site file that the table must be made from.
+     * The task digest that the table must have: SHA-256 of the set, the goal and the confidence (`posegate table info` prints it).
      */
-    uint8_t site_digest[32];
+    uint8_t task_digest[32];
     /**
      * The sources. A report carries the index of its source.
      */
@@ -948,8 +1099,9 @@ typedef struct posegate_settings {
     /**
      * The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
      * one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of
-     * the control cycle, the longest duration of a step (about 9,000 instructions on a Cortex-M4F, 24,000 on a
-     * Cortex-M0+; with cells 31,000 and 79,000, and the bound of `posegate table info`) and the delay of the output.
+     * the control cycle, the longest duration of a step and the delay of the output. A step on the table of a box takes about 5,200
+     * instructions on a Cortex-M4F and 12,000 on a Cortex-M0+, one on another table up to the bound of `posegate table info` and, for the second
+     * evaluation, 3,700 and 10,200 with facets, 31,300 and 79,300 with cells.
      * If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
      */
     uint32_t response_ms;
@@ -1014,7 +1166,7 @@ typedef struct posegate_report {
      */
     uint32_t stamp_ms;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint32_t reserved;
 } posegate_report;
@@ -1116,7 +1268,7 @@ typedef struct posegate_evidence {
      */
     uint32_t since_fix_ms;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint32_t reserved;
 } posegate_evidence;
@@ -1171,7 +1323,7 @@ typedef struct posegate_verdict {
      */
     uint8_t has_worst_pose;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint8_t reserved;
     /**
@@ -1247,7 +1399,7 @@ typedef struct posegate_estimate {
      */
     uint32_t radius_squared_q16;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint32_t reserved;
 } posegate_estimate;
@@ -1266,6 +1418,49 @@ typedef struct posegate_monitor {
 } posegate_monitor;
 
 /**
+ * Storage of a sequencer, which executes the rules of a plan (`posegate plan --rules`). It selects the next step, and the reaction if a
+ * step fails. It permits nothing: before a look or a work task the task's own gate decides.
+ *
+ * `posegate_sequencer_init` initialises it. Do not move it: a copy is refused. Only one context at a time may call its functions.
+ */
+typedef struct posegate_sequencer {
+    /**
+     * Private.
+     */
+    uint64_t words[POSEGATE_SEQUENCER_WORDS];
+    /**
+     * Private.
+     */
+    const uint8_t *pointers[POSEGATE_SEQUENCER_POINTERS];
+} posegate_sequencer;
+
+/**
+ * The next step of a plan.
+ */
+typedef struct posegate_instruction {
+    /**
+     * A `posegate_instruction_kind`.
+     */
+    uint32_t kind;
+    /**
+     * If inhibited: a `posegate_stop`; else 0.
+     */
+    uint32_t stop;
+    /**
+     * Of a look: the tag's number. `POSEGATE_NO_TAG` if there is none, or several.
+     */
+    uint32_t tag;
+    /**
+     * Of a look or work: the task's name, zero-terminated; else empty.
+     */
+    char task[36];
+    /**
+     * Of a drive: the target, world frame; else zeros.
+     */
+    struct posegate_pose to;
+} posegate_instruction;
+
+/**
  * The header data of a table.
  */
 typedef struct posegate_table_info {
@@ -1278,9 +1473,9 @@ typedef struct posegate_table_info {
      */
     char tool_version[20];
     /**
-     * SHA-256 of the site file from which the table was made.
+     * The task digest: SHA-256 of the set, the goal and the confidence from which the table was made.
      */
-    uint8_t site_digest[32];
+    uint8_t task_digest[32];
     /**
      * The squared radius of the site's confidence, unit 2^-16.
      */
@@ -1289,6 +1484,14 @@ typedef struct posegate_table_info {
      * The CRC-32C at the end of the table.
      */
     uint32_t crc;
+    /**
+     * The parts of the gate that decide on all of this table: a sum of `posegate_part`.
+     */
+    uint32_t parts;
+    /**
+     * Those of `parts` that this archive does not contain. Without them the gate denies more.
+     */
+    uint32_t missing_parts;
 } posegate_table_info;
 
 /**
@@ -1433,7 +1636,7 @@ typedef struct posegate_message {
      */
     uint8_t is_complete;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint8_t reserved[2];
     /**
@@ -1476,7 +1679,7 @@ typedef struct posegate_request {
      */
     uint32_t radius_squared_q16;
     /**
-     * Reserved: 0.
+     * Reserved: must be 0.
      */
     uint32_t reserved;
 } posegate_request;
@@ -1552,6 +1755,38 @@ posegate_status posegate_belief_from_compact(const struct posegate_compact *mess
                                              struct posegate_belief *belief);
 
 /**
+ * Initialises a clock at 0 ms, for a counter that counts up `ticks_per_s` ticks per second, has `counter_bits` bits (from 1 to 32) and is at
+ * `count` now.
+ *
+ * After `most_still` calls of `posegate_clock_now` in a row with the count of the call before, the clock is stopped: 1 if the counter ticks at
+ * least once per control cycle, 10 for a cycle of 1 kHz on ticks of 10 ms.
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if `ticks_per_s` or `most_still` is 0, or `counter_bits` is out of its range.
+ *
+ * # Safety
+ * The pointer is null, misaligned, or valid for its type.
+ */
+posegate_status posegate_clock_init(struct posegate_clock *clock,
+                                    uint32_t ticks_per_s,
+                                    uint32_t counter_bits,
+                                    uint32_t most_still,
+                                    uint32_t count);
+
+/**
+ * Takes the present count and writes the time in milliseconds. Call it in every control cycle, at least once per wrap of the counter: two wraps
+ * between two calls are seen as one (16 bits at 32,768 Hz wrap in 2 s).
+ *
+ * Errors: `POSEGATE_STATUS_CLOCK_STOPPED` if the counter stands still. The time is then written; call `posegate_gate_fault` with
+ * `POSEGATE_REASON_CLOCK_STOPPED`, since no permit ends by its age while the clock stands still. After any other error the time is 0.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or valid for its type.
+ */
+posegate_status posegate_clock_now(struct posegate_clock *clock,
+                                   uint32_t count,
+                                   uint32_t *now_ms);
+
+/**
  * Decides known pose-sets on a built-in table. Returns `POSEGATE_STATUS_OK`, or `POSEGATE_STATUS_SELF_TEST_FAILED`
  * if a faulty core or a flipped bit in the code gives another answer. `posegate_gate_init` runs it too. A main loop
  * may call it again, and must then latch `POSEGATE_REASON_SELF_TEST_FAILED` if it fails.
@@ -1561,7 +1796,7 @@ posegate_status posegate_self_test(void);
 /**
  * Initialises storage for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
  *
- * A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
+ * A table that is damaged, of another task or with another task digest is not an error. It gives a gate that denies with
  * that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
  * borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
  * word of the caller in which the gate counts its calls. Its first value may be any number. The caller must not save
@@ -1570,6 +1805,9 @@ posegate_status posegate_self_test(void);
  *
  * Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
  * gate, and its functions deny.
+ *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
@@ -1604,6 +1842,9 @@ posegate_status posegate_gate_change_table(struct posegate_gate *gate,
  * of an unknown source does. If `step` is null or misaligned, the report is still evaluated: the gate must
  * close even if the caller gets no answer.
  *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
+ *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
  */
@@ -1618,6 +1859,9 @@ posegate_status posegate_gate_step(struct posegate_gate *gate,
  * Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each error closes
  * the gate.
  *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
+ *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
  */
@@ -1629,6 +1873,9 @@ posegate_status posegate_gate_step_on(struct posegate_gate *gate,
 /**
  * Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
  * reports stop. The time also advances if `step` is null or misaligned.
+ *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
@@ -1642,6 +1889,9 @@ posegate_status posegate_gate_tick(struct posegate_gate *gate,
  * manual action: never call it from a timer.
  *
  * Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
+ *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
@@ -1657,6 +1907,9 @@ posegate_status posegate_gate_reset(struct posegate_gate *gate,
  *
  * Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
  * `POSEGATE_REASON_MEMORY_DAMAGED`.
+ *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
@@ -1734,7 +1987,7 @@ posegate_status posegate_gate_examine_on(struct posegate_gate *gate,
  * For recordings and benches only.
  *
  * Initialises storage for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are not a table are not an
- * error: they give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`), because a controller with damaged flash must
+ * error: they give a judge that denies (`POSEGATE_REASON_TABLE_DAMAGED` and others), because a controller with damaged flash must
  * still answer. The table is borrowed: it must not change while the judge is used.
  *
  * # Safety
@@ -1853,8 +2106,54 @@ posegate_status posegate_frame_id(const char *name,
                                   uint64_t *frame);
 
 /**
+ * Initialises storage for a sequencer before the plan's first step. The rules are borrowed: they must not change while the sequencer is used.
+ *
+ * Errors: `POSEGATE_STATUS_RULES_INVALID` if the bytes are not the rules of a plan: damaged, cut short, or of another format version.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or valid for its type; `length` bytes of the rules can be read, now and as long as the sequencer is
+ * used.
+ */
+posegate_status posegate_sequencer_init(struct posegate_sequencer *sequencer,
+                                        const uint8_t *rules,
+                                        size_t length);
+
+/**
+ * Writes the next step for the current estimate. `radius_squared_q16` is the squared radius of a Gaussian set, unit 2^-16, such as that of
+ * `posegate_table_info`; a bounded set does not use it. Report the result of the step with `posegate_sequencer_succeeded` or
+ * `posegate_sequencer_failed` before the next call.
+ *
+ * Errors: `POSEGATE_STATUS_BAD_VALUE` if the estimate is not a pose-set, or the radius is out of range. The instruction is then
+ * `POSEGATE_INSTRUCTION_KIND_INHIBIT`, and the plan is where it was.
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or valid for its type.
+ */
+posegate_status posegate_sequencer_next(struct posegate_sequencer *sequencer,
+                                        const struct posegate_belief *belief,
+                                        uint32_t radius_squared_q16,
+                                        struct posegate_instruction *instruction);
+
+/**
+ * Reports that the last instruction succeeded: after a drive or a look the plan continues, after the work it ends.
+ *
+ * # Safety
+ * The pointer is null, misaligned, or valid for its type.
+ */
+posegate_status posegate_sequencer_succeeded(struct posegate_sequencer *sequencer);
+
+/**
+ * Reports that the last instruction failed: the tag was not seen, the gate did not permit, or the drive was stopped. The step is repeated as
+ * often as its rule allows; then the plan continues without the tag, or ends.
+ *
+ * # Safety
+ * The pointer is null, misaligned, or valid for its type.
+ */
+posegate_status posegate_sequencer_failed(struct posegate_sequencer *sequencer);
+
+/**
  * Writes settings whose times fit a source that reports every `period_ms`, and whose reports arrive up to `jitter_ms` after their
- * stamps: such as 500 and 100 for AMCL at 2 Hz. Task, site digest and sources are zero and must be filled in; `response_ms` is 20,
+ * stamps: such as 500 and 100 for AMCL at 2 Hz. Task, task digest and sources are zero and must be filled in; `response_ms` is 20,
  * `permits_in_a_row` 3, and the restart is automatic.
  *
  * Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
@@ -1879,7 +2178,8 @@ uint32_t posegate_abi_version(void);
 /**
  * Checks the bytes of a table and writes its header data.
  *
- * Errors: `POSEGATE_STATUS_TABLE_INVALID` if the bytes are not a table.
+ * Errors: `POSEGATE_STATUS_TABLE_INVALID`, `POSEGATE_STATUS_TABLE_TOO_NEW` or `POSEGATE_STATUS_PART_MISSING` if a gate would refuse the
+ * bytes; its reasons are then `POSEGATE_REASON_TABLE_DAMAGED`, `_TABLE_TOO_NEW` and `_PART_MISSING`.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
@@ -1905,7 +2205,8 @@ posegate_status posegate_checksum(uint32_t so_far,
 /**
  * Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
  *
- * Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
+ * Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; those of `posegate_table_check`, since the table states the
+ * confidence.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be read.
@@ -1948,6 +2249,9 @@ posegate_status posegate_tracker_fix(struct posegate_tracker *tracker,
  * Writes the report for now: the newest fix, carried to the newest odometry. For records, margins and monitors; a control cycle calls
  * `posegate_gate_step_tracked`, which takes fewer instructions.
  *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
+ *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
  */
@@ -1961,6 +2265,9 @@ posegate_status posegate_tracker_tracked(struct posegate_tracker *tracker,
  * why there is none, and `posegate_gate_inhibit` with it ends a permit at once.
  *
  * Errors: those of `posegate_gate_tick`. Without an initialised tracker, the gate closes as at a report of an unknown source.
+ *
+ * `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+ * ever (`posegate_clock`).
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.
@@ -2032,7 +2339,7 @@ posegate_status posegate_reply_encode(const struct posegate_reply *reply,
 /**
  * Encodes the frame of a body: the bytes for the line, with the closing zero.
  *
- * Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message.
+ * Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message; `POSEGATE_STATUS_BAD_VALUE` if its `reserved` is not 0.
  *
  * # Safety
  * Each pointer is null, misaligned, or valid for its type.

@@ -41,9 +41,9 @@ fn errors() -> Vec<(&'static str, Vec<Box<dyn Error>>)> {
             boxed([
                 TableError::TooShort,
                 TableError::Magic,
-                TableError::Version,
                 TableError::Length,
                 TableError::Checksum,
+                TableError::TooNew,
                 TableError::Header,
                 TableError::Grid,
                 TableError::Facets,

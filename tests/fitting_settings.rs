@@ -60,7 +60,7 @@ fn open_ms(
 fn with_source<'a>(times: Settings<'a>, table: &Table<'a>, sources: &'a [Source]) -> Settings<'a> {
     Settings {
         task: table.task(),
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources,
         ..times
     }

@@ -599,15 +599,23 @@ fn wrong_table_is_latched_at_start() {
         ..settings
     };
     let other_site = Settings {
-        site_digest: [7; 32],
+        task_digest: [7; 32],
         ..settings
     };
     let zeros = [0; 300];
+    // A flipped bit in the version is damage. Only a table with a correct checksum is of another version.
+    let mut version_2 = DOCK.to_vec();
+    version_2[8] = 2;
+    let flipped_version = version_2.clone();
+    let (content, crc) = version_2.split_last_chunk_mut().unwrap();
+    *crc = posegate::table::checksum(content).to_le_bytes();
     for (table, settings, reason) in [
-        (&flipped[..], &settings, Reason::TableInvalid),
-        (&DOCK[..DOCK.len() - 1], &settings, Reason::TableInvalid),
-        (&zeros[..], &settings, Reason::TableInvalid),
-        (&[], &settings, Reason::TableInvalid),
+        (&flipped[..], &settings, Reason::TableDamaged),
+        (&DOCK[..DOCK.len() - 1], &settings, Reason::TableDamaged),
+        (&zeros[..], &settings, Reason::TableDamaged),
+        (&[], &settings, Reason::TableDamaged),
+        (&flipped_version, &settings, Reason::TableDamaged),
+        (&version_2, &settings, Reason::TableTooNew),
         (SEE_T7, &settings, Reason::WrongTask),
         (DOCK, &other_task, Reason::WrongTask),
         (DOCK, &other_site, Reason::WrongSite),

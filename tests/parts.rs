@@ -6,9 +6,9 @@
 #[path = "../crates/posegate-testkit/src/replay.rs"]
 mod replay;
 
-use posegate::gate::Verdict;
+use posegate::gate::{Reason, Verdict};
 use posegate::recordings::Evaluator;
-use posegate::table::{Table, TableError};
+use posegate::table::{Parts, Table, TableError};
 use posegate::wire::Reply;
 use replay::{MAXIMUM_AGE_MS, Records, answer, reply};
 use std::path::Path;
@@ -98,6 +98,41 @@ fn cells_only_table_is_refused_without_cells() {
     let refused = Table::parse(&bytes).err();
     let expected = cfg!(not(feature = "cells")).then_some(TableError::NoCells);
     assert_eq!(refused, expected);
+    assert_eq!(
+        refused.map(Reason::from),
+        expected.map(|_| Reason::PartMissing)
+    );
+}
+
+/// A build names the parts that a table needs, also those that it does not contain.
+#[test]
+fn parts_of_a_table_do_not_depend_on_the_build() {
+    let needed = |path| Table::parse(&read(path)).map(|table| table.parts());
+    assert_eq!(needed(TABLES[0]), Ok(Parts::default()));
+    for (path, part) in [
+        (TABLES[1], Parts::SIGHT),
+        ("tests/data/corner.posegate", Parts::UNIONS),
+        ("tests/data/turning.posegate", Parts::HEADINGS),
+    ] {
+        let parts = needed(path).expect("a table with facets");
+        assert!(parts.contains(part), "{path}: {parts:?}");
+        assert!(!parts.contains(Parts::CELLS), "{path}: {parts:?}");
+    }
+    assert_eq!(
+        needed(TABLES[CELLS_ALONE])
+            .ok()
+            .map(|parts| parts.contains(Parts::CELLS)),
+        cfg!(feature = "cells").then_some(true)
+    );
+    assert_eq!(
+        Parts::ALL.map(|part| Parts::BUILT.contains(part)),
+        [
+            cfg!(feature = "cells"),
+            cfg!(any(feature = "headings", feature = "unions")),
+            cfg!(feature = "sight"),
+            cfg!(feature = "unions"),
+        ]
+    );
 }
 
 #[test]

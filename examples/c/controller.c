@@ -10,13 +10,13 @@
  */
 #include "board.h"
 #include "posegate.h"
-#include "site_digest.h"
+#include "task_digest.h"
 #include "tables.h"
 
-/* Constants in flash. The digest is that of the site file that this firmware was built for. */
+/* Constants in flash. The digest is that of the task that this firmware was built for. */
 static const posegate_settings SETTINGS = {
     .task = "dock",
-    .site_digest = SITE_DIGEST,
+    .task_digest = TASK_DIGEST,
     .sources =
         {
             /* The robot's speed is the same for every source: 0.1 m/s ahead, 0.1 rad/s. */

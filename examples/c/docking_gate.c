@@ -10,13 +10,13 @@
 #include "board.h"
 #include "posegate.h"
 #include "robot.h"
-#include "site_digest.h"
+#include "task_digest.h"
 #include "tables.h"
 
-/* Constants in flash. The digest is that of the site file: `posegate table info` prints it. */
+/* Constants in flash. The digest is that of the task: `posegate table info` prints it. */
 static const posegate_settings SETTINGS = {
     .task = "dock",
-    .site_digest = SITE_DIGEST,
+    .task_digest = TASK_DIGEST,
     .sources = {{.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
                  .motion = POSEGATE_MOTION_STANDS_STILL}},
     .source_count = 1U,

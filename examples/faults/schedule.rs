@@ -1,7 +1,7 @@
 //! Reports of an approach: good reports that earn a permit, and after each permit a different fault. The table is a dock's box, or the one that
 //! `POSEGATE_FAULT_TABLE` names when the firmware is built: `footprint` or `union`.
 
-use posegate::gate::{Restart, Settings, Source, site_digest};
+use posegate::gate::{Restart, Settings, Source, task_digest};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::{Aging, Trust, Uncertainty};
@@ -10,7 +10,7 @@ use posegate::set::{Aging, Trust, Uncertainty};
 struct Approach {
     table: &'static [u8],
     task: &'static str,
-    site_digest: [u8; 32],
+    task_digest: [u8; 32],
     /// A good report: metres, metres, radians. Places differ by some of `wander` metres.
     good: [f64; 3],
     wander: f64,
@@ -35,7 +35,7 @@ const APPROACH: Approach = match option_env!("POSEGATE_FAULT_TABLE") {
 const DOCK: Approach = Approach {
     table: include_bytes!("../tables/dock.posegate"),
     task: "dock",
-    site_digest: site_digest("edc7c40e3d20c10c9dbb252fe3b277bce6fdb9a2c440385d8355b24a3ed0be38")
+    task_digest: task_digest("dd45d89b69c82c2f50ab8b974603f4c9f2ac254b3d9c7f82d2aa95c1b3de263c")
         .expect("64 digits"),
     good: [0.0, 0.0, 0.01],
     wander: 0.001,
@@ -65,7 +65,8 @@ const DOCK: Approach = Approach {
 const FOOTPRINT: Approach = Approach {
     table: include_bytes!("../../tests/data/turning.posegate"),
     task: "turning",
-    site_digest: [0; 32],
+    task_digest: task_digest("9db442beb0dc74389d3ac916422702ac5aaf82202ea294f107ec9bd8281bee94")
+        .expect("64 digits"),
     good: [812.7062, -1203.4759, 2.7389],
     wander: 0.001,
     small: [0.002_922, 0.002_078, 0.01, 0.000_268],
@@ -94,7 +95,8 @@ const FOOTPRINT: Approach = Approach {
 const UNION: Approach = Approach {
     table: include_bytes!("../../tests/data/corner.posegate"),
     task: "corner",
-    site_digest: [0; 32],
+    task_digest: task_digest("bba9dd8354d2d19303bafddd8f35dce1396ab8d03d7943bb18cccf139bc442de")
+        .expect("64 digits"),
     good: [-1250.6480, 939.9763, -1.281_07],
     wander: 0.000_2,
     small: [0.000_706, 0.002_294, 2.7e-5, 0.001_213],
@@ -132,7 +134,7 @@ static SOURCES: [Source; 2] = [Source {
 /// permit before its estimate is too old.
 pub static SETTINGS: Settings<'static> = Settings {
     task: APPROACH.task,
-    site_digest: APPROACH.site_digest,
+    task_digest: APPROACH.task_digest,
     sources: &SOURCES,
     maximum_age_ms: 79,
     response_ms: PERIOD_MS,

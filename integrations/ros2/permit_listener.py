@@ -30,7 +30,7 @@ class PermitWatch:
     """The rules of the permit, without ROS. Times are integers, nanoseconds."""
 
     def __init__(self, task, site=None):
-        """`task` and `site` (the digest of the site file) are those that a permit must name."""
+        """`task` and `site` (the task digest of the table) are those that a permit must name."""
         self.task = task
         self.site = site
         self.run = None
@@ -138,7 +138,7 @@ def main():
 
     parser = argparse.ArgumentParser(description="Follow the permit of posegate-node")
     parser.add_argument("--task", required=True, help="the task that may run")
-    parser.add_argument("--site", help="digest of the site file that the permit must name")
+    parser.add_argument("--site", help="task digest that the permit must name (`posegate table info` prints it)")
     parser.add_argument("--topic", default="/posegate/permission")
     given = parser.parse_args(rclpy.utilities.remove_ros_args(sys.argv)[1:])
     rclpy.init(args=sys.argv)

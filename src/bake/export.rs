@@ -13,7 +13,7 @@ pub enum Language {
 }
 
 /// Returns the source of a table: a header with its origin, the gate settings that belong to it (task, and
-/// digest of the site file), and the bytes. Sources and times are set by the controller.
+/// the task's digest), and the bytes. Sources and times are set by the controller.
 #[must_use]
 pub fn source(table: &Table<'_>, language: Language) -> String {
     let name: String = table
@@ -36,7 +36,7 @@ pub fn source(table: &Table<'_>, language: Language) -> String {
 /// Returns the table's origin, one line per fact.
 fn facts(table: &Table<'_>) -> [String; 6] {
     let digest: String = table
-        .site_digest()
+        .task_digest()
         .iter()
         .map(|b| format!("{b:02x}"))
         .collect();
@@ -51,14 +51,14 @@ fn facts(table: &Table<'_>) -> [String; 6] {
             table.task().escape_default(),
             table.epsilon()
         ),
-        format!("Site file SHA-256 {digest}"),
+        format!("Task digest {digest}"),
         format!("{} bytes, CRC-32C {:08x}", table.bytes().len(), table.crc()),
         format!(
             "One decision: at most {} instructions on a Cortex-M4F, {} on a Cortex-M0+.",
             worst.instructions_m4f(),
             worst.instructions_m0_plus()
         ),
-        match table.parts().as_slice() {
+        match table.parts().names().collect::<Vec<_>>().as_slice() {
             [] => "It needs none of the crate's optional features.".to_owned(),
             parts => format!("It needs the crate's features {}.", parts.join(", ")),
         },
@@ -106,17 +106,17 @@ fn in_c(table: &Table<'_>, name: &str) -> String {
     let upper = name.to_uppercase();
     let guard = format!("POSEGATE_TABLE_{upper}_H");
     let task = c_characters(table.task());
-    let digest = rows(&table.site_digest(), " \\\n");
+    let digest = rows(&table.task_digest(), " \\\n");
     let (length, rows) = (bytes.len(), rows(bytes, "\n"));
     format!(
         "/*\n{comment} */\n#ifndef {guard}\n#define {guard}\n\n#include <stdint.h>\n\n\
-         /* `site_digest` of the posegate_settings that belong to this table. */\n\
-         #define POSEGATE_TABLE_{upper}_SITE_DIGEST {{ \\\n{digest}    }}\n\n\
+         /* `task_digest` of the posegate_settings that belong to this table. */\n\
+         #define POSEGATE_TABLE_{upper}_TASK_DIGEST {{ \\\n{digest}    }}\n\n\
          /* The settings that belong to this table, for a designated initialiser (C99, C++20):\n \
          *     static const posegate_settings SETTINGS = {{POSEGATE_TABLE_{upper}_SETTINGS, .sources = ...}};\n \
          * Sources and times are the controller's own. */\n\
          #define POSEGATE_TABLE_{upper}_SETTINGS \\\n    \
-         .task = \"{task}\", .site_digest = POSEGATE_TABLE_{upper}_SITE_DIGEST\n\n\
+         .task = \"{task}\", .task_digest = POSEGATE_TABLE_{upper}_TASK_DIGEST\n\n\
          #define POSEGATE_TABLE_{upper}_LENGTH {length}u\n\n\
          static const uint8_t posegate_table_{name}[{length}] = {{\n{rows}}};\n\n#endif\n",
     )
@@ -130,14 +130,14 @@ fn in_rust(table: &Table<'_>, name: &str) -> String {
         .collect();
     let upper = name.to_uppercase();
     let task = table.task().escape_default();
-    let digest = rows(&table.site_digest(), "\n");
+    let digest = rows(&table.task_digest(), "\n");
     let (length, rows) = (bytes.len(), rows(bytes, "\n"));
     format!(
         "{comment}\n\
          /// `Settings::task` of a gate on this table.\n\
          pub const TASK_{upper}: &str = \"{task}\";\n\n\
-         /// `Settings::site_digest` of a gate on this table.\n\
-         #[rustfmt::skip]\npub const SITE_DIGEST_{upper}: [u8; 32] = [\n{digest}];\n\n\
+         /// `Settings::task_digest` of a gate on this table.\n\
+         #[rustfmt::skip]\npub const TASK_DIGEST_{upper}: [u8; 32] = [\n{digest}];\n\n\
          /// The success set of the task `{task}`.\n\
          #[rustfmt::skip]\npub static TABLE_{upper}: [u8; {length}] = [\n{rows}];\n",
     )
@@ -163,14 +163,14 @@ mod tests {
     fn export_contains_table_bytes_and_settings() {
         let table = Table::parse(DOCK).expect("a table");
         let c = source(&table, Language::C);
-        assert_eq!(numbers(&c, "_SITE_DIGEST {"), table.site_digest(), "{c}");
+        assert_eq!(numbers(&c, "_TASK_DIGEST {"), table.task_digest(), "{c}");
         assert_eq!(numbers(&c, "posegate_table_dock["), Vec::<u8>::new());
         assert_eq!(numbers(&c, "] = {"), DOCK);
-        assert!(c.contains(".task = \"dock\", .site_digest = POSEGATE_TABLE_DOCK_SITE_DIGEST"));
+        assert!(c.contains(".task = \"dock\", .task_digest = POSEGATE_TABLE_DOCK_TASK_DIGEST"));
         let rust = source(&table, Language::Rust);
         assert_eq!(
-            numbers(&rust, "SITE_DIGEST_DOCK: [u8; 32] = ["),
-            table.site_digest()
+            numbers(&rust, "TASK_DIGEST_DOCK: [u8; 32] = ["),
+            table.task_digest()
         );
         assert!(rust.contains("TASK_DOCK: &str = \"dock\";"));
     }

@@ -25,7 +25,6 @@
 //!         layout: Layout::Facets,
 //!     },
 //!     epsilon: 0.99,
-//!     site_digest: [0; 32],
 //! };
 //! let bytes = table(&order, &|| ())?;
 //! let read = Table::parse(&bytes)?;
@@ -71,8 +70,6 @@ pub struct BakeInput<'a> {
     pub spec: TableSpec,
     /// The site's confidence, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the site file.
-    pub site_digest: [u8; 32],
 }
 
 /// Why no table is made.

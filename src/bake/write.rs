@@ -83,7 +83,7 @@ fn write(
     bytes.extend(order.epsilon.to_le_bytes());
     let sight_at = if sight.is_empty() { 0 } else { at };
     bytes.extend((sight_at as u32).to_le_bytes());
-    bytes.extend(order.site_digest);
+    bytes.extend(order.success.digest(order.epsilon));
     bytes.extend(padded::<32>(order.task)?);
     bytes.extend(padded::<16>(env!("CARGO_PKG_VERSION"))?);
     debug_assert_eq!(bytes.len(), HEADER_LENGTH);

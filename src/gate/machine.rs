@@ -107,8 +107,11 @@ type Weighed = Result<Result<(), Reason>, CorruptWord>;
 
 impl<'a> Gate<'a> {
     /// Makes a closed gate on the bytes of a table, at the controller's time `now_ms`. Runs [`self_test`] and checks
-    /// the whole table. A table that is damaged, of another task or of another site gives a gate that denies with
+    /// the whole table. A table that is damaged, of another task or with another task digest gives a gate that denies with
     /// that reason: a controller with damaged flash must still answer.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     ///
     /// # Errors
     /// [`InvalidParameter`] if a parameter would switch a check off, or keep the gate closed for ever.
@@ -185,6 +188,9 @@ impl<'a> Gate<'a> {
     /// a manual action: never call it from a timer. If the settings have changed, latches [`Reason::MemoryDamaged`]:
     /// restart the controller.
     ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
+    ///
     /// # Errors
     /// [`InvalidParameter`] if the settings are invalid; the gate stays as it was.
     pub fn reset(&mut self, now_ms: u32) -> Result<(), InvalidParameter> {
@@ -199,7 +205,7 @@ impl<'a> Gate<'a> {
     /// Returns the table, or the reason why the gate has none.
     ///
     /// # Errors
-    /// [`Reason::TableInvalid`], [`Reason::WrongTask`], [`Reason::WrongSite`] or [`Reason::SelfTestFailed`].
+    /// [`Reason::TableDamaged`], [`Reason::TableTooNew`], [`Reason::PartMissing`], [`Reason::WrongTask`], [`Reason::WrongSite`] or [`Reason::SelfTestFailed`].
     pub const fn table(&self) -> Result<&Table<'a>, Reason> {
         match &self.table {
             Ok(table) => Ok(table),
@@ -208,11 +214,17 @@ impl<'a> Gate<'a> {
     }
 
     /// Evaluates a report at the controller's time `now_ms`.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     pub fn step(&mut self, now_ms: u32, report: &Report) -> Step {
         self.step_on(now_ms, &Evidence::of(report))
     }
 
     /// As [`Gate::step`], for a report with several hypotheses, or a report that was carried along odometry.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     #[inline(always)]
     pub fn step_on(&mut self, now_ms: u32, evidence: &Evidence<'_>) -> Step {
         let verdict = self
@@ -226,6 +238,9 @@ impl<'a> Gate<'a> {
 
     /// Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
     /// reports stop.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     pub fn tick(&mut self, now_ms: u32) -> Step {
         if self.process_tick(now_ms).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -236,6 +251,9 @@ impl<'a> Gate<'a> {
     /// Ends a permit, and the permits counted so far, at the controller's time `now_ms`. Call it if something else
     /// has closed the interlock for a cause that may pass, such as a watchdog or a mode of the machine. The gate then
     /// qualifies again as after a denial. With [`super::Restart::OnReset`] an open gate waits for the reset.
+    ///
+    /// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+    /// ever ([`super::Clock`]).
     pub fn inhibit(&mut self, now_ms: u32, reason: Reason) -> Step {
         if self.interrupt(now_ms, reason).is_err() {
             self.fault(Reason::MemoryDamaged);
@@ -401,7 +419,7 @@ impl<'a> Gate<'a> {
         Ok(before)
     }
 
-    /// Returns `true` if the table in flash still has the mark that it had at the start: its length, site digest and
+    /// Returns `true` if the table in flash still has the mark that it had at the start: its length, task digest and
     /// checksum. Another valid table has another length, or another checksum at the same place; it has the same mark
     /// with a probability of 2^-32. [`Gate::scrub`] detects changes that leave the mark unchanged. A table that was
     /// refused at the start may change.
@@ -522,11 +540,11 @@ impl<'a> Gate<'a> {
 
 /// Parses a table, checks that it is for the task and site that the controller expects, and limits its walks.
 fn checked<'a>(bytes: &'a [u8], settings: &Settings<'_>) -> Result<Table<'a>, Reason> {
-    let table = Table::parse(bytes).map_err(|_| Reason::TableInvalid)?;
+    let table = Table::parse(bytes)?;
     if table.task() != settings.task {
         return Err(Reason::WrongTask);
     }
-    if !table.is_of_site(&settings.site_digest) {
+    if !table.is_of_task(&settings.task_digest) {
         return Err(Reason::WrongSite);
     }
     Ok(table.within(settings.most_runs))

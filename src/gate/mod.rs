@@ -12,10 +12,10 @@
 //! use posegate::set::{Aging, Trust};
 //!
 //! static SOURCES: [Source; 1] = [Source { frame: FrameId::of("map"), trust: Trust::FULL, aging: Aging::NONE, motion: MotionBounds::STANDS_STILL }];
-//! # fn example(table: &'static [u8], site_digest: [u8; 32], now_ms: u32, report: &Report) -> bool {
+//! # fn example(table: &'static [u8], task_digest: [u8; 32], now_ms: u32, report: &Report) -> bool {
 //! let settings = Settings {
 //!     task: "dock",
-//!     site_digest,
+//!     task_digest,
 //!     sources: &SOURCES,
 //!     maximum_age_ms: 200,
 //!     response_ms: 20,
@@ -35,8 +35,9 @@
 use crate::contain::{self, Cause, Decision, Margin};
 use crate::pose::Pose;
 use crate::set::{InputError, PoseSet};
-use crate::table::Table;
+use crate::table::{Table, TableError};
 
+pub use self::clock::Clock;
 pub use self::evidence::{Evidence, MOST_HYPOTHESES};
 pub use self::interlock::{Interlock, InterlockFault, NoPin};
 pub use self::machine::{Gate, Step};
@@ -46,9 +47,10 @@ pub use self::reason::{Advice, Reason};
 pub use self::scrub::{Scrub, ScrubProgress};
 pub use self::seal::Seal;
 pub use self::self_test::self_test;
-pub use self::settings::{InvalidParameter, Restart, Settings, Source, site_digest};
+pub use self::settings::{InvalidParameter, Restart, Settings, Source, task_digest};
 pub use self::state::State;
 
+mod clock;
 mod doubled;
 mod elsewhere;
 mod evidence;
@@ -130,6 +132,16 @@ impl From<Cause> for Reason {
             Cause::OffTable => Self::OutsideTable,
             Cause::NotContained => Self::NotContained,
             Cause::TooCostly => Self::TooCostly,
+        }
+    }
+}
+
+impl From<TableError> for Reason {
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::TooNew => Self::TableTooNew,
+            TableError::NoCells => Self::PartMissing,
+            _ => Self::TableDamaged,
         }
     }
 }

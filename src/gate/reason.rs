@@ -47,7 +47,8 @@ pub enum Reason {
     BoundInvalid = 11,
     /// The estimate is too old, or from the future.
     Stale = 12,
-    /// The gate has no valid table.
+    /// No longer reported, kept for the logs of older firmware: the gate has no valid table. Its parts are [`Self::TableDamaged`],
+    /// [`Self::TableTooNew`] and [`Self::PartMissing`].
     TableInvalid = 13,
     /// The source says itself that it does not know its covariance.
     CovarianceUnknown = 14,
@@ -77,9 +78,9 @@ pub enum Reason {
     Holding = 26,
     /// The table is that of another task.
     WrongTask = 27,
-    /// The table was made from another site file.
+    /// The table has another task digest: it was made for another goal, set or confidence.
     WrongSite = 28,
-    /// The table's bytes changed while the gate was running.
+    /// The bytes are not a table, or changed while the gate was running.
     TableDamaged = 29,
     /// The program's own bytes are not those that were sealed.
     CodeDamaged = 30,
@@ -109,6 +110,12 @@ pub enum Reason {
     TooCostly = 42,
     /// The fixes contradict the errors that the source claims.
     ModelContradicted = 43,
+    /// The table has a later format version than the gate reads.
+    TableTooNew = 44,
+    /// The table needs a part of the gate that this firmware does not contain.
+    PartMissing = 45,
+    /// The counter of the controller's clock stands still.
+    ClockStopped = 46,
 }
 
 /// Makes [`Reason::ALL`] and the texts of each reason: its variant, its name in `snake_case`, what to do in a form for programs, a sentence that says what
@@ -117,7 +124,7 @@ macro_rules! reasons {
     ($($variant:ident $name:literal $advice:ident $meaning:literal $action:literal;)+) => {
         impl Reason {
             /// Every reason, in the order of the codes.
-            pub const ALL: [Self; 43] = [$(Self::$variant),+];
+            pub const ALL: [Self; 46] = [$(Self::$variant),+];
 
             /// Returns the name in `snake_case`, the same in every output.
             #[must_use]
@@ -190,8 +197,8 @@ reasons! {
         "The estimate is older than the maximum age, or its stamp lies in the future."
         "Wait for a fresh estimate. If it stays stale, service: the link, or the clocks of robot and controller disagree.";
     TableInvalid "table_invalid" Service
-        "The gate has no table: its bytes are damaged, cut short, or of another format version."
-        "Service: flash a table that was made by this tool version for this task, and verify it.";
+        "The gate has no table (firmware from before table_damaged, table_too_new and part_missing)."
+        "Service: flash a table that was made by the same version as the firmware, and verify it.";
     CovarianceUnknown "covariance_unknown" Service
         "The source says that it does not know its covariance (NaN in the first entry)."
         "Service: configure the source to tell its covariance, or give its reports a bounded set.";
@@ -235,11 +242,11 @@ reasons! {
         "The table is valid, and that of another task than the controller expects."
         "Service: flash the table of this task.";
     WrongSite "wrong_site" Service
-        "The table is valid, and was made from another version of the site file than the controller expects."
-        "Service: build table and firmware from the same site file (`posegate table info` prints a table's digest).";
+        "The table is valid, and was made for another goal, success set or confidence of the task than the controller expects (its task digest differs)."
+        "Service: build table and firmware from the same site file (`posegate table info` prints a table's task digest).";
     TableDamaged "table_damaged" Service
-        "The table's bytes changed while the gate was running: the scrub found another checksum."
-        "Service: the flash is failing; flash the table again and verify it.";
+        "The bytes are not a table (never written, cut short, or with a wrong checksum), or they changed while the gate was running."
+        "Service: flash the table again and verify it. If it comes back, the flash is failing, or something writes to it.";
     CodeDamaged "code_damaged" Service
         "The program's own bytes are not those that were sealed, or it was never sealed: the check at start or the scrub found another checksum."
         "Service: if the firmware was never sealed, seal it (`posegate seal`); else the flash is failing: flash the firmware again.";
@@ -282,6 +289,15 @@ reasons! {
     ModelContradicted "model_contradicted" Service
         "The fixes differ from the predictions by more than the errors that the source claims: a camera was knocked, a tag has moved, or the claimed covariance is too small."
         "Service: check camera, tags and calibration, and learn the error model again; then reset the monitor.";
+    TableTooNew "table_too_new" Service
+        "The table is whole, and its format version is above that which this firmware reads."
+        "Service: update the firmware first, or build the table with the version of Posegate that the firmware was built with.";
+    PartMissing "part_missing" Service
+        "The table needs a part of the gate that this firmware was built without: it has cells, and no facets."
+        "Service: build the firmware with the feature `cells`, or the table with `layout = \"facets\"` (`posegate table info` names a table's parts).";
+    ClockStopped "clock_stopped" Service
+        "The counter of the controller's clock stands still, so no permit would end by its age."
+        "Service: start the timer, and check that it runs in every mode of the controller (sleep, debug halt); then reset the gate.";
 }
 
 impl Reason {
@@ -343,6 +359,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(44), None);
+        assert_eq!(Reason::from_code(47), None);
     }
 }

@@ -89,8 +89,8 @@ pub enum Restart {
 pub struct Settings<'a> {
     /// The task that the table must be for.
     pub task: &'a str,
-    /// SHA-256 of the site file that the table must be made from (`posegate table info` prints it).
-    pub site_digest: [u8; 32],
+    /// The task digest that the table must have: SHA-256 of the set, the goal and the confidence (`posegate table info` prints it).
+    pub task_digest: [u8; 32],
     /// The sources. A report carries the index of its source.
     pub sources: &'a [Source],
     /// The oldest estimate that may keep the interlock open, in milliseconds: from 1 to 2^31 - 1. The age counts up
@@ -98,9 +98,9 @@ pub struct Settings<'a> {
     pub maximum_age_ms: u32,
     /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
     /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of the
-    /// control cycle, the longest duration of a step and the delay of the output. A step takes two evaluations and
-    /// the conversion of the estimate: about 9,000 instructions (Cortex-M4F; Cortex-M0+: 24,000) with facets, and and with cells
-    /// 31,000 (79,000) and the bound of `posegate table info` ([`Settings::most_runs`] lowers it). If a later cycle finds the gate open, the gate
+    /// control cycle, the longest duration of a step and the delay of the output. A step on the table of a box takes about 5,200 instructions
+    /// (Cortex-M4F; Cortex-M0+: 12,000), one on another table up to the bound of `posegate table info` ([`Settings::most_runs`] lowers that of cells) and,
+    /// for the second evaluation, 3,700 (10,200) with facets and 31,300 (79,300) with cells. If a later cycle finds the gate open, the gate
     /// closes ([`super::Reason::CycleLate`]).
     pub response_ms: u32,
     /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. A step does not use it. Settings with
@@ -214,7 +214,7 @@ impl Settings<'static> {
     /// let source = Source::new("map", 1.0, CrossTerms::Filled, MotionBounds::STANDS_STILL)?;
     /// let settings = Settings {
     ///     task: "dock",
-    ///     site_digest: [0; 32],
+    ///     task_digest: [0; 32],
     ///     sources: &[source],
     ///     ..Settings::for_source(500, 100)
     /// };
@@ -242,7 +242,7 @@ impl Settings<'static> {
         let apart = period_ms.saturating_add(jitter_ms);
         Self {
             task: "",
-            site_digest: [0; 32],
+            task_digest: [0; 32],
             sources: &[],
             maximum_age_ms: apart.saturating_add(2 * RESPONSE_MS),
             response_ms: RESPONSE_MS,
@@ -378,10 +378,10 @@ const fn mixed(sum: u32, word: u32) -> u32 {
     sum.rotate_left(7).wrapping_add(word)
 }
 
-/// Parses the digest of a site file from its 64 hexadecimal digits, as `posegate table info` prints it. Returns
+/// Parses a task digest from its 64 hexadecimal digits, as `posegate table info` prints it. Returns
 /// `None` for any other text.
 #[must_use]
-pub const fn site_digest(digits: &str) -> Option<[u8; 32]> {
+pub const fn task_digest(digits: &str) -> Option<[u8; 32]> {
     let (pairs, rest) = digits.as_bytes().as_chunks::<2>();
     let mut pairs = pairs;
     let mut digest = [0; 32];
@@ -418,7 +418,7 @@ pub(super) const fn is_time(ms: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::site_digest;
+    use super::task_digest;
 
     #[test]
     fn digests_are_read_from_their_digits() {
@@ -426,19 +426,19 @@ mod tests {
             .map(|v| format!("{:02x}", v.wrapping_mul(9)))
             .collect();
         let expected = core::array::from_fn(|k| (k as u8).wrapping_mul(9));
-        assert_eq!(site_digest(&digits), Some(expected));
-        assert_eq!(site_digest(&digits.to_uppercase()), Some(expected));
+        assert_eq!(task_digest(&digits), Some(expected));
+        assert_eq!(task_digest(&digits.to_uppercase()), Some(expected));
         for bad in [
             "",
             &digits[1..],
             &format!("{digits}0"),
             &format!("{digits}00"),
         ] {
-            assert_eq!(site_digest(bad), None, "{bad}");
+            assert_eq!(task_digest(bad), None, "{bad}");
         }
         for bad in ['g', '/', ':', '@', '`', ' '] {
             assert_eq!(
-                site_digest(&digits.replacen('0', &format!("{bad}"), 1)),
+                task_digest(&digits.replacen('0', &format!("{bad}"), 1)),
                 None
             );
         }

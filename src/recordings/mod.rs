@@ -39,7 +39,7 @@ const RADIUS_099: u32 = 743_498;
 
 impl<'a> Evaluator<'a> {
     /// Returns an evaluator on the bytes of a table. Invalid bytes give an evaluator that denies
-    /// ([`Reason::TableInvalid`]), because a controller with damaged flash must still answer.
+    /// ([`Reason::TableDamaged`], [`Reason::TableTooNew`] or [`Reason::PartMissing`]), because a controller with damaged flash must still answer.
     ///
     /// # Errors
     /// [`InvalidParameter::MaximumAge`] unless `1 <= maximum_age_ms < 2^31`.
@@ -114,7 +114,7 @@ impl<'a> Evaluator<'a> {
         stamp_ms: u32,
         set: Result<PoseSet, InputError>,
     ) -> Result<(&Table<'a>, PoseSet), Reason> {
-        let table = self.table.as_ref().map_err(|_| Reason::TableInvalid)?;
+        let table = self.table().map_err(Reason::from)?;
         if !self.is_fresh(now_ms, stamp_ms) {
             return Err(Reason::Stale);
         }
@@ -179,10 +179,10 @@ mod tests {
     #[test]
     fn an_evaluator_without_a_table_denies() {
         let evaluator = Evaluator::new(&[0; 4096], 100).unwrap();
-        assert_eq!(evaluator.permits(0, 0, SET), Err(Reason::TableInvalid));
+        assert_eq!(evaluator.permits(0, 0, SET), Err(Reason::TableDamaged));
         assert_eq!(
             evaluator.evaluate(0, 0, SET),
-            Verdict::deny(Reason::TableInvalid)
+            Verdict::deny(Reason::TableDamaged)
         );
     }
 

@@ -21,16 +21,16 @@ pub struct Camera {
     /// Row of the optical axis, pixels.
     pub cy: f64,
     /// A lens, or a window smaller than the image; `None` for the whole image of a pinhole.
-    sighted: Option<Sighted>,
+    pub(super) sighted: Option<Sighted>,
 }
 
 /// The proven lens and window of a camera, and the numbers for which they were proven.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Sighted {
-    lens: Lens,
-    window: Window,
-    edge: Edge,
-    numbers: [f64; 6],
+pub(super) struct Sighted {
+    pub(super) lens: Lens,
+    pub(super) window: Window,
+    pub(super) edge: Edge,
+    pub(super) numbers: [f64; 6],
 }
 
 /// The exact limits of an image through a lens.

@@ -7,9 +7,9 @@ use super::footprint::{Footprint, PolygonError, farthest};
 /// allowed. A footprint of one point is that point itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clear {
-    footprint: Vec<[f64; 2]>,
-    obstacle: Vec<[f64; 2]>,
-    gap: f64,
+    pub(super) footprint: Vec<[f64; 2]>,
+    pub(super) obstacle: Vec<[f64; 2]>,
+    pub(super) gap: f64,
 }
 
 impl Clear {

@@ -9,9 +9,9 @@ use super::scalar::{NONE, Scalar, Selection, selected};
 /// Both polygons are convex and counter-clockwise; only [`Footprint::new`] creates this type.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Footprint {
-    footprint: Vec<[f64; 2]>,
-    region: Vec<[f64; 2]>,
-    inset: f64,
+    pub(super) footprint: Vec<[f64; 2]>,
+    pub(super) region: Vec<[f64; 2]>,
+    pub(super) inset: f64,
 }
 
 impl Footprint {

@@ -59,6 +59,7 @@ mod apart;
 mod boxed;
 mod camera;
 mod clear;
+mod digest;
 mod error_model;
 mod evaluator;
 mod family;

@@ -43,11 +43,14 @@
 //! | 76 | u32, u32 | facet layout: offset from the start, length; 0, 0 if there is none |
 //! | 84 | f64 | epsilon, the site's confidence (information; the radius decides) |
 //! | 92 | u32 | sight record of 140 bytes: offset from the start; 0 if there is none |
-//! | 96 | 32 bytes | SHA-256 of the site file |
+//! | 96 | 32 bytes | task digest (`SuccessSet::digest`), SHA-256 of what decides: set, goal, confidence. Opaque to readers, which only compare it; older tools wrote the SHA-256 of the site file |
 //! | 128 | 32 bytes | task name, UTF-8, zeros after it |
 //! | 160 | 16 bytes | version of the tool that made it, UTF-8, zeros after it |
 //! | 176 | | the layouts, and the sight record ([`SightRecord`] has its bytes) |
 //! | end - 4 | u32 | CRC-32C (Castagnoli) of all bytes before |
+//!
+//! Magic, format version, total length and CRC have their places in every format version: a table of a later version is recognised, and
+//! a flipped bit in the version is not mistaken for one.
 //!
 //! For the width w, slab k of n covers the closed yaw interval `[lo + floor(k w / n), lo + floor((k + 1) w / n)]`. The
 //! edges are integers, and neighbours share one. Cell i along x covers the closed interval
@@ -63,6 +66,7 @@ pub use self::facets::{
     Axes, Facet, Facets, Frame, LARGEST_UNIT, LONGEST_LEVER, NORMAL_BITS, Piece,
 };
 pub use self::grid::{Grid, Run, Runs, Slab};
+pub use self::parts::Parts;
 pub use self::sight::{
     EDGE_BITS, FARTHEST_CAMERA_UM, LARGEST_HEIGHT_UM, LARGEST_SIGHT_UM, PIXEL_BITS, SIGHT_LENGTH,
     SightRecord,
@@ -89,8 +93,8 @@ pub const MAGIC: [u8; 8] = *b"POSEGATE";
 pub const VERSION: u16 = 1;
 /// Bytes of the header.
 pub const HEADER_LENGTH: usize = 176;
-/// Offset of the site's digest in the header.
-const SITE_DIGEST_AT: usize = 96;
+/// Offset of the task's digest in the header.
+const TASK_DIGEST_AT: usize = 96;
 /// Bytes of the checksum at the end.
 pub const CRC_LENGTH: usize = 4;
 /// Largest distance of a cell from the goal on an axis, micrometres (2^27, 134 m).
@@ -105,12 +109,12 @@ pub enum TableError {
     TooShort,
     /// The first bytes are not `POSEGATE`.
     Magic,
-    /// A format version that this crate does not read.
-    Version,
     /// The length in the header differs from the number of bytes given.
     Length,
     /// The bytes are damaged.
     Checksum,
+    /// The checksum is correct, and the format version is above [`VERSION`].
+    TooNew,
     /// A header field is out of its range.
     Header,
     /// The grid's directory or runs are out of range.
@@ -126,9 +130,9 @@ pub enum TableError {
 messages!(TableError {
     TooShort => "the bytes are fewer than a table's header and checksum",
     Magic => "the first bytes are not `POSEGATE`",
-    Version => "the format version is not one that this program reads",
     Length => "the length in the header differs from the number of bytes",
     Checksum => "the checksum is wrong: the bytes are damaged",
+    TooNew => "the format version is above that of this program: a newer program made the table",
     Header => "a header field is out of its range",
     Grid => "the grid's directory or its runs are out of range",
     Facets => "the facets' counts do not add up, or an arc, a frame or a facet is out of range",
@@ -184,15 +188,15 @@ impl<'a> Table<'a> {
         if bytes_at::<8>(bytes, 0) != Some(MAGIC) {
             return Err(TableError::Magic);
         }
-        if u16_at(bytes, 8) != Some(VERSION) {
-            return Err(TableError::Version);
-        }
         let length = u32_at(bytes, 12).and_then(|v| usize::try_from(v).ok());
         if length != Some(bytes.len()) {
             return Err(TableError::Length);
         }
         if u32_at(bytes, end) != Some(checksum(content)) {
             return Err(TableError::Checksum);
+        }
+        if !u16_at(bytes, 8).is_some_and(|version| version <= VERSION) {
+            return Err(TableError::TooNew);
         }
         Self::of_checked(bytes, content).ok_or(TableError::Header)?
     }
@@ -201,7 +205,10 @@ impl<'a> Table<'a> {
     fn of_checked(bytes: &'a [u8], content: &'a [u8]) -> Option<Result<Self, TableError>> {
         let header_length = u16_at(content, 10)?;
         let reserved = u16_at(content, 62)?;
-        if usize::from(header_length) != HEADER_LENGTH || reserved != 0 {
+        if u16_at(content, 8)? != VERSION
+            || usize::from(header_length) != HEADER_LENGTH
+            || reserved != 0
+        {
             return None;
         }
         let goal = GoalFrame {
@@ -333,14 +340,22 @@ impl<'a> Table<'a> {
         padded_name(self.bytes, 160, 16).unwrap_or_default()
     }
 
-    /// Returns the SHA-256 of the site file from which the table was made.
+    /// Returns the task digest: SHA-256 of the set, the goal and the confidence from which the table was made. A controller only compares it.
     #[must_use]
-    pub fn site_digest(&self) -> [u8; 32] {
+    pub fn task_digest(&self) -> [u8; 32] {
         bytes_at(self.bytes, 96).unwrap_or([0; 32])
     }
 
-    /// Returns `true` if the table was made from the site file with this SHA-256.
-    pub(crate) fn is_of_site(&self, digest: &[u8; 32]) -> bool {
+    /// Returns the table digest: SHA-256 of all bytes. It identifies a table, such as in the signature of an update; a gate does not use it.
+    #[cfg(feature = "std")]
+    #[must_use]
+    pub fn digest(&self) -> [u8; 32] {
+        use sha2::Digest;
+        sha2::Sha256::digest(self.bytes).into()
+    }
+
+    /// Returns `true` if the table was made for the task with this digest.
+    pub(crate) fn is_of_task(&self, digest: &[u8; 32]) -> bool {
         self.bytes
             .get(96..128)
             .is_some_and(|own| own == digest.as_slice())
@@ -365,23 +380,23 @@ impl<'a> Table<'a> {
         self.facets.as_ref()
     }
 
-    /// Returns the features of this crate that firmware needs to decide on all of this table, in alphabetical order. Without such a feature
-    /// the gate denies more, or refuses the table.
-    #[cfg(feature = "std")]
+    /// Returns the parts of the gate that firmware needs to decide on all of this table, also those that this build does not contain. Without such a
+    /// part the gate denies more; without cells it refuses a table that needs them ([`TableError::NoCells`]).
     #[must_use]
-    pub fn parts(&self) -> Vec<&'static str> {
+    pub fn parts(&self) -> Parts {
         let facets = self.facets();
-        let needed = [
-            ("cells", self.grid().is_some()),
-            ("headings", facets.is_some_and(|layout| layout.lever() != 0)),
-            ("sight", self.sight.is_some()),
-            (
-                "unions",
+        let has_sight = u32_at(self.bytes, 92).is_some_and(|offset| offset != 0);
+        Parts::default()
+            .with(Parts::CELLS, facets.is_none())
+            .with(
+                Parts::HEADINGS,
+                facets.is_some_and(|layout| layout.lever() != 0),
+            )
+            .with(Parts::SIGHT, has_sight)
+            .with(
+                Parts::UNIONS,
                 facets.is_some_and(|layout| layout.pieces().nth(1).is_some()),
-            ),
-        ];
-        let names = needed.into_iter().filter(|(_, is_needed)| *is_needed);
-        names.map(|(name, _)| name).collect()
+            )
     }
 
     /// Returns the grid layout, if the table has cells and no facets, and this build has the feature `cells`.

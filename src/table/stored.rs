@@ -1,6 +1,6 @@
 //! Numbers of a table that are read again from flash, past what a compiler or a register has kept.
 
-use super::SITE_DIGEST_AT;
+use super::TASK_DIGEST_AT;
 use super::bytes::u32_at;
 use crate::set::RadiusSquared;
 
@@ -19,14 +19,14 @@ pub(crate) fn stored_radius_squared(bytes: &[u8]) -> Option<RadiusSquared> {
 }
 
 /// Returns a mark of the bytes of a table, read from memory at each call: the stated length, the first four bytes of
-/// the site digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of
+/// the task digest and the checksum, combined by exclusive or. A change of one of them changes the mark; changes of
 /// several cancel with a probability of 2^-32. Returns 0 for bytes without a header.
 #[cfg_attr(small_code, inline(never))]
 #[cfg_attr(not(small_code), inline)]
 pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let bytes = core::hint::black_box(bytes);
     let Some((header, crc)) = bytes
-        .first_chunk::<{ SITE_DIGEST_AT + 4 }>()
+        .first_chunk::<{ TASK_DIGEST_AT + 4 }>()
         .zip(bytes.last_chunk::<4>())
     else {
         return 0;
@@ -34,7 +34,7 @@ pub(crate) fn stored_mark(bytes: &[u8]) -> u32 {
     let [.., s0, s1, s2, s3] = *header;
     let [_, _, _, _, _, _, _, _, _, _, _, _, l0, l1, l2, l3, ..] = *header;
     let [c0, c1, c2, c3] = *crc;
-    let [site, length, crc] =
+    let [task, length, crc] =
         [[s0, s1, s2, s3], [l0, l1, l2, l3], [c0, c1, c2, c3]].map(u32::from_le_bytes);
-    site ^ length ^ crc
+    task ^ length ^ crc
 }

@@ -228,7 +228,6 @@ mod tests {
                 layout,
             },
             epsilon: 0.99,
-            site_digest: [0; 32],
         };
         table(&order, &|| ()).unwrap()
     }

@@ -9,7 +9,7 @@
 //! ```
 //! use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 //! use posegate::shape::{BoxSet, PoseDeg, Shape, SuccessSet};
-//! use posegate::verify::{ExpectedTable, build, verify};
+//! use posegate::verify::{ExpectedTable, VerifyError, build, verify};
 //!
 //! let success = SuccessSet {
 //!     goal: PoseDeg { x: 0.0, y: 0.0, yaw_deg: 0.0 },
@@ -28,7 +28,6 @@
 //!         layout: Layout::Facets,
 //!     },
 //!     epsilon: 0.99,
-//!     site_digest: [0; 32],
 //! };
 //! // Baked and proven: only such bytes belong into flash.
 //! let (bytes, proof) = build(&order, &|| ())?;
@@ -37,8 +36,8 @@
 //! // The same bytes do not prove a smaller set.
 //! let mut smaller = success.clone();
 //! smaller.shape = Shape::Box(BoxSet { x: [-0.07, 0.07], y: [-0.06, 0.06], yaw_deg: [-4.0, 4.0] });
-//! let claim = ExpectedTable { task: "dock", success: &smaller, epsilon: 0.99, site_digest: [0; 32] };
-//! assert!(verify(&bytes, &claim, &|| ()).is_err());
+//! let claim = ExpectedTable { task: "dock", success: &smaller, epsilon: 0.99 };
+//! assert!(matches!(verify(&bytes, &claim, &|| ()), Err(VerifyError::Facet(_))));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -72,8 +71,6 @@ pub struct ExpectedTable<'a> {
     pub success: &'a SuccessSet,
     /// The site's confidence, in (0, 1).
     pub epsilon: f64,
-    /// SHA-256 of the site file.
-    pub site_digest: [u8; 32],
 }
 
 /// A table that has been proven.
@@ -161,13 +158,19 @@ fn verify_but(
     header(&table, claim)?;
     sight::sight(table.sight_record(), claim.success)?;
     let proof = runs(&table, claim.success, progress).map_err(VerifyError::Cell)?;
-    let Some(layout) = table.facets() else {
-        return Ok(proof);
+    let corners = match (table.facets(), known) {
+        (None, _) => 0,
+        (_, Some(known)) if known.bytes == bytes => known.corners,
+        (Some(layout), _) => {
+            facets::facets(layout, claim.success, progress).map_err(VerifyError::Facet)?
+        }
     };
-    let corners = match known {
-        Some(known) if known.bytes == bytes => known.corners,
-        _ => facets::facets(layout, claim.success, progress).map_err(VerifyError::Facet)?,
-    };
+    // Last, because the place where a table leaves the set says more than the digest of another set.
+    let (found, expected) = (table.task_digest(), claim.success.digest(claim.epsilon));
+    if found != expected {
+        let hex = |digest: [u8; 32]| digest.iter().map(|b| format!("{b:02x}")).collect();
+        return Err(differs("task digest", hex(found), hex(expected)));
+    }
     Ok(Proof { corners, ..proof })
 }
 
@@ -214,7 +217,6 @@ pub fn build(
         task: order.task,
         success: order.success,
         epsilon: order.epsilon,
-        site_digest: order.site_digest,
     };
     if order.spec.layout == Layout::Grid {
         let bytes = bake::grid(order, progress)?;
@@ -417,25 +419,19 @@ fn first_unproven(prover: &Prover, cells: &Cells, slab: u16, row: u16, run: Run)
     }
 }
 
-/// Compares the header's fields with the site's.
+const fn differs(field: &'static str, found: String, expected: String) -> VerifyError {
+    VerifyError::Header {
+        field,
+        found,
+        expected,
+    }
+}
+
+/// Compares the header's fields with the site's, except the digest.
 fn header(table: &Table<'_>, claim: &ExpectedTable<'_>) -> Result<(), VerifyError> {
-    let differs = |field, found: String, expected: String| {
-        Err(VerifyError::Header {
-            field,
-            found,
-            expected,
-        })
-    };
+    let differs = |field, found, expected| Err(differs(field, found, expected));
     if table.task() != claim.task {
         return differs("task", table.task().into(), claim.task.into());
-    }
-    if table.site_digest() != claim.site_digest {
-        let hex = |digest: [u8; 32]| digest.iter().map(|b| format!("{b:02x}")).collect();
-        return differs(
-            "site digest",
-            hex(table.site_digest()),
-            hex(claim.site_digest),
-        );
     }
     let radius = core_radius(claim.epsilon).map_or(0, |r| r.q16());
     if table.radius_squared().q16() != radius

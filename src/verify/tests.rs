@@ -31,7 +31,6 @@ fn order(success: &SuccessSet, yaw_deg: [f64; 2], layout: Layout) -> BakeInput<'
             layout,
         },
         epsilon: 0.99,
-        site_digest: [0; 32],
     }
 }
 
@@ -166,7 +165,6 @@ fn table_with_both_layouts_is_refused() {
         task: "over-180",
         success: &success,
         epsilon: 0.95,
-        site_digest: [0; 32],
     };
     assert_eq!(verify(bytes, &claim, &|| ()), Err(VerifyError::BothLayouts));
 }

@@ -12,7 +12,6 @@ use posegate::verify::{BuildError, ExpectedTable, build, verify};
 
 const TASK: &str = "adversarial";
 const EPSILON: f64 = 0.99;
-const DIGEST: [u8; 32] = [7; 32];
 
 /// A world with its proven table.
 pub struct Stage {
@@ -47,7 +46,6 @@ pub fn stage(rng: &mut Rng, layout: Layout) -> Stage {
             success: &success,
             spec,
             epsilon: EPSILON,
-            site_digest: DIGEST,
         };
         match build(&order, &|| ()) {
             Ok((bytes, _)) => {
@@ -73,7 +71,6 @@ impl Stage {
             task: TASK,
             success: &self.success,
             epsilon: EPSILON,
-            site_digest: DIGEST,
         };
         verify(&self.bytes, &claim, &|| ()).is_ok()
     }

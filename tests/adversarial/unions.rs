@@ -115,7 +115,6 @@ fn table(goal: Pose, is_notch: bool) -> Vec<u8> {
             layout: Layout::Facets,
         },
         epsilon: 0.99,
-        site_digest: [7; 32],
     };
     build(&order, &|| ()).unwrap().0
 }

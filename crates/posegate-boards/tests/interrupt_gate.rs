@@ -38,13 +38,13 @@ fn host_settings_equal_firmware_settings() {
     let path =
         Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/interrupt_gate.rs");
     let source = std::fs::read_to_string(path).unwrap();
-    let (_, digest) = source.split_once("site_digest: [").unwrap();
+    let (_, digest) = source.split_once("task_digest: [").unwrap();
     let (digest, _) = digest.split_once(']').unwrap();
     let digest: Vec<u8> = digest
         .split(',')
         .filter_map(|byte| u8::from_str_radix(byte.trim().strip_prefix("0x")?, 16).ok())
         .collect();
-    assert_eq!(digest, Table::parse(DOCK).unwrap().site_digest());
+    assert_eq!(digest, Table::parse(DOCK).unwrap().task_digest());
     for setting in [
         format!("maximum_age_ms: {MAXIMUM_AGE_MS},"),
         format!("permit_hold_ms: {PERMIT_HOLD_MS},"),

@@ -1,6 +1,6 @@
 //! A report with its other hypotheses, and with the bounded slip of its odometry.
 
-use super::memory::{Plain, read};
+use super::memory::{Plain, read, unused};
 use super::{posegate_belief, posegate_report, posegate_status, posegate_verdict};
 use posegate::gate::{Evidence, MOST_HYPOTHESES};
 use posegate::report::{Heading, PoseEstimate, Report};
@@ -8,7 +8,7 @@ use posegate::set::Growth;
 use posegate::task::Risk;
 
 /// Largest number of hypotheses of one report, the report's own estimate included.
-pub const POSEGATE_MOST_HYPOTHESES: usize = MOST_HYPOTHESES;
+pub const POSEGATE_MOST_HYPOTHESES: usize = 8;
 /// Largest number of hypotheses in addition to the report's own.
 pub const POSEGATE_OTHERS: usize = 7;
 
@@ -32,7 +32,7 @@ pub struct posegate_evidence {
     /// The time from the source's last fix until the stamp, milliseconds, rounded up, at least 1; 0 if it is not known. It chooses the
     /// factor of `posegate_source.ages`; without it the source's own inflation applies.
     pub since_fix_ms: u32,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u32,
 }
 
@@ -48,7 +48,8 @@ pub struct posegate_examined {
     pub reserved: u32,
 }
 
-const _: () = assert!(POSEGATE_OTHERS + 1 == MOST_HYPOTHESES);
+const _: () =
+    assert!(POSEGATE_MOST_HYPOTHESES == MOST_HYPOTHESES && POSEGATE_OTHERS + 1 == MOST_HYPOTHESES);
 
 // SAFETY: numbers.
 unsafe impl Plain for posegate_evidence {}
@@ -111,6 +112,7 @@ impl Read {
         unsafe {
             super::memory::place(evidence.cast_mut())?;
             let report = read(&raw const (*evidence).report)?.report()?;
+            unused(read(&raw const (*evidence).reserved)?)?;
             let count = read(&raw const (*evidence).other_count)?;
             let count = usize::try_from(count).unwrap_or(usize::MAX);
             if count > POSEGATE_OTHERS {

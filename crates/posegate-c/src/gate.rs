@@ -244,7 +244,7 @@ pub(super) unsafe fn held<'a>(
 fn digest(settings: &Settings<'_>) -> u32 {
     let Settings {
         task,
-        site_digest,
+        task_digest,
         sources,
         maximum_age_ms,
         response_ms,
@@ -269,7 +269,7 @@ fn digest(settings: &Settings<'_>) -> u32 {
     ];
     let of_settings = [
         task.as_bytes(),
-        site_digest,
+        task_digest,
         numbers.map(u32::to_le_bytes).as_flattened(),
     ]
     .into_iter()
@@ -333,7 +333,7 @@ unsafe fn fill(
         let task = task.get(..length).unwrap_or_default();
         (&raw mut (*held).settings).write(Settings {
             task: core::str::from_utf8(task).map_err(|_| posegate_status::Task)?,
-            site_digest: given.site_digest,
+            task_digest: given.task_digest,
             sources: sources.get(..count).unwrap_or_default(),
             maximum_age_ms: given.maximum_age_ms,
             response_ms: given.response_ms,
@@ -366,7 +366,7 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 
 /// Initialises storage for a gate on the bytes of a table, closed, at the controller's time `now_ms`.
 ///
-/// A table that is damaged, of another task or of another site is not an error. It gives a gate that denies with
+/// A table that is damaged, of another task or with another task digest is not an error. It gives a gate that denies with
 /// that reason, because a controller with damaged flash must still answer. The settings are copied. The table is
 /// borrowed: it must not change while the gate is used, as with constants in flash. `counter` is borrowed too: a
 /// word of the caller in which the gate counts its calls. Its first value may be any number. The caller must not save
@@ -375,6 +375,9 @@ pub extern "C" fn posegate_self_test() -> posegate_status {
 ///
 /// Errors: the first setting that would switch a check off, or keep the gate closed for ever. The storage then holds no
 /// gate, and its functions deny.
+///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
@@ -455,6 +458,9 @@ pub unsafe extern "C" fn posegate_gate_change_table(
 /// of an unknown source does. If `step` is null or misaligned, the report is still evaluated: the gate must
 /// close even if the caller gets no answer.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -487,6 +493,9 @@ pub unsafe extern "C" fn posegate_gate_step(
 /// Errors: as for `posegate_gate_step`; `POSEGATE_STATUS_BAD_LENGTH` if there are more hypotheses than `POSEGATE_OTHERS`. Each error closes
 /// the gate.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -515,6 +524,9 @@ pub unsafe extern "C" fn posegate_gate_step_on(
 /// Advances the time without a report. Call it in every control cycle without a report, so that a permit ends if
 /// reports stop. The time also advances if `step` is null or misaligned.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -538,6 +550,9 @@ pub unsafe extern "C" fn posegate_gate_tick(
 /// manual action: never call it from a timer.
 ///
 /// Errors: `POSEGATE_STATUS_MEMORY_DAMAGED` if the copy of the settings has changed.
+///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
@@ -565,6 +580,9 @@ pub unsafe extern "C" fn posegate_gate_reset(
 ///
 /// Errors: `POSEGATE_STATUS_BAD_VALUE` if `reason` is not a `posegate_reason`; the gate then latches
 /// `POSEGATE_REASON_MEMORY_DAMAGED`.
+///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.

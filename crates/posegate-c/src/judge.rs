@@ -1,6 +1,8 @@
 //! For recordings and benches only: evaluates single estimates, each on its own, as [`Evaluator`] does.
 
-use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
+use super::memory::{
+    Plain, Storage, bytes, close, disjoint, open, read, separate, take, unused, write,
+};
 use super::{posegate_belief, posegate_status, posegate_verdict};
 use posegate::contain::Margin;
 use posegate::gate::Verdict;
@@ -45,7 +47,7 @@ pub struct posegate_estimate {
     pub now_ms: u32,
     /// The squared radius of a Gaussian set, unit 2^-16: at least that of the table, or 0 for that of the table.
     pub radius_squared_q16: u32,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u32,
 }
 
@@ -90,7 +92,7 @@ pub(super) fn pose_set(
 /// For recordings and benches only.
 ///
 /// Initialises storage for a table and a maximum age (from 1 to 2^31 - 1 ms). Bytes that are not a table are not an
-/// error: they give a judge that denies (`POSEGATE_REASON_TABLE_INVALID`), because a controller with damaged flash must
+/// error: they give a judge that denies (`POSEGATE_REASON_TABLE_DAMAGED` and others), because a controller with damaged flash must
 /// still answer. The table is borrowed: it must not change while the judge is used.
 ///
 /// # Safety
@@ -134,6 +136,7 @@ unsafe fn judged(
         apart?;
         let judge = self::judge(judge)?;
         let estimate = estimate?;
+        unused(estimate.reserved)?;
         let radius = match estimate.radius_squared_q16 {
             0 => judge.radius_squared(),
             raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,

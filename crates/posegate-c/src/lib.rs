@@ -6,7 +6,7 @@
 //! (`crates/posegate-peers/tests/c_header.rs`), so there is one list of reasons.
 //!
 //! - **Memory** belongs to the caller: there is no allocation and no global state. Objects that are more than plain
-//!   numbers (a gate, a judge, a tracker, a receiver) live in storage that C declares and an `init` function initialises. Storage
+//!   numbers (a gate, a judge, a tracker, a sequencer, a receiver) live in storage that C declares and an `init` function initialises. Storage
 //!   that is zeroed, overwritten or moved is refused.
 //! - **Errors** never permit: after an error every output is a denial. Null and misaligned pointers, numbers outside of
 //!   an enum and impossible lengths are errors. Enums are passed as integers.
@@ -54,6 +54,8 @@ extern crate std;
 // A page in a browser evaluates single estimates and drives nothing: it has no gate.
 pub use self::belief::*;
 #[cfg(not(target_arch = "wasm32"))]
+pub use self::clock::*;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::evidence::*;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::gate::*;
@@ -64,6 +66,8 @@ pub use self::permission::*;
 pub use self::reason::*;
 pub use self::report::*;
 #[cfg(not(target_arch = "wasm32"))]
+pub use self::sequencer::*;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::settings::*;
 pub use self::status::*;
 pub use self::table::*;
@@ -72,6 +76,8 @@ pub use self::tracker::*;
 pub use self::wire::*;
 
 mod belief;
+#[cfg(not(target_arch = "wasm32"))]
+mod clock;
 #[cfg(not(target_arch = "wasm32"))]
 mod evidence;
 #[cfg(not(target_arch = "wasm32"))]
@@ -85,6 +91,8 @@ mod panic;
 mod permission;
 mod reason;
 mod report;
+#[cfg(not(target_arch = "wasm32"))]
+mod sequencer;
 #[cfg(not(target_arch = "wasm32"))]
 mod settings;
 mod status;

@@ -159,6 +159,15 @@ pub(super) unsafe fn write<T: Plain>(to: *mut T, value: T) -> Done {
     Ok(())
 }
 
+/// Refuses a field `reserved` that is not zero, so that it can get a meaning later.
+pub(super) const fn unused(reserved: u32) -> Done {
+    if reserved == 0 {
+        Ok(())
+    } else {
+        Err(posegate_status::BadValue)
+    }
+}
+
 /// Refuses a pointer that cannot be written to, before a function does anything that it could not report to
 /// the caller.
 pub(super) fn place<T>(to: *mut T) -> Done {

@@ -3,6 +3,7 @@
 use super::memory::{Plain, read};
 use posegate::contain::Margin;
 use posegate::gate::{DENY, Permission, Verdict};
+use posegate::pose::Pose;
 
 /// The verdict byte of a permit. No other byte permits.
 pub const POSEGATE_PERMIT: u8 = 0xa5;
@@ -70,7 +71,7 @@ pub struct posegate_verdict {
     pub has_margin: u8,
     /// 1 if `worst_pose` is valid, else 0.
     pub has_worst_pose: u8,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u8,
     /// A `posegate_reason`; 0 with a permit, and if an error was returned.
     pub reason: u32,
@@ -86,6 +87,22 @@ unsafe impl Plain for posegate_permission {}
 // SAFETY: integers.
 unsafe impl Plain for posegate_verdict {}
 
+impl posegate_pose {
+    pub(super) const ORIGIN: Self = Self {
+        x_um: 0,
+        y_um: 0,
+        yaw_turn_q32: 0,
+    };
+
+    pub(super) const fn of(pose: Pose) -> Self {
+        Self {
+            x_um: pose.x_um,
+            y_um: pose.y_um,
+            yaw_turn_q32: pose.yaw.0,
+        }
+    }
+}
+
 impl posegate_verdict {
     pub(super) const DENIED: Self = Self {
         verdict: POSEGATE_DENY,
@@ -94,11 +111,7 @@ impl posegate_verdict {
         reserved: 0,
         reason: 0,
         margin_q16: 0,
-        worst_pose: posegate_pose {
-            x_um: 0,
-            y_um: 0,
-            yaw_turn_q32: 0,
-        },
+        worst_pose: posegate_pose::ORIGIN,
     };
 
     pub(super) fn of(verdict: Verdict) -> Self {
@@ -118,11 +131,7 @@ impl posegate_verdict {
             reserved: 0,
             reason: u32::from(reason),
             margin_q16: margin.map_or(0, Margin::q16),
-            worst_pose: posegate_pose {
-                x_um: pose.x_um,
-                y_um: pose.y_um,
-                yaw_turn_q32: pose.yaw.0,
-            },
+            worst_pose: posegate_pose::of(pose),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Reports of sources, and the frames of their numbers.
 
-use super::memory::{Plain, answer, bytes};
+use super::memory::{Plain, answer, bytes, unused};
 use super::{posegate_belief, posegate_status};
 use core::ffi::c_char;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
@@ -19,7 +19,7 @@ pub struct posegate_report {
     pub sequence: u32,
     /// The time of the estimate, milliseconds of the controller's wrapping clock.
     pub stamp_ms: u32,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u32,
 }
 
@@ -28,6 +28,7 @@ unsafe impl Plain for posegate_report {}
 
 impl posegate_report {
     pub(super) fn report(&self) -> Result<Report, posegate_status> {
+        unused(self.reserved)?;
         Ok(Report {
             // A gate has fewer than 255 sources, so a larger number is not a source.
             source: u8::try_from(self.source).unwrap_or(u8::MAX),

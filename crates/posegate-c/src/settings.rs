@@ -1,6 +1,6 @@
 //! The settings of a gate: a constant in flash.
 
-use super::memory::{Plain, write};
+use super::memory::{Plain, unused, write};
 use super::posegate_status;
 use core::ffi::c_char;
 use posegate::gate::{Restart, Settings, Source};
@@ -77,7 +77,7 @@ pub struct posegate_source {
     pub share_q8: u32,
     /// A `posegate_motion`.
     pub motion: u32,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u32,
     /// The largest speed along the robot's axis, m/s, in either direction. Every possible movement counts, also without a
     /// command.
@@ -97,8 +97,8 @@ pub struct posegate_source {
 pub struct posegate_settings {
     /// The task that the table must be for.
     pub task: [c_char; POSEGATE_NAME_LENGTH],
-    /// SHA-256 of the site file that the table must be made from.
-    pub site_digest: [u8; 32],
+    /// The task digest that the table must have: SHA-256 of the set, the goal and the confidence (`posegate table info` prints it).
+    pub task_digest: [u8; 32],
     /// The sources. A report carries the index of its source.
     pub sources: [posegate_source; POSEGATE_MOST_SOURCES],
     /// The number of sources: at least 1.
@@ -108,8 +108,9 @@ pub struct posegate_settings {
     pub maximum_age_ms: u32,
     /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
     /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of
-    /// the control cycle, the longest duration of a step (about 9,000 instructions on a Cortex-M4F, 24,000 on a
-    /// Cortex-M0+; with cells 31,000 and 79,000, and the bound of `posegate table info`) and the delay of the output.
+    /// the control cycle, the longest duration of a step and the delay of the output. A step on the table of a box takes about 5,200
+    /// instructions on a Cortex-M4F and 12,000 on a Cortex-M0+, one on another table up to the bound of `posegate table info` and, for the second
+    /// evaluation, 3,700 and 10,200 with facets, 31,300 and 79,300 with cells.
     /// If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
     pub response_ms: u32,
     /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. Settings with which reports at this
@@ -140,7 +141,7 @@ unsafe impl Plain for posegate_settings {}
 impl posegate_settings {
     const NONE: Self = Self {
         task: [0; POSEGATE_NAME_LENGTH],
-        site_digest: [0; 32],
+        task_digest: [0; 32],
         sources: [posegate_source {
             frame: [0; POSEGATE_NAME_LENGTH],
             inflation: 0.0,
@@ -170,7 +171,7 @@ impl posegate_settings {
 }
 
 /// Writes settings whose times fit a source that reports every `period_ms`, and whose reports arrive up to `jitter_ms` after their
-/// stamps: such as 500 and 100 for AMCL at 2 Hz. Task, site digest and sources are zero and must be filled in; `response_ms` is 20,
+/// stamps: such as 500 and 100 for AMCL at 2 Hz. Task, task digest and sources are zero and must be filled in; `response_ms` is 20,
 /// `permits_in_a_row` 3, and the restart is automatic.
 ///
 /// Two reports arrive at most `period_ms + jitter_ms` apart: this is `report_period_ms` and `inhibit_hold_ms`. `permit_hold_ms` is one
@@ -220,6 +221,7 @@ impl posegate_source {
         const ALL_UNKNOWN: u32 = posegate_cross_terms::AllUnknown as u32;
         const STANDS_STILL: u32 = posegate_motion::StandsStill as u32;
         const MOVES: u32 = posegate_motion::Moves as u32;
+        unused(self.reserved)?;
         let share = u8::try_from(self.share_q8)
             .ok()
             .and_then(SplitWeight::from_q8);

@@ -1,10 +1,11 @@
 //! The status that every function returns.
 
 use posegate::gate::InvalidParameter;
+use posegate::table::TableError;
 use posegate::wire::WireError;
 
 /// Version of this interface. It changes if a struct or the meaning of a function changes.
-pub const POSEGATE_ABI_VERSION: u32 = 5;
+pub const POSEGATE_ABI_VERSION: u32 = 6;
 
 /// The result of a function: 0, or the reason why it did nothing. After an error every output is a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,9 +22,9 @@ pub enum posegate_status {
     NotInitialised = -3,
     /// A length that is impossible in memory, or less than the function needs.
     BadLength = -4,
-    /// A number that is not in its enum, or out of its range.
+    /// A number that is not in its enum or out of its range, or a field `reserved` that is not 0.
     BadValue = -5,
-    /// The bytes are not a table: damaged, cut short, or of another format version.
+    /// The bytes are not a table: damaged or cut short.
     TableInvalid = -6,
     /// The controller computes wrong answers on the built-in table.
     SelfTestFailed = -7,
@@ -71,6 +72,12 @@ pub enum posegate_status {
     /// The `ages` of a source do not rise by 64 ms, are below 64 ms or above 4194 s; or their factors fall, are not from 1 to 1023, or are,
     /// rounded up to 2^-6, larger than the source's own inflation; or a used entry follows an unused one.
     Aging = -27,
+    /// The table is whole, and its format version is above that which this archive reads.
+    TableTooNew = -28,
+    /// The table has cells and no facets, and this archive is built without the part `cells`.
+    PartMissing = -29,
+    /// The counter of a clock stands still.
+    ClockStopped = -30,
     /// A frame longer than any message, or not COBS.
     WireFrame = -31,
     /// The checksum of a frame is wrong.
@@ -79,6 +86,8 @@ pub enum posegate_status {
     WireContent = -33,
     /// A message names a table that does not exist.
     WireTable = -34,
+    /// The bytes are not the rules of a plan: damaged, cut short, or of another format version.
+    RulesInvalid = -35,
 }
 
 /// The result of a function within this crate.
@@ -90,6 +99,16 @@ impl posegate_status {
         match outcome() {
             Ok(()) => Self::Ok,
             Err(status) => status,
+        }
+    }
+}
+
+impl From<TableError> for posegate_status {
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::TooNew => Self::TableTooNew,
+            TableError::NoCells => Self::PartMissing,
+            _ => Self::TableInvalid,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::memory::{Plain, answer, bytes};
 use super::posegate_status;
 use core::ffi::c_char;
-use posegate::table::{self, Table};
+use posegate::table::{self, Parts, Table};
 
 /// The header data of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,13 +13,38 @@ pub struct posegate_table_info {
     pub task: [c_char; 36],
     /// The version of the tool that made the table, zero-terminated.
     pub tool_version: [c_char; 20],
-    /// SHA-256 of the site file from which the table was made.
-    pub site_digest: [u8; 32],
+    /// The task digest: SHA-256 of the set, the goal and the confidence from which the table was made.
+    pub task_digest: [u8; 32],
     /// The squared radius of the site's confidence, unit 2^-16.
     pub radius_squared_q16: u32,
     /// The CRC-32C at the end of the table.
     pub crc: u32,
+    /// The parts of the gate that decide on all of this table: a sum of `posegate_part`.
+    pub parts: u32,
+    /// Those of `parts` that this archive does not contain. Without them the gate denies more.
+    pub missing_parts: u32,
 }
+
+/// A part of the gate, which an archive contains or not: a feature of the package `posegate-c`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum posegate_part {
+    /// Decisions on cells. A table that needs them is refused without them: `POSEGATE_STATUS_PART_MISSING`.
+    Cells = 1,
+    /// Facets on points that turn with the robot, heading by heading.
+    Headings = 2,
+    /// The view of a tag.
+    Sight = 4,
+    /// Pose-sets that only several pieces of facets contain together.
+    Unions = 8,
+}
+
+const _: () = assert!(
+    posegate_part::Cells as u32 == Parts::CELLS.bits()
+        && posegate_part::Headings as u32 == Parts::HEADINGS.bits()
+        && posegate_part::Sight as u32 == Parts::SIGHT.bits()
+        && posegate_part::Unions as u32 == Parts::UNIONS.bits()
+);
 
 // SAFETY: integers.
 unsafe impl Plain for posegate_table_info {}
@@ -28,14 +53,16 @@ impl posegate_table_info {
     const NONE: Self = Self {
         task: [0; 36],
         tool_version: [0; 20],
-        site_digest: [0; 32],
+        task_digest: [0; 32],
         radius_squared_q16: 0,
         crc: 0,
+        parts: 0,
+        missing_parts: 0,
     };
 }
 
 /// Returns a text with at least one zero after it.
-fn text<const N: usize>(from: &str) -> [c_char; N] {
+pub(super) fn text<const N: usize>(from: &str) -> [c_char; N] {
     let mut text = [0; N];
     let most = N.saturating_sub(1);
     for (to, byte) in text.iter_mut().take(most).zip(from.bytes()) {
@@ -46,7 +73,8 @@ fn text<const N: usize>(from: &str) -> [c_char; N] {
 
 /// Checks the bytes of a table and writes its header data.
 ///
-/// Errors: `POSEGATE_STATUS_TABLE_INVALID` if the bytes are not a table.
+/// Errors: `POSEGATE_STATUS_TABLE_INVALID`, `POSEGATE_STATUS_TABLE_TOO_NEW` or `POSEGATE_STATUS_PART_MISSING` if a gate would refuse the
+/// bytes; its reasons are then `POSEGATE_REASON_TABLE_DAMAGED`, `_TABLE_TOO_NEW` and `_PART_MISSING`.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be
@@ -60,13 +88,16 @@ pub unsafe extern "C" fn posegate_table_check(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let found = bytes(table, length).and_then(|bytes| {
-            let table = Table::parse(bytes).map_err(|_| posegate_status::TableInvalid)?;
+            let table = Table::parse(bytes)?;
+            let parts = table.parts();
             Ok(posegate_table_info {
                 task: text(table.task()),
                 tool_version: text(table.tool_version()),
-                site_digest: table.site_digest(),
+                task_digest: table.task_digest(),
                 radius_squared_q16: table.radius_squared().q16(),
                 crc: table.crc(),
+                parts: parts.bits(),
+                missing_parts: parts.without(Parts::BUILT).bits(),
             })
         });
         answer(info, found, posegate_table_info::NONE)

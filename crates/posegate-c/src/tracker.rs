@@ -155,7 +155,8 @@ fn code(outcome: Result<(), Reason>) -> u32 {
 
 /// Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
 ///
-/// Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; `POSEGATE_STATUS_TABLE_INVALID`, since the table states the confidence.
+/// Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; those of `posegate_table_check`, since the table states the
+/// confidence.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type; `length` bytes of the table can be read.
@@ -178,8 +179,7 @@ pub unsafe extern "C" fn posegate_tracker_init(
         let held = take(tracker);
         let (held, given) = (held?, given?);
         apart?;
-        let table =
-            Table::parse(bytes(table, length)?).map_err(|_| posegate_status::TableInvalid)?;
+        let table = Table::parse(bytes(table, length)?)?;
         let source = given.source.source()?;
         // Odometry without any error does not exist: the errors were forgotten.
         if given.errors.errors() == OdometryErrors::NONE {
@@ -279,6 +279,9 @@ pub unsafe extern "C" fn posegate_tracker_fix(
 /// Writes the report for now: the newest fix, carried to the newest odometry. For records, margins and monitors; a control cycle calls
 /// `posegate_gate_step_tracked`, which takes fewer instructions.
 ///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
+///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
@@ -314,6 +317,9 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
 /// why there is none, and `posegate_gate_inhibit` with it ends a permit at once.
 ///
 /// Errors: those of `posegate_gate_tick`. Without an initialised tracker, the gate closes as at a report of an unknown source.
+///
+/// `now_ms` is in milliseconds, of a clock that runs: if its ticks are longer than 1 ms, or it stands still, a permit lasts too long, or for
+/// ever (`posegate_clock`).
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.

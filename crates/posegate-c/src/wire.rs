@@ -3,7 +3,7 @@
 use super::judge::judge;
 use super::memory::{
     Plain, Storage, answer, bytes, close, element, open, read, separate, separate_from_all, take,
-    write,
+    unused, write,
 };
 use super::{POSEGATE_PERMIT, posegate_belief, posegate_judge, posegate_status, posegate_verdict};
 use posegate::contain::Margin;
@@ -28,7 +28,7 @@ const _: () = assert!(posegate::wire::LONGEST_FRAME <= POSEGATE_LONGEST_MESSAGE)
 pub struct posegate_message {
     /// 1 if a frame has ended, else 0. Only `posegate_receiver_push` sets it.
     pub is_complete: u8,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: [u8; 2],
     /// The number of valid bytes.
     pub length: u8,
@@ -61,7 +61,7 @@ pub struct posegate_request {
     pub now_ms: u32,
     /// Squared radius of a Gaussian set, unit 2^-16, at least that of the table.
     pub radius_squared_q16: u32,
-    /// Reserved: 0.
+    /// Reserved: must be 0.
     pub reserved: u32,
 }
 
@@ -136,6 +136,7 @@ impl posegate_request {
     }
 
     fn request(&self) -> Option<Request> {
+        unused(self.reserved).ok()?;
         let belief = self.belief.belief().ok()?;
         let Heading::Radians(yaw_rad) = belief.heading else {
             return None;
@@ -186,6 +187,7 @@ impl posegate_reply {
 impl posegate_verdict {
     /// Returns the verdict, or `None` if the numbers contradict each other.
     fn decode(&self) -> Option<Verdict> {
+        unused(self.reserved.into()).ok()?;
         let flag = |flag: u8| match flag {
             0 => Some(false),
             1 => Some(true),
@@ -339,7 +341,7 @@ pub unsafe extern "C" fn posegate_reply_encode(
 
 /// Encodes the frame of a body: the bytes for the line, with the closing zero.
 ///
-/// Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message.
+/// Errors: `POSEGATE_STATUS_BAD_LENGTH` if the body is longer than any message; `POSEGATE_STATUS_BAD_VALUE` if its `reserved` is not 0.
 ///
 /// # Safety
 /// Each pointer is null, misaligned, or valid for its type.
@@ -351,6 +353,7 @@ pub unsafe extern "C" fn posegate_frame_encode(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let encoded = read(body).and_then(|body| {
+            unused(u16::from_le_bytes(body.reserved).into())?;
             let bytes = body.bytes.get(..usize::from(body.length));
             let bytes = bytes.filter(|bytes| bytes.len() <= posegate::wire::LONGEST_BODY);
             let bytes = bytes.ok_or(posegate_status::BadLength)?;

@@ -78,7 +78,7 @@ fn source() -> posegate_source {
 fn settings() -> posegate_settings {
     posegate_settings {
         task: name("dock"),
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: [
             source(),
             posegate_source {
@@ -151,7 +151,7 @@ fn settings_of_rust() -> &'static Settings<'static> {
     ];
     Box::leak(Box::new(Settings {
         task: "dock",
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: Box::leak(Box::new(sources)),
         maximum_age_ms: 200,
         response_ms: 30,
@@ -792,10 +792,10 @@ fn gate_without_its_table_latches_with_reason() {
     let mut damaged = DOCK.to_vec();
     damaged[200] ^= 1;
     let mut other_site = settings();
-    other_site.site_digest[31] ^= 1;
+    other_site.task_digest[31] ^= 1;
     let cases: [(&[u8], posegate_settings, Reason); 4] = [
-        (&[], settings(), Reason::TableInvalid),
-        (&damaged, settings(), Reason::TableInvalid),
+        (&[], settings(), Reason::TableDamaged),
+        (&damaged, settings(), Reason::TableDamaged),
         (SEE_T7, settings(), Reason::WrongTask),
         (DOCK, other_site, Reason::WrongSite),
     ];
@@ -852,8 +852,8 @@ fn an_inhibited_gate_qualifies_again() {
     for (reason, kind, status) in [
         (35, posegate_state_kind::Inhibited, posegate_status::Ok),
         (0, posegate_state_kind::Latched, posegate_status::BadValue),
-        (43, posegate_state_kind::Inhibited, posegate_status::Ok),
-        (44, posegate_state_kind::Latched, posegate_status::BadValue),
+        (46, posegate_state_kind::Inhibited, posegate_status::Ok),
+        (47, posegate_state_kind::Latched, posegate_status::BadValue),
         (291, posegate_state_kind::Latched, posegate_status::BadValue),
     ] {
         let gate = open_gate();
@@ -1171,7 +1171,7 @@ fn c_gate_equals_rust_gate() {
                 source: u32::from(source),
                 sequence,
                 stamp_ms: report.stamp_ms,
-                reserved: random.below(9),
+                reserved: 0,
             };
             if round % 7 == 0 {
                 let mut verdict = open_verdict();
@@ -1670,6 +1670,100 @@ fn c_reasons_have_texts_of_rust_crate() {
     }
 }
 
+/// A later version may give a reserved field a meaning, so no program may have left anything there.
+#[test]
+fn reserved_fields_must_be_zero() {
+    let bad = posegate_status::BadValue;
+    let mut step = open_step();
+    let mut verdict = open_verdict();
+    // SAFETY: valid pointers, as long as the table is there.
+    unsafe {
+        for source in 0..2 {
+            let mut given = settings();
+            given.sources[source].reserved = 1;
+            let status =
+                posegate_gate_init(zeroed(), DOCK.as_ptr(), DOCK.len(), &given, counter(), 0);
+            assert_eq!(status, bad, "source {source}");
+        }
+        let report = posegate_report {
+            reserved: 1,
+            ..good(0, 0)
+        };
+        let gate = open_gate();
+        assert_eq!(posegate_gate_step(gate, 0, &report, &mut step), bad);
+        assert!(!is_permit(&step));
+        let mut evidence = posegate_evidence {
+            report: good(0, 0),
+            others: [good(0, 0).belief; POSEGATE_OTHERS],
+            other_count: 0,
+            beside_um: 0,
+            beside_q24: 0,
+            elsewhere_q32: 0,
+            since_fix_ms: 0,
+            reserved: 0,
+        };
+        let gate = open_gate();
+        assert_ne!(posegate_gate_step_on(gate, 0, &evidence, &mut step), bad);
+        evidence.reserved = 1 << 31;
+        assert_eq!(posegate_gate_step_on(gate, 0, &evidence, &mut step), bad);
+        assert!(!is_permit(&step));
+        let judge = zeroed();
+        let status = posegate_judge_init(judge, DOCK.as_ptr(), DOCK.len(), 100);
+        assert_eq!(status, posegate_status::Ok);
+        let mut estimate = posegate_estimate {
+            belief: good(0, 0).belief,
+            stamp_ms: 0,
+            now_ms: 0,
+            radius_squared_q16: 0,
+            reserved: 0,
+        };
+        let status = posegate_judge_permits(judge, &estimate, &mut verdict);
+        assert_eq!(status, posegate_status::Ok);
+        estimate.reserved = 1;
+        let status = posegate_judge_permits(judge, &estimate, &mut verdict);
+        assert_eq!((status, verdict.verdict), (bad, POSEGATE_DENY));
+        let body = posegate_message {
+            is_complete: 0,
+            reserved: [0, 1],
+            length: 3,
+            bytes: [0; POSEGATE_LONGEST_MESSAGE],
+        };
+        assert_eq!(posegate_frame_encode(&body, zeroed()), bad);
+        let mut reply = posegate_reply {
+            sequence: 0,
+            status: 0,
+            verdict: posegate_verdict {
+                verdict: POSEGATE_DENY,
+                has_margin: 0,
+                has_worst_pose: 0,
+                reserved: 0,
+                reason: 1,
+                margin_q16: 0,
+                worst_pose: verdict.worst_pose,
+            },
+            interlock_high: 0,
+        };
+        let status = posegate_reply_encode(&reply, zeroed());
+        assert_eq!(status, posegate_status::Ok);
+        reply.verdict.reserved = 1;
+        assert_eq!(posegate_reply_encode(&reply, zeroed()), bad);
+        let mut request = posegate_request {
+            belief: good(0, 0).belief,
+            sequence: 1,
+            table: 0,
+            stamp_ms: 0,
+            now_ms: 0,
+            radius_squared_q16: 743_498,
+            reserved: 0,
+        };
+        let status = posegate_request_judge(&request, judge, 1, &mut verdict);
+        assert_eq!(status, posegate_status::Ok);
+        request.reserved = 1;
+        let status = posegate_request_judge(&request, judge, 1, &mut verdict);
+        assert_eq!((status, verdict.verdict), (bad, POSEGATE_DENY));
+    }
+}
+
 #[test]
 fn table_info_frames_and_checksums_equal_rust() {
     let info = zeroed::<posegate_table_info>();
@@ -1682,9 +1776,29 @@ fn table_info_frames_and_checksums_equal_rust() {
             |text: &[core::ffi::c_char]| CStr::from_ptr(text.as_ptr()).to_str().unwrap().to_owned();
         assert_eq!(text(&(*info).task), "dock");
         assert_eq!(text(&(*info).tool_version), table.tool_version());
-        assert_eq!((*info).site_digest, table.site_digest());
+        assert_eq!((*info).task_digest, table.task_digest());
         assert_eq!((*info).crc, table.crc());
         assert_eq!((*info).radius_squared_q16, table.radius_squared().q16());
+        assert_eq!(((*info).parts, (*info).missing_parts), (0, 0));
+        for (table, part) in [
+            ("examples/tables/see-t7.posegate", posegate_part::Sight),
+            ("examples/tables/see-t7-grid.posegate", posegate_part::Cells),
+            ("tests/data/corner.posegate", posegate_part::Unions),
+            ("tests/data/turning.posegate", posegate_part::Headings),
+        ] {
+            let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+            let bytes = std::fs::read(format!("{root}/{table}")).unwrap();
+            let status = posegate_table_check(bytes.as_ptr(), bytes.len(), info);
+            assert_eq!(status, posegate_status::Ok);
+            assert_ne!((*info).parts & part as u32, 0, "{table}");
+            assert_eq!((*info).missing_parts, 0, "this build has all parts");
+        }
+        let mut newer = DOCK.to_vec();
+        newer[8] = 2;
+        let (content, crc) = newer.split_last_chunk_mut().unwrap();
+        *crc = checksum(content).to_le_bytes();
+        let status = posegate_table_check(newer.as_ptr(), newer.len(), info);
+        assert_eq!(status, posegate_status::TableTooNew);
         let status = posegate_table_check(DOCK.as_ptr(), DOCK.len() - 1, info);
         assert_eq!(status, posegate_status::TableInvalid);
         assert_eq!(((*info).crc, (*info).task[0]), (0, 0));

@@ -62,7 +62,7 @@ fn settings_of_c(table: &Table<'_>) -> posegate_settings {
     for (to, byte) in settings.task.iter_mut().zip(table.task().bytes()) {
         *to = core::ffi::c_char::from_ne_bytes([byte]);
     }
-    settings.site_digest = table.site_digest();
+    settings.task_digest = table.task_digest();
     settings.sources[0] = posegate_source {
         inflation: 1.0,
         ..source_of_c()
@@ -87,7 +87,7 @@ fn gate_of_rust(bytes: &'static [u8]) -> Gate<'static> {
     let sources = [Source::new("map", 1.0, CrossTerms::Filled, bounds).unwrap()];
     let settings = Settings {
         task: String::leak(table.task().to_owned()),
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: Box::leak(Box::new(sources)),
         ..Settings::for_source(20, 10)
     };
@@ -356,7 +356,7 @@ fn c_inflation_by_age_equals_rust() {
     }];
     let settings = Settings {
         task: table.task(),
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: &sources,
         ..Settings::for_source(20, 10)
     };

@@ -15,6 +15,7 @@ const NO_AGES: [posegate_age; POSEGATE_MOST_AGES] = [posegate_age {
     inflation_q16: 0,
 }; POSEGATE_MOST_AGES];
 
+static RULES: &[u8] = include_bytes!("../../../examples/tables/contingent.rules");
 static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 
 /// The kind of an argument.
@@ -26,13 +27,15 @@ enum Kind {
     Output,
     /// Read and written: the counter of a gate.
     Word,
-    /// A gate, a tracker, a monitor, a judge, a receiver; `posegate_request_judge` has two judges.
+    /// A gate, a tracker, a monitor, a judge, a receiver, a sequencer, a clock; `posegate_request_judge` has two judges.
     Gate,
     Tracker,
     Monitor,
     Judge,
     Judges,
     Receiver,
+    Sequencer,
+    Clock,
 }
 
 struct Argument {
@@ -43,11 +46,7 @@ struct Argument {
 
 impl Argument {
     fn is_storage(&self) -> bool {
-        use Kind::{Gate, Judge, Judges, Monitor, Receiver, Tracker};
-        matches!(
-            self.kind,
-            Gate | Tracker | Monitor | Judge | Judges | Receiver
-        )
+        !matches!(self.kind, Kind::Input | Kind::Output | Kind::Word)
     }
 }
 
@@ -122,7 +121,7 @@ fn settings() -> posegate_settings {
     };
     posegate_settings {
         task: name("dock"),
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: ["map", "odom", "", ""].map(source),
         source_count: 2,
         maximum_age_ms: 200,
@@ -289,6 +288,14 @@ fn set_up(kind: Kind, at: *mut u8) {
                 let status = posegate_receiver_init(at.cast());
                 assert_eq!(status, posegate_status::Ok);
             }
+            Kind::Sequencer => {
+                let status = posegate_sequencer_init(at.cast(), RULES.as_ptr(), RULES.len());
+                assert_eq!(status, posegate_status::Ok);
+            }
+            Kind::Clock => {
+                let status = posegate_clock_init(at.cast(), 1_000, 32, 1, 0);
+                assert_eq!(status, posegate_status::Ok);
+            }
             _ => {}
         }
     }
@@ -310,6 +317,8 @@ fn is_in_use(kind: Kind, at: *mut u8) -> bool {
                 posegate_judge_permits(at.cast(), &estimate, memory(64).cast())
             }
             Kind::Receiver => posegate_receiver_push(at.cast(), 1, memory(256).cast()),
+            Kind::Sequencer => posegate_sequencer_failed(at.cast()),
+            Kind::Clock => posegate_clock_now(at.cast(), 9, memory(64).cast()),
             _ => return true,
         }
     };
@@ -685,6 +694,35 @@ fn functions() -> Vec<Function> {
         |p| p[0].cast(),
         p[1].cast()
     );
+    function!(
+        posegate_sequencer_init,
+        [
+            storage::<posegate_sequencer>(Kind::Sequencer, 1),
+            raw(RULES)
+        ],
+        |p| p[0].cast(),
+        p[1],
+        RULES.len()
+    );
+    function!(
+        posegate_sequencer_next,
+        [
+            storage::<posegate_sequencer>(Kind::Sequencer, 1),
+            input(belief(0.0, 0.0)),
+            output::<posegate_instruction>()
+        ],
+        |p| p[0].cast(),
+        p[1].cast(),
+        743_498,
+        p[2].cast()
+    );
+    function!(
+        posegate_clock_now,
+        [storage::<posegate_clock>(Kind::Clock, 1), output::<u32>()],
+        |p| p[0].cast(),
+        5,
+        p[1].cast()
+    );
     functions
 }
 
@@ -960,7 +998,7 @@ fn restored_gate_copy_is_refused() {
     }
     // After another start, successful or not, an old copy is refused, too.
     let mut latched = settings();
-    latched.site_digest[0] ^= 1;
+    latched.task_digest[0] ^= 1;
     let mut refused = settings();
     refused.permits_in_a_row = 0;
     for (settings, expected) in [

@@ -111,7 +111,6 @@ pub fn build_table(site: &Site, path: OsString, name: &str) -> Result<Vec<u8>, R
         success: &task.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let built = build(&order, &|| ());
     let (bytes, _) = built.map_err(|error| Failure::build(&input, name, error))?;

@@ -30,7 +30,6 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                 success: &task.success,
                 spec,
                 epsilon: site.epsilon,
-                site_digest: site.digest,
             };
             check(&order).map_err(|error| Failure::table(&arguments.site, name, error))?;
         }

@@ -73,7 +73,6 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         success: &task.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let refused = |error| Failure::table(&arguments.site, name, error);
     let slabs = u64::from(bake::check(&order).map_err(refused)?.slabs);

@@ -70,6 +70,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         )
     })?;
     let radius = radius(&table, arguments.epsilon)?;
+    let task_digest = super::table::hex(&table.task_digest());
     let columns = match arguments.set {
         Kind::Gaussian => Columns::Estimates,
         Kind::Bounded => Columns::TimedPoses,
@@ -95,7 +96,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             *reasons.entry(reason).or_default() += 1;
         }
         if arguments.json {
-            print_json(&line(index, &decided))?;
+            let mut line = line(index, &decided);
+            line["task_digest"] = json!(task_digest);
+            print_json(&line)?;
         } else {
             print(&sentence(index, &decided))?;
         }

@@ -52,7 +52,8 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         source.aging = inflated.factors.aging;
     }
     let sources = vec![source; arguments.topic.len().max(1)];
-    let settings = settings(arguments, &site, &sources);
+    let task_digest = digest(arguments, &site, chosen);
+    let settings = settings(arguments, task_digest, &sources);
     let setup = ReplayConfig {
         table: &table,
         settings: &settings,
@@ -139,10 +140,14 @@ fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Returns the settings of the gate.
-fn settings<'a>(arguments: &'a Arguments, site: &Site, sources: &'a [Source]) -> Settings<'a> {
+fn settings<'a>(
+    arguments: &'a Arguments,
+    task_digest: [u8; 32],
+    sources: &'a [Source],
+) -> Settings<'a> {
     Settings {
         task: &arguments.task,
-        site_digest: site.digest,
+        task_digest,
         sources,
         maximum_age_ms: arguments.max_age_ms,
         response_ms: arguments.response_ms,
@@ -198,6 +203,12 @@ pub(super) fn parameter(error: InvalidParameter) -> Failure {
     Failure::usage(format!("a setting of the gate is invalid: {error}"), help)
 }
 
+/// Returns the digest of the task, with the confidence of this replay.
+fn digest(arguments: &Arguments, site: &Site, task: &Task) -> [u8; 32] {
+    task.success
+        .digest(arguments.epsilon.unwrap_or(site.epsilon))
+}
+
 /// Returns the given table, or builds and proves one from the site.
 fn table(
     arguments: &Arguments,
@@ -208,9 +219,11 @@ fn table(
     if let Some(path) = &arguments.table {
         let (bytes, name) = files.read(path)?;
         let table = Table::parse(&bytes).map_err(|error| super::gate::not_a_table(&name, error))?;
-        if table.task() != arguments.task || table.site_digest() != site.digest {
+        if table.task() != arguments.task || table.task_digest() != digest(arguments, site, task) {
             return Err(Failure::usage(
-                format!("{name} is not a table of this site file and task"),
+                format!(
+                    "{name} is not a table of this task with the goal, set and confidence of the site file"
+                ),
                 "build it again with `posegate table build`, or leave --table out",
             ));
         }
@@ -227,7 +240,6 @@ fn table(
         success: &task.success,
         spec,
         epsilon: arguments.epsilon.unwrap_or(site.epsilon),
-        site_digest: site.digest,
     };
     let built = posegate::verify::build(&order, &|| {});
     let (bytes, _) =

@@ -2,6 +2,7 @@
 
 use crate::gate::not_a_table;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use posegate::bake::{self, BakeError, BakeInput, Language, Layout, source};
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
 use posegate::verify::{
@@ -124,8 +125,8 @@ pub struct Cost {
     /// The table; `-` for standard input
     table: Input,
     /// The processor core
-    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(Core::ALL.map(Core::name)))]
-    core: String,
+    #[arg(long, value_parser = PossibleValuesParser::new(Core::ALL.map(Core::name)).try_map(core))]
+    core: Core,
     /// With a tracker: fixes are carried along odometry
     #[arg(long)]
     tracker: bool,
@@ -164,7 +165,6 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
         success: &chosen.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let refused = |error| Failure::table(&arguments.site, &arguments.task, error);
     let slabs = u64::from(bake::check(&order).map_err(refused)?.slabs);
@@ -196,6 +196,7 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     let covered = coverage(&table, &chosen.success);
     if arguments.json {
         let mut facts = facts(&table);
+        facts["site_digest"] = json!(site.digest_text());
         facts["covered"] = json!(covered.share);
         facts["file"] = json!(file);
         facts["proven"] = of_proof(proof);
@@ -304,7 +305,6 @@ fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure
         task: name,
         success: &task(site, name)?.success,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     })
 }
 
@@ -323,7 +323,8 @@ fn of_proof(proof: Proof) -> Value {
     json!({"runs": proof.runs, "cells": proof.cells, "corners": proof.corners})
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Returns bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
@@ -347,7 +348,8 @@ fn facts(table: &Table<'_>) -> Value {
         "task": table.task(),
         "format_version": posegate::table::VERSION,
         "tool_version": table.tool_version(),
-        "site_digest": hex(&table.site_digest()),
+        "task_digest": hex(&table.task_digest()),
+        "table_digest": hex(&table.digest()),
         "crc32c": format!("{:08x}", table.crc()),
         "bytes": table.bytes().len(),
         "epsilon": table.epsilon(),
@@ -381,7 +383,7 @@ fn facts(table: &Table<'_>) -> Value {
             "covered_cells": covered,
         },
         "sight": table.sight_record().map(|record| sight(&record)),
-        "parts": table.parts(),
+        "parts": table.parts().names().collect::<Vec<_>>(),
         "worst_case": {
             "m4f": worst.instructions_m4f(),
             "m0plus": worst.instructions_m0_plus(),
@@ -430,18 +432,20 @@ fn info(arguments: &Info, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
+/// Returns the core of a name.
+fn core(name: String) -> Result<Core, String> {
+    let known = Core::ALL.into_iter().find(|core| core.name() == name);
+    known.ok_or(name)
+}
+
 fn cost(arguments: &Cost, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
-    let core = Core::ALL
-        .into_iter()
-        .find(|core| core.name() == arguments.core);
     let level = match arguments.level.as_str() {
         "s" => Level::Small,
         _ => Level::Fast,
     };
-    let core = core.ok_or_else(|| Failure::input("no such core"))?;
-    let cost = controller_cost::cost(&table, core, level, arguments.tracker);
+    let cost = controller_cost::cost(&table, arguments.core, level, arguments.tracker);
     let total = cost.flash_of_gate + cost.flash_of_tracker + cost.flash_of_table;
     if arguments.json {
         print_json(&json!({
@@ -457,7 +461,7 @@ fn cost(arguments: &Cost, files: &Files) -> Outcome {
          flash: gate {}, tracker {}, table {}, total {total} bytes\n\
          stack: init {}, step {}, tracker {} bytes\n\
          a cycle takes at most {} instructions, {} with a fix; a change of table {}",
-        arguments.core,
+        arguments.core.name(),
         cost.parts,
         arguments.level,
         cost.flash_of_gate,

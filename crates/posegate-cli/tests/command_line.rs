@@ -117,7 +117,13 @@ fn site_becomes_a_table_that_decides() {
         (&info["task"], &info["epsilon"]),
         (&"dock".into(), &0.99.into())
     );
-    assert_eq!(info["site_digest"], built["site_digest"]);
+    assert_eq!(info["task_digest"], built["task_digest"]);
+    assert_eq!(info["table_digest"], built["table_digest"]);
+    let task_digest = info["task_digest"].clone();
+    // The site file is at hand only where the table is built.
+    assert!(info["site_digest"].is_null());
+    assert_eq!(built["site_digest"].as_str().unwrap().len(), 64);
+    assert_ne!(built["site_digest"], built["task_digest"]);
     assert_eq!(info["parts"], serde_json::json!(["cells"]));
     // The table's own bound on the instructions of a decision.
     let bytes = std::fs::read(folder.path().join("dock.posegate")).unwrap();
@@ -172,6 +178,7 @@ fn site_becomes_a_table_that_decides() {
         (&line["verdict"], &line["reason"]),
         (&"permit".into(), &serde_json::Value::Null)
     );
+    assert_eq!(line["task_digest"], task_digest);
     folder.write(
         "both.csv",
         &format!("{permit}0,0.07,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
@@ -195,13 +202,15 @@ fn site_becomes_a_table_that_decides() {
         (&line["inside"], &line["visible"], &line["d"]),
         (&true.into(), &true.into(), &3.75.into())
     );
-    // A change of the site changes the claim.
-    folder.write("changed.toml", &SAMPLE.replace("0.08, 0.08", "0.08, 0.07"));
-    let (out, _) = folder.expect(1, "table verify dock.posegate changed.toml");
-    assert!(
-        out.contains("NOT proven") && out.contains("site digest"),
-        "{out}"
-    );
+    // A change of the task changes the claim, also if the table's poses are all in the changed set; a comment does not.
+    for (x, why) in [("0.07", "cell (slab"), ("0.09", "task digest")] {
+        let changed = SAMPLE.replace("0.08, 0.08", &format!("0.08, {x}"));
+        folder.write("changed.toml", &changed);
+        let (out, _) = folder.expect(1, "table verify dock.posegate changed.toml");
+        assert!(out.contains("NOT proven") && out.contains(why), "{out}");
+    }
+    folder.write("commented.toml", &format!("# a comment\n{SAMPLE}"));
+    folder.expect(0, "table verify dock.posegate commented.toml");
 }
 
 #[test]
@@ -324,6 +333,9 @@ fn bad_tables_and_recordings_are_refused() {
     flipped[200] ^= 4;
     let mut version = good.clone();
     version[8] = 9;
+    // Without its checksum a table with another version is a damaged one.
+    let (content, crc) = version.split_last_chunk_mut().unwrap();
+    *crc = posegate::table::checksum(content).to_le_bytes();
     for (name, bytes, word) in [
         ("flipped", flipped, "checksum"),
         ("cut", good[..200].to_vec(), "length"),
@@ -1057,6 +1069,25 @@ fn check_prints_the_warnings_of_doctor() {
 fn check_warns_of_tables_beyond_the_cycle_budget() {
     let folder = Folder::new();
     let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    let advice = |site: &str, keys: &str| {
+        folder.write("site.toml", &format!("{site}\n[controller]\n{keys}\n"));
+        let (out, _) = folder.expect(0, "check site.toml --json");
+        let found: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let warnings = found["warnings"].as_array().unwrap().iter();
+        let of_cost = warnings.filter(|one| one["code"] == "decision_too_long");
+        let all: Vec<_> = of_cost.map(|one| one["help"].to_string()).collect();
+        assert!(!all.is_empty(), "{out}");
+        all.concat()
+    };
+    // What the file already says is not advised.
+    let few = "core = \"cortex-m4f\"\ncycles_per_decision = 10";
+    let cells = site.replace("layout = \"auto\"", "layout = \"grid\"");
+    let layout = "layout = \\\"facets";
+    assert!(advice(&cells, few).contains(layout));
+    assert!(!advice(&site, few).contains(layout));
+    assert!(advice(&site, few).contains("cycles_per_instruction"));
+    let measured = format!("{few}\ncycles_per_instruction = 2.0");
+    assert!(!advice(&site, &measured).contains("cycles_per_instruction"));
     let costly = |keys: &str| {
         folder.write("site.toml", &format!("{site}\n[controller]\n{keys}\n"));
         let (out, _) = folder.expect(0, "check site.toml --json");

@@ -29,14 +29,12 @@ fn main() -> ExitCode {
         task: "see-t7",
         success: &task.success,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let order = |spec: TableSpec| BakeInput {
         task: claim.task,
         success: claim.success,
         spec,
         epsilon: claim.epsilon,
-        site_digest: claim.site_digest,
     };
     let mut short = false;
     let mut line = |name: &str, value: f64, unit: &str, goal: Goal| {

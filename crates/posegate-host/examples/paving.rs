@@ -67,7 +67,6 @@ fn order<'a>(site: &'a Site, task: &'a str, layout: Layout, step: Step) -> BakeI
             ..spec
         },
         epsilon: site.epsilon,
-        site_digest: site.digest,
     }
 }
 
@@ -111,7 +110,6 @@ fn paving(lines: &mut Lines) {
             task: order.task,
             success: order.success,
             epsilon: order.epsilon,
-            site_digest: order.site_digest,
         };
         let start = Instant::now();
         verify(&bytes, &claim, &|| ()).expect("a proof");

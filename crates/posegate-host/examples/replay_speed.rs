@@ -218,14 +218,13 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         success: &task.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let (table, _) = posegate::verify::build(&order, &|| {})?;
     let source = Source::new("map", 1.0, CrossTerms::Filled, MotionBounds::STANDS_STILL)
         .map_err(|error| format!("{error:?}"))?;
     let settings = Settings {
         task: "dock",
-        site_digest: site.digest,
+        task_digest: site.task_digest(task),
         sources: &[source],
         maximum_age_ms: 200,
         response_ms: 20,

@@ -5,7 +5,7 @@
 //! in `examples/c/robot`. `./ci.sh costs` makes the figures.
 
 use crate::site::Core;
-use posegate::table::{Axes, Table};
+use posegate::table::{Parts, Table};
 
 /// The figures: a line for each core, level of optimization and set of parts.
 const FIGURES: &str = include_str!("controller_cost/figures.txt");
@@ -89,18 +89,13 @@ impl Figures {
 
 /// Returns the smallest set of parts that a table needs.
 fn parts(table: &Table<'_>) -> &'static str {
-    let Some(facets) = table.facets().filter(|_| table.sight().is_none()) else {
-        return "all";
-    };
-    let turns = facets.pieces().any(|piece| {
-        piece
-            .frames()
-            .any(|frame| frame.axes == Axes::Robot || (frame.x, frame.y) != (0, 0))
-    });
-    if turns || facets.pieces().nth(1).is_some() {
-        "turning"
-    } else {
+    let needs = table.parts();
+    if needs.contains(Parts::CELLS) || needs.contains(Parts::SIGHT) {
+        "all"
+    } else if needs == Parts::default() {
         "boxes"
+    } else {
+        "turning"
     }
 }
 

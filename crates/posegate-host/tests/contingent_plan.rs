@@ -57,7 +57,6 @@ fn committed_rules_are_made_from_the_committed_site() {
             success: &found.success,
             spec: site.chosen_table(found).unwrap(),
             epsilon: site.epsilon,
-            site_digest: site.digest,
         };
         made.push((file, build(&order, &|| ()).unwrap().0));
     }

@@ -499,7 +499,7 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
     let reading_ms = (scene.reading / TICKS_PER_MS) as u32 + 1;
     let settings = Settings {
         task: "hall",
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: &sources,
         maximum_age_ms: 3 * reading_ms + scene.response_ms + 20,
         response_ms: scene.response_ms,

@@ -160,13 +160,11 @@ fn border_crossed_between_the_ends_is_detected() {
             layout: Layout::Facets,
         },
         epsilon: 0.99,
-        site_digest: [3; 32],
     };
     let claim = ExpectedTable {
         task: "swing",
         success: &success,
         epsilon: 0.99,
-        site_digest: [3; 32],
     };
     let made = plan(&build(&order, &|| ()).unwrap().0);
     // A frame of only the robot's centre, whose upper facet is correct at both ends of the arc.
@@ -400,7 +398,6 @@ fn permits_are_correct_despite_rounding_of_the_estimate() {
                 layout: Layout::Facets,
             },
             epsilon: 0.99,
-            site_digest: [3; 32],
         };
         let bytes = build(&order, &|| ()).unwrap().0;
         let table = Table::parse(&bytes).unwrap();
@@ -464,7 +461,6 @@ fn worst_pose_is_beyond_a_facet() {
             layout: Layout::Facets,
         },
         epsilon: 0.99,
-        site_digest: [3; 32],
     };
     let bytes = build(&order, &|| ()).unwrap().0;
     let table = Table::parse(&bytes).unwrap();

@@ -97,7 +97,7 @@ fn drive(rng: &mut Rng, bytes: &[u8], stated: impl Fn(&Drive) -> MotionBounds, f
     }];
     let settings = Settings {
         task: "hall",
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: &sources,
         maximum_age_ms: drive.maximum_age_ms,
         response_ms: drive.response_ms,

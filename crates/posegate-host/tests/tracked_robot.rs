@@ -340,7 +340,7 @@ fn drive(
     }];
     let settings = Settings {
         task: "hall",
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: &sources,
         maximum_age_ms: 3 * drive.odometry_ms + drive.response_ms + 20,
         response_ms: drive.response_ms,

@@ -101,6 +101,39 @@ fn header_has_only_plain_c() {
     assert!(code.matches("(").count() >= 20, "few functions");
 }
 
+/// A C program may use each macro and each constant: the compiler knows every word in them.
+#[test]
+fn every_macro_and_constant_compiles() {
+    let code = without_comments(&committed());
+    let macros = code
+        .lines()
+        .filter_map(|line| line.strip_prefix("#define ")?.split_once(' '))
+        .map(|(name, _)| name);
+    let constants = code
+        .lines()
+        .filter_map(|line| line.strip_prefix("    POSEGATE_")?.split_once(" = "))
+        .map(|(name, _)| format!("POSEGATE_{name}"));
+    let mut program = String::from("#include \"posegate.h\"\n");
+    let mut count = 0;
+    for name in macros.map(str::to_owned).chain(constants) {
+        program += &format!("const long long value_{count} = (long long)({name});\n");
+        count += 1;
+    }
+    assert!(count > 100, "only {count} macros and constants");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("constants.c");
+    std::fs::write(&file, program).expect("the program is written");
+    let output = std::process::Command::new("cc")
+        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"])
+        .arg("-I")
+        .arg(at_root("include"))
+        .arg(&file)
+        .output()
+        .expect("a C compiler `cc`");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
 fn without_comments(text: &str) -> String {
     let mut code = String::new();
     let mut rest = text;

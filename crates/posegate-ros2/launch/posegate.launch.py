@@ -14,15 +14,15 @@ def generate_launch_description():
         [
             DeclareLaunchArgument("table", description="table of the task, made by `posegate table build`"),
             DeclareLaunchArgument("params", description="parameter file, such as posegate.yaml next to this file"),
-            DeclareLaunchArgument("site_digest", description="digest of the site file (`posegate table info` prints it)"),
+            DeclareLaunchArgument("task_digest", description="task digest of the table (`posegate table info` prints it)"),
             DeclareLaunchArgument("pose", default_value="/amcl_pose", description="topic of the pose with covariance"),
             DeclareLaunchArgument("odom", default_value="/odom", description="topic of the odometry"),
             ExecuteProcess(
                 cmd=[
                     "posegate-node",
                     LaunchConfiguration("table"),
-                    "--site-digest",
-                    LaunchConfiguration("site_digest"),
+                    "--task-digest",
+                    LaunchConfiguration("task_digest"),
                     "--ros-args",
                     "--params-file",
                     LaunchConfiguration("params"),

@@ -1,4 +1,4 @@
-//! The command line: `posegate-node TABLE [--site-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args ...]`.
+//! The command line: `posegate-node TABLE [--task-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args ...]`.
 
 use crate::names::{NameError, Names};
 use crate::parameters::{ParameterError, Parameters};
@@ -8,11 +8,11 @@ use std::path::PathBuf;
 pub const USAGE: &str = "\
 Decide whether a robot is localized well enough for a task, as a ROS 2 node
 
-Usage: posegate-node TABLE [--site-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
+Usage: posegate-node TABLE [--task-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
 
   TABLE                the table of the task, made by `posegate table build`
-  --site-digest HEX    SHA-256 of the site file that the table must be made from (`posegate table info` prints it)
-  --site FILE          the site file that the table must be made from: its tags and cameras, for the parameter use_detections
+  --task-digest HEX    the task digest that the table must have (`posegate table info` prints it); also as --site-digest, its older name
+  --site FILE          the site file; the table must be of its task: its tags and cameras, for the parameter use_detections
   --serial DEV         the serial line of a controller whose gate decides: poses are passed to it, and the permit is the controller's;
                        TABLE is the table in its flash
   --baud N             the speed of that line, bits per second [default: 115200]
@@ -41,8 +41,8 @@ pub enum Command {
 pub struct Arguments {
     /// The file of the table.
     pub table: PathBuf,
-    /// The digest of the site file, as given.
-    pub site_digest: Option<String>,
+    /// The task digest, as given.
+    pub task_digest: Option<String>,
     /// The site file, for its tags and cameras.
     pub site: Option<PathBuf>,
     /// The serial line of a controller, and its speed in bits per second.
@@ -68,7 +68,7 @@ pub enum ArgumentError {
     TwoTables(String, String),
     /// The option does not exist.
     #[error(
-        "`{0}` is not an option of posegate-node: expected a table, --site-digest, --site, --serial, --baud or --ros-args; see --help"
+        "`{0}` is not an option of posegate-node: expected a table, --task-digest, --site, --serial, --baud or --ros-args; see --help"
     )]
     Unknown(String),
     /// The ROS argument does not exist.
@@ -103,17 +103,17 @@ impl Command {
     /// [`ArgumentError`]. Parameter files are read, so a missing file is also an error.
     pub fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
         let mut words = given.into_iter();
-        let (mut table, mut site_digest, mut serial, mut baud) = (None, None, None, None);
+        let (mut table, mut task_digest, mut serial, mut baud) = (None, None, None, None);
         let mut site = None;
         let mut ros = Ros::default();
         while let Some(word) = words.next() {
             match word.as_str() {
                 "--help" | "-h" => return Ok(Self::Help),
                 "--version" | "-V" => return Ok(Self::Version),
-                "--site-digest" => {
+                "--task-digest" | "--site-digest" => {
                     let digest = words.next();
-                    site_digest =
-                        Some(digest.ok_or(ArgumentError::NoValue("--site-digest", "HEX"))?);
+                    task_digest =
+                        Some(digest.ok_or(ArgumentError::NoValue("--task-digest", "HEX"))?);
                 }
                 "--site" => {
                     site = Some(
@@ -138,8 +138,11 @@ impl Command {
                     baud = Some(known.ok_or(ArgumentError::Baud(given))?);
                 }
                 "--ros-args" => ros.parse(&mut words)?,
-                option if option.starts_with("--site-digest=") => {
-                    site_digest = option.split_once('=').map(|(_, digest)| digest.to_owned());
+                option
+                    if option.starts_with("--task-digest=")
+                        || option.starts_with("--site-digest=") =>
+                {
+                    task_digest = option.split_once('=').map(|(_, digest)| digest.to_owned());
                 }
                 option if option.starts_with('-') => return Err(ArgumentError::Unknown(word)),
                 _ => match table.replace(word) {
@@ -169,7 +172,7 @@ impl Command {
         }
         Ok(Self::Run(Box::new(Arguments {
             table,
-            site_digest,
+            task_digest,
             site: site.map(PathBuf::from),
             serial,
             parameters,
@@ -243,12 +246,21 @@ mod tests {
 
     #[test]
     fn run_has_table_parameters_and_names() {
-        let line = "dock.posegate --site-digest abc --ros-args -p inflation:=2.0 -r pose:=/filter/pose --log-level info -- ";
+        let line = "dock.posegate --task-digest abc --ros-args -p inflation:=2.0 -r pose:=/filter/pose --log-level info -- ";
         let Ok(Command::Run(arguments)) = parse(line) else {
             panic!("{line}");
         };
         assert_eq!(arguments.table, PathBuf::from("dock.posegate"));
-        assert_eq!(arguments.site_digest.as_deref(), Some("abc"));
+        assert_eq!(arguments.task_digest.as_deref(), Some("abc"));
+        for older in [
+            "a.posegate --site-digest abc",
+            "a.posegate --site-digest=abc",
+        ] {
+            let Ok(Command::Run(arguments)) = parse(older) else {
+                panic!("{older}");
+            };
+            assert_eq!(arguments.task_digest.as_deref(), Some("abc"));
+        }
         assert_eq!(arguments.names.pose, "/filter/pose");
         assert!(arguments.parameters.get("inflation").is_some());
     }
@@ -259,7 +271,7 @@ mod tests {
             ("", "no table is given"),
             ("a.posegate b.posegate", "two tables"),
             ("a.posegate --speed 3", "`--speed` is not an option"),
-            ("a.posegate --site-digest", "needs a value"),
+            ("a.posegate --task-digest", "needs a value"),
             ("a.posegate --serial", "needs a value"),
             ("a.posegate --site", "needs a value"),
             ("a.posegate --baud 9600", "without --serial"),

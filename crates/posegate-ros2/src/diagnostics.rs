@@ -115,7 +115,7 @@ fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> Dia
     } else if settings.site_is_checked {
         "as given"
     } else {
-        "not given: any site's table would be accepted; start the node with --site-digest"
+        "not given: any table of the task's name would be accepted; start the node with --task-digest"
     };
     DiagnosticStatus {
         level: if reason.is_none() { OK } else { WARN },

@@ -38,7 +38,7 @@ pub struct Serial {
 #[derive(Clone, Debug)]
 pub struct NodeSettings {
     task: String,
-    site_digest: [u8; 32],
+    task_digest: [u8; 32],
     /// `true` if the digest of the site file was given, `false` if it was taken from the table.
     pub site_is_checked: bool,
     sources: [Source; 1],
@@ -183,9 +183,9 @@ pub enum SettingsError {
         /// The requested task.
         expected: String,
     },
-    /// The table is of another site.
+    /// The table has another task digest.
     #[error(
-        "the table was made from another site file: its digest is {found}, and {expected} was given; build the table from the site file that is in use (`posegate table info` prints a table's digest)"
+        "the table was made from another site file, or before its task changed: its task digest is {found}, and {expected} was given; build the table from the site file that is in use (`posegate table info` prints a table's task digest)"
     )]
     WrongSite {
         /// The digest of the table.
@@ -211,7 +211,7 @@ impl NodeSettings {
             return Err(SettingsError::SimulatedTime);
         }
         let table = Table::parse(table)?;
-        let (digest, site_is_checked) = reader.site(arguments.site_digest.as_deref(), &table)?;
+        let (digest, site_is_checked) = reader.site(arguments.task_digest.as_deref(), &table)?;
         let task = reader.text("task", table.task())?;
         if task != table.task() {
             return Err(SettingsError::WrongTask {
@@ -242,7 +242,7 @@ impl NodeSettings {
         };
         let settings = Self {
             task,
-            site_digest: digest,
+            task_digest: digest,
             site_is_checked: site_is_checked || site.is_some(),
             sources: [source],
             frame,
@@ -321,7 +321,7 @@ impl NodeSettings {
     pub fn gate(&self) -> Settings<'_> {
         Settings {
             task: &self.task,
-            site_digest: self.site_digest,
+            task_digest: self.task_digest,
             sources: &self.sources,
             maximum_age_ms: self.maximum_age_ms,
             response_ms: self.response_ms(),
@@ -342,10 +342,10 @@ impl NodeSettings {
         &self.task
     }
 
-    /// Returns the digest of the site file, in hexadecimal digits.
+    /// Returns the task digest, in hexadecimal digits.
     #[must_use]
     pub fn site(&self) -> String {
-        hex(&self.site_digest)
+        hex(&self.task_digest)
     }
 }
 

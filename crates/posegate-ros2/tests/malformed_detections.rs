@@ -219,7 +219,6 @@ fn table() -> Vec<u8> {
         success: &task.success,
         spec: *site.table_spec(task).unwrap(),
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     posegate::verify::build(&order, &|| ()).unwrap().0
 }

@@ -157,7 +157,7 @@ impl Controller {
     fn start(elf: &Path) -> Self {
         let settings = Settings {
             task: "dock",
-            site_digest: Table::parse(DOCK).expect("a table").site_digest(),
+            task_digest: Table::parse(DOCK).expect("a table").task_digest(),
             sources: &SOURCES,
             maximum_age_ms: MAXIMUM_AGE_MS,
             response_ms: RESPONSE_MS,

@@ -28,7 +28,7 @@ pub const PERMITS: u16 = 3;
 pub fn settings() -> Settings<'static> {
     Settings {
         task: "dock",
-        site_digest: Table::parse(DOCK).unwrap().site_digest(),
+        task_digest: Table::parse(DOCK).unwrap().task_digest(),
         sources: &SOURCES,
         maximum_age_ms: MAXIMUM_AGE_MS,
         response_ms: RESPONSE_MS,

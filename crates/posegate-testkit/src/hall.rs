@@ -54,7 +54,6 @@ pub fn facets(site: &Site, task: &str, reach: f64) -> Vec<u8> {
             layout: Layout::Facets,
         },
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     build(&order, &|| ()).expect("a table").0
 }

@@ -17,7 +17,6 @@ pub fn order<'a>(site: &'a Site, task: &'a str) -> BakeInput<'a> {
         success: &found.success,
         spec: *site.table_spec(found).unwrap(),
         epsilon: site.epsilon,
-        site_digest: site.digest,
     }
 }
 
@@ -27,7 +26,6 @@ pub fn claim<'a>(site: &'a Site, task: &'a str) -> ExpectedTable<'a> {
         task,
         success: &site.task(task).unwrap().success,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     }
 }
 

@@ -77,7 +77,6 @@ pub fn turning() -> Vec<u8> {
             layout: Layout::Facets,
         },
         epsilon: 0.99,
-        site_digest: [0; 32],
     };
     build(&order, &|| ()).expect("a table that is proven").0
 }
@@ -121,7 +120,6 @@ pub fn corner() -> Vec<u8> {
             layout: Layout::Facets,
         },
         epsilon: 0.99,
-        site_digest: [0; 32],
     };
     build(&order, &|| ()).expect("a table that is proven").0
 }
@@ -271,7 +269,6 @@ fn table(
         },
         spec,
         epsilon,
-        site_digest: [0; 32],
     };
     let cells = spec.cells().expect("the extent is one");
     write(&order, &cells).expect("the format holds the table")

@@ -9,7 +9,7 @@
 #include "measure.h"
 #ifndef EMPTY_LOOP
 #include "posegate.h"
-#include "site_digest.h"
+#include "task_digests.h"
 
 #define CYCLE_MS 10U
 #define CYCLES 1000U
@@ -24,9 +24,9 @@ extern const uint8_t table_wait[];
 extern const uint32_t table_wait_length;
 
 /* The gate evaluates what the tracker carries: the tracker applies the trust in the fixes. */
-#define SETTINGS_OF(name)                                                                          \
+#define SETTINGS_OF(name, digest)                                                                          \
     {.task = name,                                                                                 \
-     .site_digest = SITE_DIGEST,                                                                   \
+     .task_digest = digest,                                                                   \
      .sources = {{.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,    \
                   .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1}},          \
      .source_count = 1U,                                                                           \
@@ -39,7 +39,9 @@ extern const uint32_t table_wait_length;
      .restart = POSEGATE_RESTART_AUTOMATIC,                                                        \
      .look_at_tag = 7U}
 
-static const posegate_settings SETTINGS[3] = {SETTINGS_OF("dock"), SETTINGS_OF("see-t7"), SETTINGS_OF("wait")};
+static const posegate_settings SETTINGS[3] = {
+    SETTINGS_OF("dock", TASK_DIGEST_OF_DOCK), SETTINGS_OF("see-t7", TASK_DIGEST_OF_SEE_T7),
+    SETTINGS_OF("wait", TASK_DIGEST_OF_WAIT)};
 
 static const posegate_tracker_settings TRACKING = {
     .errors = {.m_per_sqrt_m = 0.002, .rad_per_sqrt_rad = 0.01, .rad_per_sqrt_m = 0.005,

@@ -58,7 +58,7 @@ fn evaluations_that_disagree_are_latched() {
     let table = Table::parse(SEE_T7).unwrap();
     let settings = Settings {
         task: table.task(),
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: &SOURCES,
         maximum_age_ms: 200,
         response_ms: 10,
@@ -90,7 +90,7 @@ fn evaluations_that_disagree_are_latched() {
 fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
     Settings {
         task: table.task(),
-        site_digest: table.site_digest(),
+        task_digest: table.task_digest(),
         sources: &SOURCES,
         maximum_age_ms: 200,
         response_ms: 25,

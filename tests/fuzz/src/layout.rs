@@ -36,8 +36,8 @@ pub fn repair(bytes: &mut [u8], to_the_end: bool) {
 pub fn walk(table: &Table<'_>) -> WorstCase {
     let again = Table::parse(table.bytes()).expect("it was parsed before");
     assert_eq!(
-        (again.crc(), again.site_digest()),
-        (table.crc(), table.site_digest())
+        (again.crc(), again.task_digest()),
+        (table.crc(), table.task_digest())
     );
     assert_eq!(again.epsilon().to_bits(), table.epsilon().to_bits());
     assert!(!table.task().is_empty() && !table.tool_version().is_empty());

@@ -34,7 +34,10 @@ pub fn c(_: &Arguments) -> Result {
     ] {
         need::command(command, package)?;
     }
-    ran(suite("--test c_boundary --test c_overlap"), 1)?;
+    ran(
+        suite("--test c_boundary --test c_overlap --test c_sequencer"),
+        1,
+    )?;
     ran(cmd("cargo test -p posegate-peers --test c_header"), 1)?;
     for (compiler, language) in COMPILERS {
         cmd(compiler)
@@ -86,10 +89,41 @@ pub fn c(_: &Arguments) -> Result {
         }
     }
 
+    added_to_a_project(&folder)?;
+
     // The smallest gate opens and closes, and the bench answers, as those in Rust do.
     let tests = suite("--test docking_gate --test uart_replay");
     ran(with_target_folder(tests).env("POSEGATE_FIRMWARE", "c"), 2)?;
     report.finish()
+}
+
+/// Builds a project with its own toolchain that adds `examples/c`, calls the archive, and does not ask for the examples.
+fn added_to_a_project(folder: &Scratch) -> Result {
+    let (project, built) = (folder.join("project"), folder.join("project/build"));
+    std::fs::create_dir_all(&project)?;
+    let examples = std::env::current_dir()?.join("examples/c");
+    let text = format!(
+        "cmake_minimum_required(VERSION 3.21)\nproject(firmware LANGUAGES C)\nset(POSEGATE_TARGET thumbv6m-none-eabi)\n\
+         add_subdirectory({} posegate)\nadd_executable(firmware.elf main.c)\ntarget_link_libraries(firmware.elf PRIVATE posegate)\n\
+         target_link_options(firmware.elf PRIVATE -nostdlib -Wl,-e,main -Wl,--gc-sections)\n",
+        examples.display()
+    );
+    files::write(project.join("CMakeLists.txt"), text)?;
+    let main = "#include \"posegate.h\"\nint main(void) { return posegate_abi_version() != POSEGATE_ABI_VERSION; }\n";
+    files::write(project.join("main.c"), main)?;
+    cmd("cmake -DCMAKE_SYSTEM_NAME=Generic -DCMAKE_C_COMPILER=arm-none-eabi-gcc -DCMAKE_TRY_COMPILE_TARGET_TYPE=STATIC_LIBRARY")
+        .arg("-DCMAKE_C_FLAGS=-mcpu=cortex-m0plus -mthumb")
+        .arg(format!("-DPOSEGATE_CARGO_DIR={}", target_folder().display()))
+        .arg("-S")
+        .arg(&project)
+        .arg("-B")
+        .arg(&built)
+        .run()?;
+    with_target_folder(cmd("cmake --build")).arg(&built).run()?;
+    if !built.join("firmware.elf").is_file() || built.join("posegate/controller.elf").exists() {
+        return Err("a project that adds examples/c has another result".into());
+    }
+    Ok(())
 }
 
 fn with_target_folder(command: Cmd) -> Cmd {

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 const FOLDER: &str = "examples/c/robot";
 const TASKS: [&str; 3] = ["dock", "see-t7", "wait"];
-const DIGEST: &str = "site_digest.h";
+const DIGESTS: &str = "examples/c/robot/task_digests.h";
 
 /// The cores of the program: how a user names them, the emulator with its board and what an instruction takes, the objects of the board,
 /// and where its memories begin if not where the linker script has them.
@@ -140,7 +140,6 @@ pub fn of_board(
     let features = features(parts)?;
     let archive = archive::build(board.core()?, features, level)?;
     let folder = Scratch::new()?;
-    digest(&folder)?;
     let sources = ["main.c", "measure.c", "tables.S"].map(|name| format!("{FOLDER}/{name}"));
     let sources = sources.each_ref().map(String::as_str);
     let (elf, empty) = (folder.join("robot.elf"), folder.join("empty.elf"));
@@ -294,17 +293,23 @@ pub fn features(parts: &str) -> Result<&'static str> {
         .ok_or_else(|| format!("no parts {parts}").into())
 }
 
-/// Writes the header with the digest that the program expects of its tables.
-fn digest(folder: &Scratch) -> Result {
-    let sum = cmd("sha256sum").arg(format!("{FOLDER}/site.toml")).read()?;
-    let bytes: Vec<String> = (0..32)
-        .filter_map(|at| sum.get(2 * at..2 * at + 2))
-        .map(|byte| format!("0x{byte}"))
-        .collect();
-    files::write(
-        folder.join(DIGEST),
-        format!("#define SITE_DIGEST {{{}}}\n", bytes.join(",")),
-    )
+/// Returns the header with the task digests that the program expects of its tables.
+fn digests() -> Result<String> {
+    let mut header =
+        "/* The task digests of the tables in this folder: posegate table info TABLE. */\n"
+            .to_owned();
+    for task in TASKS {
+        let bytes = files::bytes(table(task))?;
+        let digest = bytes.get(96..128).ok_or("a table has a digest")?;
+        let digest: Vec<String> = digest.iter().map(|byte| format!("0x{byte:02x}")).collect();
+        let name = task.to_uppercase().replace('-', "_");
+        writeln!(
+            header,
+            "#define TASK_DIGEST_OF_{name} {{{}}}",
+            digest.join(", ")
+        )?;
+    }
+    Ok(header)
 }
 
 /// Fails if a table of the program is not what the program `posegate` builds of its site file.
@@ -322,6 +327,13 @@ fn tables() -> Result {
         if files::bytes(&committed)? != files::bytes(&fresh)? {
             return Err(format!("{0} is not what its site file makes: posegate table build {FOLDER}/site.toml --task {task} -o {0}", committed.display()).into());
         }
+    }
+    if files::read(DIGESTS)? != digests()? {
+        return Err(format!(
+            "{DIGESTS} does not have the digests of the tables:\n{}",
+            digests()?
+        )
+        .into());
     }
     Ok(())
 }

@@ -60,7 +60,7 @@ impl Starts {
         let found = latched(&[Reason::CodeDamaged]);
         let found_before = latched(&[
             Reason::SelfTestFailed,
-            Reason::TableInvalid,
+            Reason::TableDamaged,
             Reason::MemoryDamaged,
             // A bit of the name or of the digest, in the table or in the settings.
             Reason::WrongTask,

@@ -2,7 +2,7 @@
 
 use super::{Folder, boxes, rewrite, sha256, two_shards};
 use posegate::bake::BakeInput;
-use posegate::table::Table;
+use posegate::table::{Table, checksum};
 use posegate::verify::build;
 use posegate_host::site::Site;
 use serde_json::{Value, json};
@@ -31,9 +31,14 @@ fn wider() -> Vec<u8> {
         success: &task.success,
         spec: wide.chosen_table(task).unwrap(),
         epsilon: wide.epsilon,
-        site_digest: own.digest,
     };
-    build(&order, &|| ()).unwrap().0
+    let mut forged = build(&order, &|| ()).unwrap().0;
+    // The forger writes the digest of the task, and the checksum of the result.
+    let claimed = own.task_digest(&own.tasks["dock-0"]);
+    forged[96..128].copy_from_slice(&claimed);
+    let (content, crc) = forged.split_last_chunk_mut().unwrap();
+    *crc = checksum(content).to_le_bytes();
+    forged
 }
 
 /// Returns a proof file with the size and checksums of another table.
@@ -82,6 +87,7 @@ fn mismatched_table_and_proof_are_neither_kept_nor_merged() {
         "bytes",
         "crc32c",
         "task",
+        "task_digest",
         "site_digest",
         "tool_version",
         "layout",

@@ -27,7 +27,6 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
             success: &task.success,
             spec,
             epsilon: site.epsilon,
-            site_digest: site.digest,
         };
         let bytes = match bake::table(&input, &|| ()) {
             Ok(bytes) => bytes,
@@ -45,6 +44,18 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
             Core::Rv32Imc => "RV32IMC",
         };
         if cycles > f64::from(controller.cycles_per_decision) {
+            // What the file says already is no advice.
+            let mut advice = Vec::new();
+            if table.grid().is_some() {
+                advice.push("use `layout = \"facets\"` instead of cells");
+            }
+            advice.extend([
+                "make the success set simpler",
+                "lengthen the control cycle and `cycles_per_decision`",
+            ]);
+            if controller.cycles_per_instruction.is_none() {
+                advice.push("state `cycles_per_instruction` as measured (it counts as 2)");
+            }
             all.push(warn(
                 "decision_too_long",
                 ["task", name],
@@ -52,8 +63,7 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
                     "a decision on its table may take {cycles:.0} cycles of a {core}; the controller has {} for it",
                     controller.cycles_per_decision
                 ),
-                "use `layout = \"facets\"` instead of cells, make the success set simpler, lengthen the control cycle, or state \
-                 `cycles_per_instruction` as measured",
+                &advice.join("; or "),
             ));
         }
     }

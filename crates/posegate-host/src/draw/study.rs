@@ -366,7 +366,6 @@ fn order<'a>(site: &Site, name: &'a str, task: &'a Task) -> Result<BakeInput<'a>
         success: &task.success,
         spec: spec.ok_or_else(|| StudyError::NoTable(name.into()))?,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     })
 }
 
@@ -385,7 +384,6 @@ fn proven(
         task: name,
         success: &task.success,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let started = Instant::now();
     let proof = verify(&bytes, &claim, progress).map_err(|e| StudyError::Verify(name.into(), e))?;

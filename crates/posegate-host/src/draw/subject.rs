@@ -93,7 +93,7 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// [`DrawError::Table`] if the bytes are not a table, [`DrawError::OtherTable`] if the table belongs
-    /// to another task or site file.
+    /// to another task, or to another set, goal or confidence of it.
     pub fn with_table(mut self, bytes: &'a [u8]) -> Result<Self, DrawError> {
         let table = Table::parse(bytes).map_err(DrawError::Table)?;
         if table.task() != self.name {
@@ -102,9 +102,10 @@ impl<'a> Subject<'a> {
                 table.task()
             )));
         }
-        if table.site_digest() != self.site.digest {
+        if table.task_digest() != self.site.task_digest(self.task) {
             return Err(DrawError::OtherTable(
-                "another site file, or of this one before it changed".into(),
+                "another set, goal or confidence of this task: the site file has changed since"
+                    .into(),
             ));
         }
         self.table = Some(table);

@@ -44,7 +44,6 @@ fn table(site: &Site, name: &str, layout: Layout) -> Vec<u8> {
         success: &task.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     build(&order, &|| ()).unwrap().0
 }

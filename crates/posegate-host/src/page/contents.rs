@@ -190,7 +190,6 @@ fn table(site: &Site, name: &str, task: &Task) -> Result<(Vec<u8>, Proof), Strin
         success: &task.success,
         spec,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     build(&order, &|| ()).map_err(|error| error.to_string())
 }

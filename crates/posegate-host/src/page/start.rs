@@ -88,7 +88,6 @@ mod tests {
                 success: &task.success,
                 spec: site.chosen_table(task).unwrap(),
                 epsilon: site.epsilon,
-                site_digest: site.digest,
             };
             let (bytes, _) = build(&order, &|| ()).unwrap();
             let table = Table::parse(&bytes).unwrap();

@@ -127,7 +127,6 @@ impl TaskTable {
             success: &self.success,
             spec,
             epsilon: site.epsilon,
-            site_digest: site.digest,
         }
     }
 

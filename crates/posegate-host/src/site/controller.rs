@@ -39,14 +39,15 @@ pub struct Controller {
     /// The processor cycles of one control cycle that a decision may take.
     pub cycles_per_decision: u32,
     /// The cycles of an instruction on average, wait states of the flash included: at least 1.
-    pub cycles_per_instruction: f64,
+    /// [`Self::DEFAULT_CYCLES_PER_INSTRUCTION`] if the file does not state them.
+    pub cycles_per_instruction: Option<f64>,
 }
 
 impl Controller {
     /// The cycles of an instruction if a site file gives none.
     pub const DEFAULT_CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
-    /// Returns an upper bound on the cycles of one decision on a table, at [`Self::cycles_per_instruction`].
+    /// Returns an upper bound on the cycles of one decision on a table, by [`Self::cycles_per_instruction`].
     #[must_use]
     pub fn cycles(&self, worst: &WorstCase) -> f64 {
         let instructions = match self.core {
@@ -55,7 +56,8 @@ impl Controller {
             // A step takes a third more than on a Cortex-M4F (`./ci.sh costs`).
             Core::Rv32Imc => worst.instructions_m4f().saturating_mul(2),
         };
-        f64::from(instructions) * self.cycles_per_instruction
+        let each = self.cycles_per_instruction;
+        f64::from(instructions) * each.unwrap_or(Self::DEFAULT_CYCLES_PER_INSTRUCTION)
     }
 }
 
@@ -75,9 +77,9 @@ pub(super) fn controller(node: &Node<'_>) -> Result<Controller, SiteError> {
     Ok(Controller {
         core,
         cycles_per_decision: cycles.whole(1..=u32::MAX)?,
-        cycles_per_instruction: match table.optional(&keys::CYCLES_PER_INSTRUCTION) {
-            Some(node) => node.number()?,
-            None => Controller::DEFAULT_CYCLES_PER_INSTRUCTION,
-        },
+        cycles_per_instruction: table
+            .optional(&keys::CYCLES_PER_INSTRUCTION)
+            .map(|node| node.number())
+            .transpose()?,
     })
 }

@@ -127,6 +127,13 @@ impl Site {
             .collect()
     }
 
+    /// Returns the digest of a task that a controller compares with the one in its table ([`posegate::shape::SuccessSet::digest`]). The rest
+    /// of the file does not change it.
+    #[must_use]
+    pub fn task_digest(&self, task: &Task) -> [u8; 32] {
+        task.success.digest(self.epsilon)
+    }
+
     /// Returns the words that a document made from this site carries: the name of its file without folders, and the first 16 digits
     /// of the digest.
     #[must_use]

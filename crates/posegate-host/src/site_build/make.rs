@@ -23,7 +23,6 @@ pub(super) fn table(site: &Site, recipe: &Recipe, name: &str) -> Result<Files, P
         success: &task.success,
         spec: site.chosen_table(task).ok_or(PieceError::NoExtent)?,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     let (bytes, proof) = build(&input, &|| ())?;
     let record = proof::encode(name, &bytes, proof.into(), recipe)

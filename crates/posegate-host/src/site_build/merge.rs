@@ -318,7 +318,6 @@ fn unproven(table: &[u8], counts: Counts, task: &str, site: &Site) -> Option<Str
         task,
         success: &of.success,
         epsilon: site.epsilon,
-        site_digest: site.digest,
     };
     match verify(table, &expected, &|| ()) {
         Err(why) => Some(format!("{why}")),

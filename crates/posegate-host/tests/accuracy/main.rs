@@ -177,7 +177,6 @@ fn main() -> ExitCode {
             success: &task.success,
             spec,
             epsilon: site.epsilon,
-            site_digest: site.digest,
         };
         let bytes = build(&order, &|| ()).unwrap().0;
         let table = Table::parse(&bytes).unwrap();

@@ -262,7 +262,6 @@ pub fn regions(count: u64, seed: u64) -> bool {
                 layout: Layout::Facets,
             },
             epsilon: 0.99,
-            site_digest: [0; 32],
         };
         let bytes = build(&order, &|| ()).expect("a table").0;
         let table = Table::parse(&bytes).expect("a table");

@@ -193,7 +193,6 @@ pub fn unions(count: u64, seed: u64) -> bool {
                 layout: Layout::Facets,
             },
             epsilon: site.epsilon,
-            site_digest: site.digest,
         };
         let bytes = build(&order, &|| ()).expect("a table").0;
         let table = Table::parse(&bytes).expect("a table");

@@ -17,7 +17,7 @@ use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet};
 use posegate::shape::{ErrorLimit, ErrorModel, Shape, SuccessSet};
 use posegate::table::Table;
-use posegate::verify::{BuildError, ExpectedTable, build, verify};
+use posegate::verify::{BuildError, ExpectedTable, VerifyError, build, verify};
 use posegate_host::site::Site;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -125,7 +125,6 @@ fn empty_sets_have_no_table() {
             success: &task.success,
             spec,
             epsilon: site.epsilon,
-            site_digest: site.digest,
         };
         let (bytes, _) = build(&order, &|| ()).unwrap();
         let proof = |success: &SuccessSet| {
@@ -133,12 +132,22 @@ fn empty_sets_have_no_table() {
                 task: "see-t7",
                 success,
                 epsilon: site.epsilon,
-                site_digest: site.digest,
             };
             verify(&bytes, &claim, &|| ())
         };
-        assert!(proof(&limit(0.2)).is_ok());
-        assert!(proof(&limit(0.05)).is_err(), "{layout:?}");
+        // Every pose is proven, and only then the digest is compared: it is that of another set.
+        let hex = |digest: [u8; 32]| digest.iter().map(|b| format!("{b:02x}")).collect();
+        let other = VerifyError::Header {
+            field: "task digest",
+            found: hex(task.success.digest(site.epsilon)),
+            expected: hex(limit(0.2).digest(site.epsilon)),
+        };
+        assert_eq!(proof(&limit(0.2)), Err(other));
+        let unproven = proof(&limit(0.05));
+        assert!(
+            matches!(unproven, Err(VerifyError::Facet(_) | VerifyError::Cell(_))),
+            "{layout:?}: {unproven:?}"
+        );
     }
 }
 
@@ -305,7 +314,6 @@ fn order<'a>(random: &mut Random, success: &'a SuccessSet) -> BakeInput<'a> {
             layout,
         },
         epsilon: 0.99,
-        site_digest: [7; 32],
     }
 }
 

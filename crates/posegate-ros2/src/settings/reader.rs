@@ -3,7 +3,7 @@
 use super::{Delivery, Serial, SettingsError, hex};
 use crate::arguments::Arguments;
 use crate::parameters::{Parameters, Value};
-use posegate::gate::site_digest;
+use posegate::gate::task_digest;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate::table::Table;
@@ -13,7 +13,7 @@ use posegate_host::site::Site;
 use std::path::Path;
 
 /// Every parameter.
-const NAMES: [&str; 44] = [
+const NAMES: [&str; 45] = [
     "camera",
     "camera_info_reliability",
     "corner_sigma_px",
@@ -54,6 +54,7 @@ const NAMES: [&str; 44] = [
     "site_digest",
     "stands_still",
     "task",
+    "task_digest",
     "use_detections",
     "use_odometry",
     "use_sim_time",
@@ -62,7 +63,7 @@ const NAMES: [&str; 44] = [
 
 /// The parameters of a node with a controller. All others are settings of the gate or of odometry, which such a node
 /// does not have.
-const WITH_CONTROLLER: [&str; 9] = [
+const WITH_CONTROLLER: [&str; 10] = [
     "cycle_ms",
     "frame_id",
     "heartbeat_ms",
@@ -71,6 +72,7 @@ const WITH_CONTROLLER: [&str; 9] = [
     "pose_reliability",
     "site_digest",
     "task",
+    "task_digest",
     "valid_ms",
 ];
 
@@ -229,36 +231,41 @@ impl Reader<'_> {
         table: &Table<'_>,
     ) -> Result<([u8; 32], bool), SettingsError> {
         let expected = "the 64 hexadecimal digits that `posegate table info` prints";
-        let parameter = match self.0.get("site_digest") {
+        // The older name of the parameter.
+        let name = match self.0.get("task_digest") {
+            None => "site_digest",
+            Some(_) => "task_digest",
+        };
+        let parameter = match self.0.get(name) {
             None => None,
             Some(Value::Text(digits)) => Some(digits.as_str()),
-            Some(_) => return Err(self.invalid("site_digest", expected)),
+            Some(_) => return Err(self.invalid(name, expected)),
         };
         let Some(digits) = option.or(parameter) else {
-            return Ok((table.site_digest(), false));
+            return Ok((table.task_digest(), false));
         };
-        let digest = site_digest(digits).ok_or_else(|| SettingsError::Invalid {
-            name: "site_digest",
+        let digest = task_digest(digits).ok_or_else(|| SettingsError::Invalid {
+            name,
             place: if option.is_some() {
-                "--site-digest"
+                "--task-digest"
             } else {
-                self.0.place("site_digest")
+                self.0.place(name)
             }
             .to_owned(),
             given: format!("`{digits}`"),
             expected,
         })?;
-        if digest == table.site_digest() {
+        if digest == table.task_digest() {
             Ok((digest, true))
         } else {
             Err(SettingsError::WrongSite {
-                found: hex(&table.site_digest()),
+                found: hex(&table.task_digest()),
                 expected: digits.to_owned(),
             })
         }
     }
 
-    /// Reads the site file. The table must be made from it.
+    /// Reads the site file. The table must be of its task.
     pub(super) fn site_file(
         &self,
         path: Option<&Path>,
@@ -268,12 +275,15 @@ impl Reader<'_> {
             return Ok(None);
         };
         let site = Site::read(path).map_err(|error| SettingsError::Site(error.to_string()))?;
-        if site.digest == table.site_digest() {
+        let task = site.task(table.task()).ok();
+        let digest = task.map(|task| site.task_digest(task));
+        if digest == Some(table.task_digest()) {
             return Ok(Some(site));
         }
+        let expected = digest.map_or("no such task".into(), |digest| hex(&digest));
         Err(SettingsError::WrongSite {
-            found: hex(&table.site_digest()),
-            expected: format!("{} (of {})", hex(&site.digest), path.display()),
+            found: hex(&table.task_digest()),
+            expected: format!("{expected} (of {})", path.display()),
         })
     }
 

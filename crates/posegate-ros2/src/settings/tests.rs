@@ -182,11 +182,11 @@ fn invalid_parameters_have_their_own_errors() {
         ),
         (format!("{STILL} -p task:=park"), "for the task `dock`"),
         (
-            format!("{STILL} -p site_digest:=abc"),
+            format!("{STILL} -p task_digest:=abc"),
             "64 hexadecimal digits",
         ),
         (
-            format!("--site-digest {other} {STILL}"),
+            format!("--task-digest {other} {STILL}"),
             "another site file",
         ),
     ] {
@@ -197,7 +197,7 @@ fn invalid_parameters_have_their_own_errors() {
         assert!(message.contains(words), "{line}: {message}");
     }
     assert!(
-        settings(&format!("--site-digest {digest} {STILL}"))
+        settings(&format!("--task-digest {digest} {STILL}"))
             .unwrap()
             .site_is_checked
     );

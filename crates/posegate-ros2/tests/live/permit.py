@@ -131,7 +131,7 @@ def refuses():
     for words in [
         [],
         [str(TABLE)],
-        [str(TABLE), "--site-digest", "00" * 32, "--ros-args", "-p", "stands_still:=true"],
+        [str(TABLE), "--task-digest", "00" * 32, "--ros-args", "-p", "stands_still:=true"],
         [str(TABLE), "--ros-args", "-p", "stands_still:=true", "-p", "inflation:=0.1"],
         [__file__, "--ros-args", "-p", "stands_still:=true"],
     ]:

@@ -44,7 +44,7 @@ class PermitWatch : public PermitSource {
   /// Returns nanoseconds of a monotonic clock.
   using Clock = std::function<std::int64_t()>;
 
-  /// `task` is the task that a permit must name; `site` is the digest of the site file, or empty for any.
+  /// `task` is the task that a permit must name; `site` is the task digest of the table, or empty for any.
   explicit PermitWatch(std::string task, std::string site = "", Clock monotonic = steady_ns);
 
   /// Takes a heartbeat at a moment of the system's clock (not of simulated time), nanoseconds since 1970.

@@ -21,7 +21,7 @@
 //! let csv = "t_s,x_m,y_m,yaw_rad\n1.00,0.01,0,0\n1.05,0.11,0,0\n";
 //! let settings = Settings {
 //!     task: "dock",
-//!     site_digest: site.digest,
+//!     task_digest: site.task_digest(site.task("dock")?),
 //!     sources: &[Source { frame: FrameId::of("map"), trust: Trust::FULL, aging: Aging::NONE, motion: MotionBounds::STANDS_STILL }],
 //!     maximum_age_ms: 200,
 //!     response_ms: 20,

@@ -124,6 +124,54 @@ fn digest_is_that_of_the_bytes() {
     );
 }
 
+/// Controllers compare the digest of their task: it changes with what decides on the task, and with nothing else.
+#[test]
+fn task_digest_changes_with_the_task_alone() {
+    const DOCK: &str = include_str!("../../../../../examples/sites/dock.toml");
+    let digests = |text: &str| {
+        let site = Site::parse(text, FILE).expect("sound");
+        ["dock", "see-t7"].map(|task| site.task_digest(site.task(task).expect("a task")))
+    };
+    let [dock, see] = digests(DOCK);
+    assert_ne!(dock, see);
+    let changed = |from: &str, to: &str, which: [bool; 2]| {
+        assert!(DOCK.contains(from), "{from}");
+        let [now_dock, now_see] = digests(&DOCK.replacen(from, to, 1));
+        assert_eq!([now_dock != dock, now_see != see], which, "{from} to {to}");
+    };
+    // A comment, a name, how the table is made, an unused tag, another number of the same value.
+    changed("# A charging dock", "# The charging dock", [false, false]);
+    changed(
+        "[tag.t7]",
+        "[tag.other]\nid = 8\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 9.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\n[tag.t7]",
+        [false, false],
+    );
+    changed("xy = 0.005", "xy = 0.004", [false, false]);
+    changed("x = [-0.1, 0.1]", "x = [-0.2, 0.1]", [false, false]);
+    changed(
+        "kind = \"work\"",
+        "kind = \"work\"\nexpected = { translation = 0.02, yaw_deg = 1.0 }",
+        [false, false],
+    );
+    changed("x = [-0.08, 0.08]", "x = [-0.080, 8e-2]", [false, false]);
+    // The bound of the observation's error is not in the table: it decides nothing there.
+    changed("translation = 0.05", "translation = 0.06", [false, false]);
+    // One task's set and goal; the camera and the tag of one.
+    changed("x = [-0.08, 0.08]", "x = [-0.08, 0.07]", [true, false]);
+    changed("goal = { x = 0.0", "goal = { x = 0.1", [true, false]);
+    changed("d_max = 5.5", "d_max = 5.4", [false, true]);
+    changed("fx = 615.0", "fx = 616.0", [false, true]);
+    changed("mount = { x = 0.25", "mount = { x = 0.26", [false, true]);
+    changed("pose = { x = 4.0", "pose = { x = 4.1", [false, true]);
+    changed(
+        "yaw_deg = 180.0 }",
+        "yaw_deg = 180.0 }\ntolerance = { translation = 0.01, yaw_deg = 0.5 }",
+        [false, true],
+    );
+    // The confidence of all.
+    changed("epsilon = 0.99", "epsilon = 0.999", [true, true]);
+}
+
 #[test]
 fn defaults_and_parts_of_tables() {
     let site = Site::parse("", FILE).expect("an empty site");
