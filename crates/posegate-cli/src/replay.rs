@@ -1,6 +1,7 @@
 //! `posegate replay`: runs a recording through the gate, and through the rules that are in use today.
 
 mod arguments;
+mod bag;
 mod inflation;
 mod input;
 mod odometry;
@@ -19,8 +20,8 @@ use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::set::CrossTerms;
 use posegate::table::Table;
 use posegate_host::draw::replay_picture;
-use posegate_host::files::{FileError, Files, Output};
-use posegate_host::log::recording::{RecordingError, TagLocalizer};
+use posegate_host::files::{Files, Output};
+use posegate_host::log::recording::TagLocalizer;
 use posegate_host::log::replay::{PlayError, Replay, ReplayConfig, play};
 use posegate_host::site::{Site, Task};
 use serde_json::{Map, Value, json};
@@ -36,7 +37,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
     let inflated = Inflated::of(arguments, files, radius.radius_squared())?;
     let mut input = Recorded::open(arguments, files, &site, radius_squared, &inflated)?;
-    let odometry = odometry::odometry(arguments, files)?;
+    let odometry = odometry::odometry(arguments, files, &site)?;
     let trust = arguments.trust(inflated.factors.inflation);
     // A fix that is carried along an odometry has the trust applied already.
     let carried = odometry.is_some();
@@ -169,6 +170,8 @@ fn summary(
         summary["inflation"] = inflated.to_json();
     }
     summary["recording"] = recording(input);
+    summary["child_frames"] = json!(input.recording.diagnostics().child_frames);
+    summary["body_frames"] = input.body_frames();
     if let Some(looks) = &input.part.looks
         && has_detections(input)
     {
@@ -237,12 +240,7 @@ fn table(
 
 fn play_failure(error: PlayError<Failure>) -> Failure {
     match error {
-        PlayError::Recording(RecordingError::Io { file, source }) => FileError::Unread {
-            name: file,
-            cause: source,
-        }
-        .into(),
-        PlayError::Recording(error) => Failure::input(error),
+        PlayError::Recording(error) => bag::failure(error),
         PlayError::NoCamera => Failure::usage(
             "detections need a camera: the site has none, or several".into(),
             "name it: --camera front",

@@ -69,6 +69,10 @@ pub struct Arguments {
     /// The robot's frame in /tf [default: base_link or base_footprint, whichever is the child of the odometry's frame]
     #[arg(long)]
     pub base_frame: Option<String>,
+    /// The frame whose poses are recorded, if it is not the robot's base; may be repeated. At its place in the site ([frame.NAME]) or in the
+    /// bag's /tf_static, else it counts as the base. Also for types without a child frame: the pose of a camera
+    #[arg(long, value_name = "NAME")]
+    pub child_frame: Vec<String>,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
     /// else log times, unless nearly all stamps are of another clock
     #[arg(long, value_enum, default_value = "auto")]

@@ -2,17 +2,20 @@
 
 use super::Arguments;
 use super::arguments::Kind;
+use super::bag;
 use super::inflation::Inflated;
 use crate::site_input::Failure;
 use posegate_host::files::{FileError, Files, Input, Opened};
 use posegate_host::log::corners::MountedCamera;
 use posegate_host::log::recording::{
-    Bag, Format, ReaderDiagnostics, Recording, Role, TagLocalizer, Text, Wanted, format_of,
+    Bag, BodyFrames, Format, ReaderDiagnostics, Recording, Role, TagLocalizer, Text, Wanted,
+    format_of,
 };
 use posegate_host::log::replay::{Clock, Part};
 use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, tum};
 use posegate_host::printable::printable;
 use posegate_host::site::Site;
+use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
 
 /// The largest number of true poses of a topic that are kept.
@@ -27,6 +30,8 @@ pub struct Recorded {
     pub part: Part,
     /// The gate's clock, if the recording's format defines it.
     pub clock: Option<Clock>,
+    /// The places of frames on the robot, if the recording is a bag.
+    body: BodyFrames,
 }
 
 impl Recorded {
@@ -69,6 +74,7 @@ impl Recorded {
             None
         };
         let mut clock = None;
+        let body;
         let recording: Box<dyn Recording + Send> = match format {
             Format::Mcap => {
                 let numbered = (0u8..=255).zip(&arguments.topic);
@@ -82,21 +88,27 @@ impl Recorded {
                     topic,
                     role: Role::Truth,
                 }));
-                Box::new(Bag::new(input, &name, &wanted).with_frames(arguments.frames()))
+                body = bag::body(arguments, files, site, &wanted)?;
+                let bag = Bag::new(input, &name, &wanted).with_frames(arguments.frames());
+                Box::new(bag.with_body(body.clone()))
             }
             Format::Csv => {
                 let gaussian = arguments.set == Kind::Gaussian;
                 let mut text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
                 inflated.reads(&mut text, &name);
+                body = bag::of_site(arguments, site)?;
                 // A recorded time of use is the clock, however far it is from the stamps.
                 clock = Some(if text.has_use() {
                     Clock::Logged
                 } else {
                     Clock::Stamps
                 });
-                Box::new(text)
+                Box::new(text.with_body(body.clone()))
             }
-            Format::Tum => Box::new(Text::tum(input, &name)),
+            Format::Tum => {
+                body = bag::of_site(arguments, site)?;
+                Box::new(Text::tum(input, &name).with_body(body.clone()))
+            }
             _ => return Err(foreign(&name)),
         };
         Ok(Self {
@@ -113,7 +125,15 @@ impl Recorded {
                 outside: 0,
             },
             clock,
+            body,
         })
+    }
+
+    /// Returns the frames of the recorded poses with a known place on the robot: x, y (m) and yaw (rad).
+    pub fn body_frames(&self) -> Value {
+        let frames = self.recording.diagnostics().child_frames.iter();
+        let known = frames.filter_map(|name| Some((name.clone(), json!(self.body.place(name)?))));
+        Value::Object(known.collect())
     }
 }
 
@@ -150,7 +170,7 @@ pub fn topics(diagnostics: &ReaderDiagnostics) -> String {
 }
 
 /// Returns the failure for a bag without --topic, with the bag's topics.
-fn which_topic(input: impl Read, name: &str) -> Failure {
+fn which_topic(input: impl Read + Send, name: &str) -> Failure {
     let mut bag = Bag::new(input, name, &[]);
     while let Ok(Some(_)) = bag.next() {}
     Failure::list(

@@ -1,20 +1,24 @@
 //! The odometry of a replay: a topic of the recording, or a file.
 
-use super::Arguments;
+use super::{Arguments, bag};
 use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
 use posegate_host::files::{Files, Input};
 use posegate_host::log::recording::{
-    Bag, Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
+    Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
 };
 use posegate_host::log::replay::{Odometry, OdometryPose, odometry_csv};
 use posegate_host::log::tum;
 use posegate_host::printable::printable;
-use std::io::BufReader;
+use posegate_host::site::Site;
 
 /// Reads the odometry; `None` without --odom.
-pub fn odometry(arguments: &Arguments, files: &Files) -> Result<Option<Odometry>, Failure> {
+pub fn odometry(
+    arguments: &Arguments,
+    files: &Files,
+    site: &Site,
+) -> Result<Option<Odometry>, Failure> {
     let Some(from) = &arguments.odom else {
         return Ok(None);
     };
@@ -27,7 +31,7 @@ pub fn odometry(arguments: &Arguments, files: &Files) -> Result<Option<Odometry>
     let poses = if from.as_path().is_file() {
         of_file(from, files)?
     } else {
-        of_topic(arguments, &from.as_path().to_string_lossy(), files)?
+        of_topic(arguments, &from.as_path().to_string_lossy(), files, site)?
     };
     let odometry = Odometry::new(poses);
     if odometry.is_empty() {
@@ -61,6 +65,7 @@ fn of_topic(
     arguments: &Arguments,
     topic: &str,
     files: &Files,
+    site: &Site,
 ) -> Result<Vec<OdometryPose>, Failure> {
     if arguments.topic.is_empty() {
         return Err(Failure::usage(
@@ -74,21 +79,20 @@ fn of_topic(
             "name the topic of the odometry",
         ));
     }
-    let opened = files.open(&arguments.log)?;
-    let wanted = Wanted {
+    let wanted = [Wanted {
         topic: topic.to_string(),
         role: Role::Odometry,
-    };
-    let reader = BufReader::with_capacity(1 << 18, opened.reader);
-    let bag = Bag::new(reader, &opened.name, &[wanted]);
-    let mut bag = bag.with_frames(arguments.frames());
+    }];
+    let body = bag::body(arguments, files, site, &wanted)?;
+    let mut bag = bag::open(arguments, files, &wanted)?.with_body(body);
     let mut poses = Vec::new();
-    while let Some(item) = bag.next().map_err(Failure::input)? {
+    while let Some(item) = bag.next().map_err(bag::failure)? {
         if let Item::Truth(pose) = item {
             poses.push((pose.t_s, pose.level()));
         }
     }
     let diagnostics = bag.diagnostics();
+    let name = arguments.log.display();
     if !diagnostics.read.contains_key(topic) {
         let refused = diagnostics.skipped.get(topic);
         let transforms = diagnostics
@@ -105,7 +109,7 @@ fn of_topic(
                 )
             },
         );
-        let (name, topic) = (&opened.name, printable(topic));
+        let topic = printable(topic);
         return Err(Failure::usage(
             match refused {
                 Some(skipped) => format!(
@@ -120,7 +124,7 @@ fn of_topic(
     }
     if poses.is_empty() && !diagnostics.transforms.is_empty() {
         return Err(no_edge(
-            &format!("{}: {} has", opened.name, printable(topic)),
+            &format!("{}: {} has", name, printable(topic)),
             diagnostics,
             arguments,
         ));

@@ -1,5 +1,6 @@
 //! Converts TOML to a [`Site`].
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str;
@@ -16,8 +17,8 @@ use super::syntax::syntax;
 use super::table_keys::TableKeys;
 use super::task::task;
 use super::{
-    Navigation, Planner, Site, SiteCamera, SiteTag, camera, candidate, chain, controller, import,
-    keys, places, planner, poses, tags,
+    Navigation, Planner, Remark, Site, SiteCamera, SiteTag, camera, candidate, chain, controller,
+    import, keys, places, planner, poses, tags,
 };
 use crate::input::{self, Limit};
 use crate::learn::ErrorModel;
@@ -46,7 +47,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
 }
 
 /// The sections of a site file.
-const SECTIONS: [&Key; 15] = [
+const SECTIONS: [&Key; 16] = [
     &keys::CAMERAS,
     &keys::TAGS,
     &keys::CANDIDATES,
@@ -61,6 +62,7 @@ const SECTIONS: [&Key; 15] = [
     &keys::WALLS,
     &keys::ERROR_MODELS,
     &keys::GOALS,
+    &keys::FRAMES,
     &keys::IMPORTS,
 ];
 
@@ -99,16 +101,21 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
             None => Ok(()),
         }
     })?;
+    let frames = entries(root, &keys::FRAMES, &keys::FRAME, |_, node| {
+        poses::pose3(node)
+    })?;
     let (error_formulas, error_models) = split_models(parts.error_models);
     Ok(Site {
         digest: digest(sha256, parts.files.iter().map(|file| &file.digest)),
         files: parts.files.into_iter().map(|file| file.path).collect(),
         cameras: parts.cameras,
+        remarks: parts.remarks,
         tags: parts.tags,
         candidates,
         tasks,
         walls: parts.walls.into_values().collect(),
         goals: parts.goals,
+        frames,
         chains,
         navigation,
         planner: planner.unwrap_or_default(),
@@ -154,20 +161,32 @@ struct NamedParts {
     goals: BTreeMap<String, PoseDeg>,
     /// Calibrations in the order of the cameras' names, then imports, then learnt error models.
     files: Vec<NamedFile>,
+    /// What the files do not say.
+    remarks: Vec<Remark>,
 }
 
 impl NamedParts {
     /// Reads the sections without tasks, and the imports.
     fn read(root: &Table<'_>) -> Result<Self, SiteError> {
-        let cameras = entries(root, &keys::CAMERAS, &keys::CAMERA, |_, node| {
-            camera::camera(node)
+        let mut remarks = Vec::new();
+        let noted = RefCell::new(&mut remarks);
+        let cameras = entries(root, &keys::CAMERAS, &keys::CAMERA, |name, node| {
+            let mut notes = Vec::new();
+            let camera = camera::camera(node, &mut notes)?;
+            noted
+                .borrow_mut()
+                .extend(notes.into_iter().map(|note| Remark {
+                    about: ["camera", name].map(str::to_owned),
+                    note,
+                }));
+            Ok(camera)
         })?;
         let (cameras, calibrations) = split_files(cameras);
         let mut tags = entries(root, &keys::TAGS, &keys::TAG, |_, node| tags::tag(node))?;
         let mut goals = entries(root, &keys::GOALS, &keys::ONE_GOAL, |_, node| {
             poses::pose2(node)
         })?;
-        let imports = import::imports(root, &mut tags, &mut goals)?;
+        let imports = import::imports(root, &mut tags, &mut goals, &mut remarks)?;
         let walls = entries(root, &keys::WALLS, &keys::WALL, places::wall)?;
         let reach = reach(&cameras);
         let models = entries(
@@ -184,6 +203,7 @@ impl NamedParts {
             walls,
             error_models,
             goals,
+            remarks,
             files: files.chain(learnt).collect(),
         })
     }

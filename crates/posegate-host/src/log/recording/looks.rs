@@ -103,6 +103,7 @@ impl TagLocalizer {
             },
             truth: None,
             since_fix_ms: None,
+            lever_m: 0.0,
         })
     }
 

@@ -21,27 +21,32 @@
 //! # Ok::<(), posegate_host::log::recording::RecordingError>(())
 //! ```
 
-pub use self::bag::{Bag, Role, Wanted};
+pub use self::body::BodyFrames;
 pub use self::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::findings::Findings;
+pub use self::intake::{Role, Wanted};
 pub use self::kind::{Format, format_of};
 pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
+pub use self::storage::Bag;
 pub use self::text::Text;
 pub use self::transforms::FrameNames;
 
-mod bag;
+mod body;
 mod cdr;
 mod diagnostics;
 mod findings;
+mod intake;
 mod kind;
 mod layout;
 mod looks;
+mod mcap_file;
 mod message;
+mod storage;
 mod text;
 mod transforms;
 
-pub(crate) use self::bag::yaw_of;
+pub(crate) use self::intake::yaw_of;
 
 use super::LogError;
 use super::tum::TumError;
@@ -70,6 +75,9 @@ pub struct Sample {
     pub truth: Option<[f64; 3]>,
     /// The time since the last fix of the source, milliseconds, rounded up; `None` if it is not known.
     pub since_fix_ms: Option<u32>,
+    /// How far the frame of the recorded pose is from the robot's vertical axis, metres. The pose and its covariance are those of the
+    /// base; what the covariance's derivative leaves out grows with this lever.
+    pub lever_m: f64,
 }
 
 /// Times in nanoseconds.
@@ -150,6 +158,28 @@ pub enum RecordingError {
     /// A fault in a trajectory.
     #[error(transparent)]
     Tum(#[from] TumError),
+    /// A pose is that of a frame with an unknown place on the robot.
+    #[error(
+        "the topic {topic} has poses of the frame `{child}`, and its place on the robot is not known"
+    )]
+    ChildFrame {
+        /// The topic.
+        topic: String,
+        /// The child frame that a message names.
+        child: String,
+        /// The frames with a known place.
+        known: String,
+    },
+    /// A covariance without all its terms is that of a frame beside the robot's base.
+    #[error(
+        "the topic {topic} has poses of the frame `{child}`, and covariances without cross terms: that of the base does not follow"
+    )]
+    PartialCovariance {
+        /// The topic.
+        topic: String,
+        /// The child frame that a message names.
+        child: String,
+    },
     /// The bytes cannot be read.
     #[error("{file}: {source}")]
     Io {

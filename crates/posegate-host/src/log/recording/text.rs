@@ -1,6 +1,8 @@
 //! CSV and TUM files as streams of estimates.
 
+use super::body::{Body, BodyFrames};
 use super::diagnostics::ReaderDiagnostics;
+use super::intake::sample_of_base;
 use super::{Item, Recording, RecordingError, Sample};
 use crate::input::Lines as Limited;
 use crate::log::estimates::Rows;
@@ -19,6 +21,7 @@ pub struct Text<R: Read> {
     diagnostics: ReaderDiagnostics,
     bytes: Arc<AtomicU64>,
     covariance: bool,
+    body: BodyFrames,
 }
 
 enum Lines<R: Read> {
@@ -101,7 +104,15 @@ impl<R: Read> Text<R> {
             diagnostics: ReaderDiagnostics::default(),
             bytes,
             covariance,
+            body: BodyFrames::default(),
         }
+    }
+
+    /// Gives the places of frames on the robot: the poses are those of a frame that the user names.
+    #[must_use]
+    pub fn with_body(mut self, body: BodyFrames) -> Self {
+        self.body = body;
+        self
     }
 }
 
@@ -153,7 +164,9 @@ impl<R: Read> Recording for Text<R> {
                 }
             },
         };
-        Ok(Some(Item::Estimate(sample)))
+        // A text names no frame; one that the user names has a place, or is the base.
+        let body = self.body.body(None, true).unwrap_or(Body::Base);
+        Ok(Some(Item::Estimate(sample_of_base(sample, body))))
     }
 
     fn diagnostics(&self) -> &ReaderDiagnostics {
@@ -186,6 +199,7 @@ fn of_row(row: &Row, covariance: bool) -> Sample {
         belief,
         truth: row.truth,
         since_fix_ms: row.since_fix_s.and_then(milliseconds),
+        lever_m: 0.0,
     }
 }
 
@@ -205,5 +219,6 @@ fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
         },
         truth: None,
         since_fix_ms: None,
+        lever_m: 0.0,
     }
 }

@@ -295,6 +295,14 @@ impl<'a> Replay<'a> {
                 yaw_rad,
             });
         }
+        if sample.lever_m > 0.0 {
+            let trust = self.trust(sample);
+            let inflation = f64::from(trust.map_or(0, |trust| trust.inflation.q16())) / 65536.0;
+            let radius_squared = f64::from(self.judge.radius_squared().q16()) / 65536.0;
+            belief.spread = belief
+                .spread
+                .map(|spread| of_base(spread, sample.lever_m, radius_squared * inflation));
+        }
         let frame = sample
             .frame
             .as_ref()
@@ -306,6 +314,19 @@ impl<'a> Replay<'a> {
             stamp_ms: stamp_ms(sample).unwrap_or(0),
             belief,
         }
+    }
+
+    /// Returns the trust in a sample's source; `None` if the source is not known.
+    fn trust(&self, sample: &Sample) -> Option<Trust> {
+        let source = self
+            .setup
+            .settings
+            .sources
+            .get(usize::from(sample.source))?;
+        Some(self.carry.as_ref().map_or_else(
+            || source.trust_after(sample.since_fix_ms),
+            |carry| carry.trust,
+        ))
     }
 
     /// Returns the time when a sample was recorded if the gate uses that clock, or NaN if the sample has no such time.
@@ -624,6 +645,49 @@ impl<'a> Replay<'a> {
     #[must_use]
     pub fn summary(&self) -> serde_json::Value {
         summary::summary(self)
+    }
+}
+
+/// Returns the uncertainty of the base from that of a frame at a distance from the base's vertical axis. `radius_squared` is that of
+/// the pose-set, with the source's inflation.
+///
+/// A bound grows by the chord of the largest turn. A covariance has the derivative of the step already; what the derivative leaves out
+/// is at most `lever yaw^2 / 2` with the largest turn of the set, and a disc of that size is added: a sum of ellipsoids lies in
+/// `(1 + k) A + (1 + 1 / k) B` for every k above 0.
+fn of_base(spread: Uncertainty, lever_m: f64, radius_squared: f64) -> Uncertainty {
+    match spread {
+        Uncertainty::Bounded {
+            translation_m,
+            yaw_rad,
+        } => {
+            let turn = yaw_rad.min(core::f64::consts::PI);
+            Uncertainty::Bounded {
+                translation_m: translation_m + 2.0 * lever_m * libm::sin(0.5 * turn),
+                yaw_rad,
+            }
+        }
+        Uncertainty::Gaussian(mut rows) => {
+            let variance = rows[2][2];
+            let left_out = 0.5 * lever_m * radius_squared * variance;
+            let added = left_out * left_out / radius_squared;
+            let own = rows[0][0].min(rows[1][1]);
+            let best = libm::sqrt(added / own);
+            let share = if best > 0.0 && best.is_finite() {
+                best
+            } else {
+                1.0
+            };
+            // Without a turn, or without a valid covariance, nothing is added.
+            if added > 0.0 && added.is_finite() {
+                for entry in rows.as_flattened_mut() {
+                    *entry *= 1.0 + share;
+                }
+                for axis in [0, 1] {
+                    rows[axis][axis] += (1.0 + 1.0 / share) * added;
+                }
+            }
+            Uncertainty::Gaussian(rows)
+        }
     }
 }
 
