@@ -701,6 +701,18 @@ enum posegate_reason
      * The fixes contradict the errors that the source claims.
      */
     POSEGATE_REASON_MODEL_CONTRADICTED = 43,
+    /**
+     * Two poses of the robot fit the corners of a tag, and not both are inside.
+     */
+    POSEGATE_REASON_TAG_POSES_AMBIGUOUS = 44,
+    /**
+     * No pose of the robot fits the corners of the tags.
+     */
+    POSEGATE_REASON_CORNERS_DO_NOT_FIT = 45,
+    /**
+     * A detected tag has fewer than four corners.
+     */
+    POSEGATE_REASON_TOO_FEW_CORNERS = 46,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -109,6 +109,12 @@ pub enum Reason {
     TooCostly = 42,
     /// The fixes contradict the errors that the source claims.
     ModelContradicted = 43,
+    /// Two poses of the robot fit the corners of a tag, and not both are inside.
+    TagPosesAmbiguous = 44,
+    /// No pose of the robot fits the corners of the tags.
+    CornersDoNotFit = 45,
+    /// A detected tag has fewer than four corners.
+    TooFewCorners = 46,
 }
 
 /// Makes [`Reason::ALL`] and the texts of each reason: its variant, its name in `snake_case`, what to do in a form for programs, a sentence that says what
@@ -117,7 +123,7 @@ macro_rules! reasons {
     ($($variant:ident $name:literal $advice:ident $meaning:literal $action:literal;)+) => {
         impl Reason {
             /// Every reason, in the order of the codes.
-            pub const ALL: [Self; 43] = [$(Self::$variant),+];
+            pub const ALL: [Self; 46] = [$(Self::$variant),+];
 
             /// Returns the name in `snake_case`, the same in every output.
             #[must_use]
@@ -282,6 +288,15 @@ reasons! {
     ModelContradicted "model_contradicted" Service
         "The fixes differ from the predictions by more than the errors that the source claims: a camera was knocked, a tag has moved, or the claimed covariance is too small."
         "Service: check camera, tags and calibration, and learn the error model again; then reset the monitor.";
+    TagPosesAmbiguous "tag_poses_ambiguous" Relocalise
+        "The corners of the tag fit two poses of the robot, or more, and the task does not succeed from all of them: a small tag, seen head-on, looks the same from both sides of its normal."
+        "Relocalise: look at a second tag in the same image, at a larger tag, from nearer, or at the tag from an angle (psi_min_deg).";
+    CornersDoNotFit "corners_do_not_fit" Service
+        "No pose of the robot fits the detected corners within the noise of the detector: a tag has another size or place than in the site, or the camera another calibration or mount."
+        "Service: measure the tag's size (the black border's outer edge) and its place, and compare calibration, image (rect or raw) and mount of the camera with the site.";
+    TooFewCorners "too_few_corners" Service
+        "A detected tag has fewer than four corners that are finite numbers, so no pose follows from it."
+        "Service: make the detector report all four corners of each tag, in pixels.";
 }
 
 impl Reason {
@@ -343,6 +358,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(44), None);
+        assert_eq!(Reason::from_code(47), None);
     }
 }

@@ -13,7 +13,7 @@ pub use self::arguments::Arguments;
 use self::inflation::Inflated;
 use self::input::Recorded;
 use self::outputs::Outputs;
-use self::words::{check_requested, no_estimates, recording, sentences};
+use self::words::{check_requested, check_topics, no_estimates, recording, sentences};
 use crate::site_input::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
@@ -87,6 +87,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     played.map_err(play_failure)?;
     let diagnostics = input.recording.diagnostics();
     let [permits, estimates] = replay.permits();
+    if !arguments.topic.is_empty() {
+        check_topics(arguments, diagnostics)?;
+    }
     if estimates == 0 {
         return Err(no_estimates(arguments, diagnostics, input.part.outside));
     }
@@ -172,6 +175,7 @@ fn summary(
     summary["recording"] = recording(input);
     summary["child_frames"] = json!(input.recording.diagnostics().child_frames);
     summary["body_frames"] = input.body_frames();
+    summary["truth"]["duplicates"] = json!(input.duplicates);
     if let Some(looks) = &input.part.looks
         && has_detections(input)
     {

@@ -36,7 +36,8 @@ impl Limit {
     };
     /// A camera's calibration.
     pub const CALIBRATION: Self = Self {
-        bytes: MIB,
+        // PhotonVision adds its observations.
+        bytes: 16 * MIB,
         help: "check that it is the correct file; a calibration has some kilobytes",
     };
     /// A finished part or a manifest of a site build.

@@ -3,14 +3,28 @@
 use super::Arguments;
 use super::arguments::{Kind, Terms};
 use crate::site_input::Failure;
-use posegate_host::files::{FileError, Files};
-use posegate_host::log::recording::{Bag, BodyFrames, Recording, RecordingError, Role, Wanted};
+use posegate_host::files::{FileError, Files, Input};
+use posegate_host::log::recording::{
+    BAD_FOLDER, Bag, BagFile, BodyFrames, Recording, RecordingError, Role, Wanted, files_of,
+};
 use posegate_host::printable::printable;
 use posegate_host::site::Site;
-use std::io::BufReader;
 
 /// The topic of static transforms.
 const STATIC: &str = "/tf_static";
+
+/// Returns the files of a bag, each registered as an input: the file itself, or those of a folder.
+pub fn parts(files: &Files, input: &Input) -> Result<Vec<BagFile<'static>>, Failure> {
+    if input.is_standard() {
+        let opened = files.open(input)?;
+        return Ok(vec![BagFile::Stream(opened.reader, opened.name)]);
+    }
+    let paths = files_of(input.as_path()).map_err(|fault| Failure::usage(fault, BAD_FOLDER))?;
+    for path in &paths {
+        files.register(path)?;
+    }
+    Ok(paths.into_iter().map(BagFile::Path).collect())
+}
 
 /// Opens the recording as a bag, with the names of its frames.
 pub fn open(
@@ -18,9 +32,8 @@ pub fn open(
     files: &Files,
     wanted: &[Wanted],
 ) -> Result<Bag<'static>, Failure> {
-    let opened = files.open(&arguments.log)?;
-    let reader = BufReader::with_capacity(1 << 18, opened.reader);
-    Ok(Bag::new(reader, &opened.name, wanted).with_frames(arguments.frames()))
+    let bag = Bag::of_files(parts(files, &arguments.log)?, wanted);
+    Ok(bag.with_frames(arguments.frames()))
 }
 
 /// Returns the places of frames on the robot: those of the site and, if the poses of the wanted topics need others, those of the bag's
@@ -134,6 +147,10 @@ pub fn failure(error: RecordingError) -> Failure {
         RecordingError::PartialCovariance { .. } => Failure::usage(
             error.to_string(),
             "give poses of the base, a source that fills its covariance (--cross-terms filled), or --set bounded",
+        ),
+        RecordingError::NotABag { .. } => Failure::usage(
+            error.to_string(),
+            "record it again, or copy it again; `ros2 bag reindex` mends a folder's list of files",
         ),
         error => Failure::input(error),
     }

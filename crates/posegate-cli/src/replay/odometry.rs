@@ -1,5 +1,6 @@
 //! The odometry of a replay: a topic of the recording, or a file.
 
+use super::input::topics;
 use super::{Arguments, bag};
 use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
@@ -9,7 +10,7 @@ use posegate_host::log::recording::{
     Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
 };
 use posegate_host::log::replay::{Odometry, OdometryPose, odometry_csv};
-use posegate_host::log::tum;
+use posegate_host::log::trajectories;
 use posegate_host::printable::printable;
 use posegate_host::site::Site;
 
@@ -47,14 +48,13 @@ fn of_file(from: &Input, files: &Files) -> Result<Vec<OdometryPose>, Failure> {
     let (bytes, name) = files.read(from)?;
     match format_of(&bytes) {
         Format::Csv => odometry_csv(bytes.as_slice(), &name).map_err(Failure::input),
-        Format::Tum => {
-            // A comment may have another encoding; numbers have none.
-            let text = String::from_utf8_lossy(&bytes);
-            let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
-            Ok(poses.iter().map(|pose| (pose.t_s, pose.level())).collect())
+        Format::Tum | Format::Euroc => {
+            let found = trajectories::read(&bytes, &name, None).map_err(Failure::input)?;
+            let poses = found.poses.iter();
+            Ok(poses.map(|pose| (pose.t_s, pose.level())).collect())
         }
         _ => Err(Failure::usage(
-            format!("--odom {name} is neither TUM nor CSV"),
+            format!("--odom {name} is not TUM, EuRoC or CSV"),
             "name a topic of the recording, or give a file with poses and times",
         )),
     }
@@ -70,7 +70,7 @@ fn of_topic(
     if arguments.topic.is_empty() {
         return Err(Failure::usage(
             format!("--odom {topic}: there is no such file"),
-            "give a TUM file or a CSV; topics are those of MCAP files",
+            "give a TUM file or a CSV; topics are those of bags",
         ));
     }
     if arguments.topic.iter().any(|known| known == topic) {
@@ -110,17 +110,23 @@ fn of_topic(
             },
         );
         let topic = printable(topic);
-        return Err(Failure::usage(
-            match refused {
-                Some(skipped) => format!(
+        return Err(match refused {
+            Some(skipped) => Failure::usage(
+                format!(
                     "{name}: the topic {topic} is not an odometry: {} ({})",
                     skipped.why.name(),
                     printable(&skipped.schema)
                 ),
-                None => format!("{name} has no topic {topic}"),
-            },
-            &help,
-        ));
+                &help,
+            ),
+            None => Failure::list(
+                &format!(
+                    "{name} has no topic {topic}; it has:{}",
+                    topics(diagnostics)
+                ),
+                &help,
+            ),
+        });
     }
     if poses.is_empty() && !diagnostics.transforms.is_empty() {
         return Err(no_edge(

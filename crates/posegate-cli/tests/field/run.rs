@@ -1,6 +1,7 @@
 //! Runs the program in a folder with the files of a case.
 
 use serde_json::Value;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// A folder with the files of a case.
@@ -23,6 +24,10 @@ impl Case {
             std::fs::write(path, bytes).expect("a file");
         }
         Self(folder)
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.path()
     }
 
     pub fn run(&self, arguments: &str) -> Ended {

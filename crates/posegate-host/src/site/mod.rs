@@ -44,6 +44,7 @@ pub use self::places::pose_line;
 pub use self::planner::{GeneratedLook, Planner};
 pub use self::sample::SAMPLE;
 pub use self::suggest::{question, similar};
+pub(crate) use self::yaml::texts as yaml_texts;
 
 mod calibration;
 mod camera;

@@ -46,9 +46,13 @@ impl Findings {
         } else {
             self.time_not_finite += 1;
         }
-        self.pose_not_finite += u64::from(!(is_finite(&sample.belief) && sample.z_m.is_finite()));
-        self.quaternion_not_unit += u64::from(!is_unit(&sample.belief.heading));
-        self.without_covariance += u64::from(sample.belief.spread.is_none());
+        // A detection without a pose has its own reason.
+        if sample.fault.is_none() {
+            let is_finite = is_finite(&sample.belief) && sample.z_m.is_finite();
+            self.pose_not_finite += u64::from(!is_finite);
+            self.quaternion_not_unit += u64::from(!is_unit(&sample.belief.heading));
+            self.without_covariance += u64::from(sample.belief.spread.is_none());
+        }
         if let Some(frame) = &sample.frame
             && frame.trim_start_matches('/') != world.trim_start_matches('/')
         {

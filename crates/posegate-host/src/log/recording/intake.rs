@@ -4,12 +4,16 @@
 
 use super::body::{Body, BodyFrames};
 use super::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
+use super::kind::{Format, format_of};
 use super::message::{Content, Encoding, Kind, Message, decoded};
 use super::transforms::{Composer, FrameNames, Pose, Transform};
+use super::whole::Unpacked;
 use super::{Exact, Item, RecordingError, Sample, TruePose};
+use crate::log::mcap::chunk::LARGEST;
 use posegate::report::{Heading, PoseEstimate, ros::PoseWithCovariance};
 use posegate::set::Uncertainty;
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::sync::Arc;
 
 /// The most bytes of schemas and channels that are stored.
@@ -150,6 +154,12 @@ impl Intake {
         Ok(())
     }
 
+    /// Returns `true` if the messages of a channel are decoded.
+    pub fn reads(&self, channel: u32) -> bool {
+        let channel = self.channels.get(&channel);
+        channel.is_some_and(|channel| matches!(channel.used, Use::Read { .. }))
+    }
+
     fn open(&mut self, id: u32, topic: &str, schema: u32, encoding: &str) {
         let mut schema = self.schemas.get_mut(&schema);
         let wanted = self.wanted.iter().find(|w| w.topic == topic);
@@ -211,6 +221,18 @@ impl Intake {
             *count += 1;
         }
         let topic = channel.topic.clone();
+        // rosbag2 may compress each message by itself. No message begins like a frame.
+        let mut unpacked = Vec::new();
+        let mut data = data;
+        if encoding == Encoding::Cdr && format_of(data) == Format::Zstd {
+            let longest = LARGEST as u64;
+            let read = Unpacked::new(data).take(longest).read_to_end(&mut unpacked);
+            if let Err(why) = read {
+                self.undecodable(|| format!("{topic}: {why}"));
+                return Ok(None);
+            }
+            data = &unpacked;
+        }
         match decoded(kind, encoding, data) {
             Ok(message) => self.item(&topic, message, role, logged_ns),
             Err(why) => {
@@ -348,6 +370,9 @@ impl Intake {
                 truth: None,
                 since_fix_ms: None,
                 lever_m,
+                other: None,
+                is_ambiguous: false,
+                fault: None,
             }),
             _ => Item::Truth(TruePose {
                 t_s,

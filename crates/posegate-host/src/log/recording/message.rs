@@ -1,4 +1,4 @@
-//! ROS 2 messages from CDR: poses and detections.
+//! ROS messages from CDR (ROS 2) or ROS 1's encoding: poses and detections.
 
 use super::cdr::{BadCdr, Cdr};
 use super::layout::{layout, short};
@@ -44,6 +44,10 @@ impl Kind {
     /// Returns the kind with a name, with or without `/msg/`.
     pub(super) fn of(name: &str) -> Option<Self> {
         let name = short(name);
+        // Before tf2.
+        if name == "tf/tfMessage" {
+            return Some(Self::Transforms);
+        }
         Self::ALL
             .into_iter()
             .find(|kind| short(kind.name()) == name)
@@ -67,7 +71,8 @@ impl Kind {
             // The header of ROS 1 begins with a counter, and its time is unsigned; the layout does not show the sign of a time.
             Encoding::Ros1 => ros2.replacen("int32 uint32", "uint32 int32 uint32", 1),
         };
-        layout(definition, self.name()) == Some(fields)
+        layout(definition, self.name()).as_ref() == Some(&fields)
+            || self == Self::Transforms && layout(definition, "tf/tfMessage") == Some(fields)
     }
 }
 

@@ -6,7 +6,8 @@ use super::intake::sample_of_base;
 use super::{Item, Recording, RecordingError, Sample};
 use crate::input::Lines as Limited;
 use crate::log::estimates::Rows;
-use crate::log::tum::numbers;
+use crate::log::trajectories;
+use crate::log::tum::{Stamped, TumError, numbers};
 use crate::log::{Columns, Row};
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
@@ -31,6 +32,7 @@ enum Lines<R: Read> {
         line: Vec<u8>,
         number: usize,
     },
+    Poses(std::vec::IntoIter<Stamped>),
 }
 
 /// A reader that counts bytes.
@@ -74,7 +76,7 @@ impl<R: Read> Text<R> {
     pub fn has_use(&self) -> bool {
         match &self.lines {
             Lines::Csv(rows) => rows.has_use(),
-            Lines::Tum { .. } => false,
+            Lines::Tum { .. } | Lines::Poses(_) => false,
         }
     }
 
@@ -82,7 +84,7 @@ impl<R: Read> Text<R> {
     pub fn reads_since_fix(&mut self, column: &str) -> bool {
         match &mut self.lines {
             Lines::Csv(rows) => rows.reads_since_fix(column),
-            Lines::Tum { .. } => false,
+            Lines::Tum { .. } | Lines::Poses(_) => false,
         }
     }
 
@@ -95,6 +97,21 @@ impl<R: Read> Text<R> {
             number: 0,
         };
         Self::of(lines, file, bytes, false)
+    }
+
+    /// Returns a reader of a trajectory in any format: estimates without a covariance.
+    ///
+    /// # Errors
+    /// As [`trajectories::read`].
+    pub fn trajectory(
+        text: &[u8],
+        file: &str,
+        times: Option<trajectories::Named<'_>>,
+    ) -> Result<Self, TumError> {
+        let found = trajectories::read(text, file, times)?;
+        let bytes = Arc::new(AtomicU64::new(text.len() as u64));
+        let lines = Lines::Poses(found.poses.into_iter());
+        Ok(Self::of(lines, file, bytes, false))
     }
 
     fn of(lines: Lines<R>, file: &str, bytes: Arc<AtomicU64>, covariance: bool) -> Self {
@@ -128,6 +145,10 @@ fn counted<R: Read>(input: R) -> (Counted<R>, Arc<AtomicU64>) {
 impl<R: Read> Recording for Text<R> {
     fn next(&mut self) -> Result<Option<Item>, RecordingError> {
         let sample = match &mut self.lines {
+            Lines::Poses(poses) => match poses.next() {
+                None => return Ok(None),
+                Some(pose) => of_pose(&pose),
+            },
             Lines::Csv(rows) => match rows.next() {
                 None => return Ok(None),
                 Some(row) => of_row(&row?, self.covariance),
@@ -200,7 +221,15 @@ fn of_row(row: &Row, covariance: bool) -> Sample {
         truth: row.truth,
         since_fix_ms: row.since_fix_s.and_then(milliseconds),
         lever_m: 0.0,
+        other: None,
+        is_ambiguous: false,
+        fault: None,
     }
+}
+
+fn of_pose(pose: &Stamped) -> Sample {
+    let (p, q) = (pose.position, pose.rotation);
+    of_numbers([pose.t_s, p.x, p.y, p.z, q.i, q.j, q.k, q.w])
 }
 
 fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
@@ -220,5 +249,8 @@ fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
         truth: None,
         since_fix_ms: None,
         lever_m: 0.0,
+        other: None,
+        is_ambiguous: false,
+        fault: None,
     }
 }

@@ -95,7 +95,7 @@ use crate::log::{clock_ms, factor};
 use posegate::contain::Margin;
 use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
-use posegate::report::{FrameId, Heading, Report};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::InputError;
 use posegate::set::{Trust, Uncertainty};
 use posegate::shape::SuccessSet;
@@ -288,7 +288,23 @@ impl<'a> Replay<'a> {
 
     /// Returns the report of a sample. Its sequence number is not set yet.
     fn report(&self, sample: &Sample) -> Report {
-        let mut belief = sample.belief;
+        let belief = self.spread(&sample.belief, sample);
+        let frame = sample
+            .frame
+            .as_ref()
+            .map_or(self.world, |name| FrameId::of(name));
+        Report {
+            source: sample.source,
+            frame,
+            sequence: 0,
+            stamp_ms: stamp_ms(sample).unwrap_or(0),
+            belief,
+        }
+    }
+
+    /// Returns a pose of a sample with the uncertainty that the gate uses.
+    fn spread(&self, belief: &PoseEstimate, sample: &Sample) -> PoseEstimate {
+        let mut belief = *belief;
         if let Some([translation_m, yaw_rad]) = self.setup.bounded {
             belief.spread = Some(Uncertainty::Bounded {
                 translation_m,
@@ -303,17 +319,7 @@ impl<'a> Replay<'a> {
                 .spread
                 .map(|spread| of_base(spread, sample.lever_m, radius_squared * inflation));
         }
-        let frame = sample
-            .frame
-            .as_ref()
-            .map_or(self.world, |name| FrameId::of(name));
-        Report {
-            source: sample.source,
-            frame,
-            sequence: 0,
-            stamp_ms: stamp_ms(sample).unwrap_or(0),
-            belief,
-        }
+        belief
     }
 
     /// Returns the trust in a sample's source; `None` if the source is not known.
@@ -357,20 +363,41 @@ impl<'a> Replay<'a> {
             || source.trust_after(sample.since_fix_ms),
             |carry| carry.trust,
         );
-        let set = report.belief.pose_set(self.judge.radius_squared(), trust);
+        if let Some(reason) = sample.fault {
+            return Verdict::deny(reason);
+        }
         let movement = self
             .setup
             .settings
             .movement(source.motion, now.wrapping_sub(stamp));
-        let set = set.map(|set| set.grown(movement));
-        if self.setup.examined {
-            return self.judge.evaluate(now, stamp, set);
+        let verdict = |belief: &PoseEstimate| {
+            let set = belief.pose_set(self.judge.radius_squared(), trust);
+            let set = set.map(|set| set.grown(movement));
+            if self.setup.examined {
+                return self.judge.evaluate(now, stamp, set);
+            }
+            match self.judge.permits(now, stamp, set) {
+                Ok(()) => Verdict::Permit {
+                    margin: Margin::ONE,
+                },
+                Err(reason) => Verdict::deny(reason),
+            }
+        };
+        let best = verdict(&report.belief);
+        if !sample.is_ambiguous {
+            return best;
         }
-        match self.judge.permits(now, stamp, set) {
-            Ok(()) => Verdict::Permit {
-                margin: Margin::ONE,
-            },
-            Err(reason) => Verdict::deny(reason),
+        let other = sample.other.as_ref();
+        let other = other.map(|other| verdict(&self.spread(other, sample)));
+        // Permitted only from both poses, with the smaller margin.
+        match (best, other) {
+            (Verdict::Permit { margin }, Some(Verdict::Permit { margin: of_other })) => {
+                Verdict::Permit {
+                    margin: margin.min(of_other),
+                }
+            }
+            (Verdict::Permit { margin }, None) => Verdict::Permit { margin },
+            _ => Verdict::deny(Reason::TagPosesAmbiguous),
         }
     }
 
@@ -415,14 +442,26 @@ impl<'a> Replay<'a> {
     }
 
     /// Passes a fix to the gate: unchanged, with the time since the source's last fix, or carried along the odometry.
-    fn take_fix(&mut self, now_ms: u32, report: &Report, since_fix_ms: Option<u32>) -> Step {
+    fn take_fix(&mut self, now_ms: u32, report: &Report, sample: &Sample) -> Step {
+        if let Some(reason) = sample.fault {
+            return self.gate.inhibit(now_ms, reason);
+        }
+        let other = sample.other.map(|other| self.spread(&other, sample));
         let Some(carry) = &mut self.carry else {
             let evidence = Evidence {
-                since_fix_ms,
+                since_fix_ms: sample.since_fix_ms,
+                others: other.as_slice(),
                 ..Evidence::of(report)
             };
             return self.gate.step_on(now_ms, &evidence);
         };
+        // One of two poses cannot be carried: the carried pose is unchanged.
+        if other.is_some() {
+            return Step {
+                verdict: Err(Reason::TagPosesAmbiguous),
+                ..self.gate.tick(now_ms)
+            };
+        }
         match carry.tracker.fix(report) {
             Ok(()) => match carry.tracker.tracked(now_ms) {
                 Ok(tracked) => self.gate.step_on(now_ms, &tracked.evidence()),
@@ -459,14 +498,18 @@ impl<'a> Replay<'a> {
         }
         self.drive_until(now_s);
         self.let_time_pass(now_ms);
-        let step = self.take_fix(now_ms, &report, sample.since_fix_ms);
+        let mut step = self.take_fix(now_ms, &report, sample);
+        // One of the two poses is outside, whichever the gate names.
+        if sample.is_ambiguous && step.verdict.is_err_and(|reason| !remembers(reason)) {
+            step.verdict = Err(Reason::TagPosesAmbiguous);
+        }
         self.last_now_ms = now_ms;
         let verdict = examined.unwrap_or_else(|| match step.verdict {
             Ok(()) => Verdict::Permit {
                 margin: Margin::ONE,
             },
             // The reason may come from the gate's memory, so the verdict is computed from the estimate alone.
-            Err(reason) if remembers(reason) => self.judged(&report, sample),
+            Err(reason) if remembers(reason) || sample.is_ambiguous => self.judged(&report, sample),
             Err(reason) => Verdict::deny(reason),
         });
         let mut row = Row::of(sample, &report.belief, verdict, logged);
@@ -712,6 +755,9 @@ const fn remembers(reason: Reason) -> bool {
             | Reason::Tilted
             | Reason::FrameMismatch
             | Reason::SourceUnknown
+            | Reason::TagPosesAmbiguous
+            | Reason::CornersDoNotFit
+            | Reason::TooFewCorners
     )
 }
 

@@ -265,6 +265,32 @@ impl<'a> Document<'a> {
     }
 }
 
+/// Returns the list of texts below these keys, one inside the other; errors are described in one line and name the file `name`.
+pub(crate) fn texts(text: &str, name: &str, path: &[&str]) -> Result<Vec<String>, String> {
+    const MESSAGES: FormatMessages = FormatMessages {
+        what: "the metadata of a ROS 2 bag",
+        written: "use the file as rosbag2 wrote it",
+        numbers: "use the file as rosbag2 wrote it",
+        not_finite: "use the file as rosbag2 wrote it",
+        length: "use the file as rosbag2 wrote it",
+        reads_first: true,
+    };
+    let found = || {
+        let document = Document::new(Source { file: name, text }, &MESSAGES)?;
+        let root = document.parse()?;
+        let mut node = root;
+        for key in path {
+            let inner = document.map(&node)?.get(key).cloned();
+            node = document.required(inner, node.at, key, MESSAGES.written)?;
+        }
+        let texts = document.list(&node)?.iter().map(|node| document.text(node));
+        texts
+            .map(|text| text.map(str::to_owned))
+            .collect::<Result<_, SiteError>>()
+    };
+    found().map_err(|error| error.to_string())
+}
+
 fn scalar(node: &Node) -> Option<&str> {
     match &*node.value {
         Value::Scalar { text, .. } => Some(text.trim_ascii()),
