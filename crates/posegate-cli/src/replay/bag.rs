@@ -75,6 +75,7 @@ pub fn of_site(arguments: &Arguments, site: &Site) -> Result<BodyFrames, Failure
 
 fn all_of_site(arguments: &Arguments, site: &Site) -> BodyFrames {
     let body = BodyFrames::new(&site.frames)
+        .with_origin(site.map_origin)
         .with_named(&arguments.child_frame)
         .with_base(arguments.base_frame.as_deref());
     if is_partial(arguments) {

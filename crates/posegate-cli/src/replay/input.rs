@@ -66,7 +66,7 @@ impl Recorded {
             track,
             topic: truth_topic,
             duplicates,
-        } = truth(arguments, files, is_bag)?;
+        } = truth(arguments, files, site, is_bag)?;
         let looks = if is_bag {
             looks(arguments, site, radius_squared)?
         } else {
@@ -260,7 +260,12 @@ struct Truth {
 }
 
 /// Returns the truth from a file, or the topic that has it.
-fn truth(arguments: &Arguments, files: &Files, is_bag: bool) -> Result<Truth, Failure> {
+fn truth(
+    arguments: &Arguments,
+    files: &Files,
+    site: &Site,
+    is_bag: bool,
+) -> Result<Truth, Failure> {
     let Some(truth) = &arguments.truth else {
         return Ok(Truth::default());
     };
@@ -293,6 +298,7 @@ fn truth(arguments: &Arguments, files: &Files, is_bag: bool) -> Result<Truth, Fa
     }
     let (bytes, name) = files.read(truth)?;
     let mut duplicates = 0;
+    let [east, north] = site.map_origin;
     let track = match format_of(&bytes) {
         Format::Csv => {
             let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
@@ -302,7 +308,7 @@ fn truth(arguments: &Arguments, files: &Files, is_bag: bool) -> Result<Truth, Fa
                 let pose = row.estimate;
                 track.push(
                     row.t_s.unwrap_or(f64::NAN),
-                    [pose.x_m, pose.y_m, pose.yaw_rad],
+                    [pose.x_m - east, pose.y_m - north, pose.yaw_rad],
                 );
             }
             track.complete();
@@ -313,8 +319,12 @@ fn truth(arguments: &Arguments, files: &Files, is_bag: bool) -> Result<Truth, Fa
             let times = times
                 .as_ref()
                 .map(|(text, name)| (text.as_slice(), name.as_str()));
-            let found = trajectories::read(&bytes, &name, times).map_err(Failure::input)?;
+            let mut found = trajectories::read(&bytes, &name, times).map_err(Failure::input)?;
             duplicates = found.duplicates;
+            for pose in &mut found.poses {
+                pose.position.x -= east;
+                pose.position.y -= north;
+            }
             Trajectory::of(&found.poses, arguments.truth_gap)
         }
         _ => {

@@ -1,14 +1,12 @@
 //! Recordings of rosbag2 and ROS 1 in every storage: the same drive gives the same summary.
 
 use crate::run::Case;
-use posegate_testkit::bags::{Bag, Pose, pose_definition, pose_message};
-use ruzstd::encoding::{CompressionLevel, compress_to_vec};
+use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::storages::{ros1, sqlite, zstd};
 use serde_json::Value;
-use std::io::Write;
 
 const SITE: &str = include_str!("../../../../examples/sites/dock.toml");
 const TOPIC: &str = "/amcl_pose";
-const KIND: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
 /// A drive into the dock, and out of it again.
 fn drive() -> Vec<Pose> {
@@ -28,146 +26,6 @@ fn mcap(poses: &[Pose]) -> Vec<u8> {
     }
     bag.other("/camera", "sensor_msgs/msg/Image", 1);
     bag.finish()
-}
-
-fn nanoseconds(seconds: f64) -> i64 {
-    (seconds * 1e9).round() as i64
-}
-
-/// A bag in SQLite. Humble's has no definitions; `pack` changes each message.
-fn sqlite(poses: &[Pose], has_definitions: bool, pack: fn(Vec<u8>) -> Vec<u8>) -> Vec<u8> {
-    let file = tempfile::NamedTempFile::new().expect("a file");
-    let database = rusqlite::Connection::open(file.path()).expect("a database");
-    database
-        .execute_batch(
-            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
-             CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);
-             CREATE INDEX timestamp_idx ON messages (timestamp ASC);",
-        )
-        .expect("tables");
-    let topic = "INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', '')";
-    database.execute(topic, (4, TOPIC, KIND)).expect("a topic");
-    database
-        .execute(topic, (7, "/camera", "sensor_msgs/msg/Image"))
-        .expect("a topic");
-    if has_definitions {
-        database
-            .execute_batch("CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT, encoding TEXT, encoded_message_definition TEXT, type_description_hash TEXT)")
-            .expect("a table");
-        let definition = "INSERT INTO message_definitions VALUES (1, ?1, 'ros2msg', ?2, '')";
-        database
-            .execute(definition, (KIND, pose_definition()))
-            .expect("a definition");
-    }
-    let message = "INSERT INTO messages(topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
-    for pose in poses {
-        let time = nanoseconds(pose.t_s + 0.01);
-        database
-            .execute(message, (4, time, pack(pose_message(pose))))
-            .expect("a message");
-    }
-    database
-        .execute(message, (7, nanoseconds(1.0), vec![0u8; 8]))
-        .expect("a message");
-    database.close().expect("a database");
-    std::fs::read(file.path()).expect("bytes")
-}
-
-/// A bag of ROS 1 with one chunk.
-fn ros1(poses: &[Pose], compression: &str) -> Vec<u8> {
-    let part = |bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], bytes].concat();
-    let field = |name: &str, value: &[u8]| part(&[name.as_bytes(), b"=", value].concat());
-    let record = |fields: &[Vec<u8>], data: &[u8]| [part(&fields.concat()), part(data)].concat();
-    let definition =
-        pose_definition().replace("builtin_interfaces/Time stamp", "uint32 seq\ntime stamp");
-    let mut records = Vec::new();
-    for (id, topic, kind, definition) in [
-        (
-            0u32,
-            TOPIC,
-            "geometry_msgs/PoseWithCovarianceStamped",
-            definition.as_str(),
-        ),
-        (1, "/camera", "sensor_msgs/Image", "uint8[] data\n"),
-    ] {
-        let head = [
-            field("op", &[7]),
-            field("conn", &id.to_le_bytes()),
-            field("topic", topic.as_bytes()),
-        ];
-        let data = [
-            field("topic", topic.as_bytes()),
-            field("type", kind.as_bytes()),
-            field("md5sum", b"0"),
-            field("message_definition", definition.as_bytes()),
-        ];
-        records.extend(record(&head, &data.concat()));
-    }
-    let time = |seconds: f64| {
-        let all = nanoseconds(seconds);
-        let (whole, rest) = ((all / 1_000_000_000) as u32, (all % 1_000_000_000) as u32);
-        [whole.to_le_bytes(), rest.to_le_bytes()].concat()
-    };
-    for (sequence, pose) in (0u32..).zip(poses) {
-        let mut data = sequence.to_le_bytes().to_vec();
-        data.extend(time(pose.t_s));
-        data.extend(part(pose.frame.as_bytes()));
-        let (sin, cos) = (0.5 * pose.yaw).sin_cos();
-        let mut floats = vec![pose.x, pose.y, 0.0, 0.0, 0.0, sin, cos];
-        let mut covariance = [0.0; 36];
-        [covariance[0], covariance[7], covariance[35]] = pose.covariance;
-        floats.extend(covariance);
-        data.extend(floats.iter().flat_map(|float| float.to_le_bytes()));
-        let head = [
-            field("op", &[2]),
-            field("conn", &0u32.to_le_bytes()),
-            field("time", &time(pose.t_s + 0.01)),
-        ];
-        records.extend(record(&head, &data));
-    }
-    let head = [
-        field("op", &[2]),
-        field("conn", &1u32.to_le_bytes()),
-        field("time", &time(1.0)),
-    ];
-    records.extend(record(&head, &[0; 4]));
-    let size = (records.len() as u32).to_le_bytes();
-    let data = match compression {
-        "lz4" => {
-            let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
-            encoder.write_all(&records).expect("lz4");
-            encoder.finish().expect("lz4")
-        }
-        "bz2" => {
-            let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
-            encoder.write_all(&records).expect("bzip2");
-            encoder.finish().expect("bzip2")
-        }
-        _ => records,
-    };
-    let mut bytes = b"#ROSBAG V2.0\n".to_vec();
-    let head = [
-        field("op", &[3]),
-        field("index_pos", &[0; 8]),
-        field("conn_count", &[2, 0, 0, 0]),
-        field("chunk_count", &[1, 0, 0, 0]),
-    ];
-    bytes.extend(record(&head, &[b' '; 4027]));
-    let head = [
-        field("op", &[5]),
-        field("compression", compression.as_bytes()),
-        field("size", &size),
-    ];
-    bytes.extend(record(&head, &data));
-    bytes.extend(record(
-        &[field("op", &[4]), field("ver", &[1, 0, 0, 0])],
-        &[0; 12],
-    ));
-    bytes
-}
-
-fn zstd(bytes: &[u8]) -> Vec<u8> {
-    compress_to_vec(bytes, CompressionLevel::Fastest)
 }
 
 fn metadata(files: &[&str]) -> String {
@@ -200,19 +58,25 @@ fn every_storage_gives_the_same_summary() {
     let files: Vec<(&str, Vec<u8>)> = vec![
         ("site.toml", SITE.into()),
         ("a.mcap", mcap(&poses)),
-        ("a.db3", sqlite(&poses, false, plain)),
-        ("iron.db3", sqlite(&poses, true, plain)),
-        ("messages.db3", sqlite(&poses, false, |bytes| zstd(&bytes))),
-        ("none.bag", ros1(&poses, "none")),
-        ("lz4.bag", ros1(&poses, "lz4")),
-        ("bz2.bag", ros1(&poses, "bz2")),
+        ("a.db3", sqlite(TOPIC, &poses, false, plain)),
+        ("iron.db3", sqlite(TOPIC, &poses, true, plain)),
+        (
+            "messages.db3",
+            sqlite(TOPIC, &poses, false, |bytes| zstd(&bytes)),
+        ),
+        ("none.bag", ros1(TOPIC, &poses, "none")),
+        ("lz4.bag", ros1(TOPIC, &poses, "lz4")),
+        ("bz2.bag", ros1(TOPIC, &poses, "bz2")),
         ("a.mcap.zstd", zstd(&mcap(&poses))),
-        ("a.db3.zstd", zstd(&sqlite(&poses, false, plain))),
+        ("a.db3.zstd", zstd(&sqlite(TOPIC, &poses, false, plain))),
         ("single/a_0.mcap", mcap(&poses)),
         ("listed/metadata.yaml", metadata(&["b_0.db3"]).into()),
-        ("listed/b_0.db3", sqlite(&poses, false, plain)),
+        ("listed/b_0.db3", sqlite(TOPIC, &poses, false, plain)),
         ("packed/metadata.yaml", metadata(&["b_0.db3.zstd"]).into()),
-        ("packed/b_0.db3.zstd", zstd(&sqlite(&poses, false, plain))),
+        (
+            "packed/b_0.db3.zstd",
+            zstd(&sqlite(TOPIC, &poses, false, plain)),
+        ),
     ];
     let named: Vec<(&str, &[u8])> = files
         .iter()
@@ -249,7 +113,7 @@ fn every_storage_gives_the_same_summary() {
             first.iter().for_each(|pose| bag.pose(TOPIC, pose));
             bag.finish()
         }),
-        ("split/c_1.db3", sqlite(second, false, plain)),
+        ("split/c_1.db3", sqlite(TOPIC, second, false, plain)),
     ];
     let named: Vec<(&str, &[u8])> = split
         .iter()
@@ -264,8 +128,8 @@ fn missing_topic_names_the_topics_one_a_line() {
     let case = Case::new(&[
         ("site.toml", SITE.as_bytes()),
         ("a.mcap", &mcap(&poses)),
-        ("a.db3", &sqlite(&poses, false, |bytes| bytes)),
-        ("a.bag", &ros1(&poses, "none")),
+        ("a.db3", &sqlite(TOPIC, &poses, false, |bytes| bytes)),
+        ("a.bag", &ros1(TOPIC, &poses, "none")),
     ]);
     for log in ["a.mcap", "a.db3", "a.bag"] {
         for wrong in ["/pose", "/pose --topic /amcl_pose"] {
@@ -296,8 +160,8 @@ fn missing_topic_names_the_topics_one_a_line() {
 #[test]
 fn faults_of_bags_are_named() {
     let poses = drive();
-    let good = sqlite(&poses, false, |bytes| bytes);
-    let cut = ros1(&poses, "none");
+    let good = sqlite(TOPIC, &poses, false, |bytes| bytes);
+    let cut = ros1(TOPIC, &poses, "none");
     let other = tempfile::NamedTempFile::new().expect("a file");
     let database = rusqlite::Connection::open(other.path()).expect("a database");
     database

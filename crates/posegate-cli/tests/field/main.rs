@@ -5,6 +5,7 @@ mod calibrations;
 mod child_frames;
 mod detections;
 mod docks;
+mod origins;
 mod rounds;
 mod run;
 mod tag_maps;

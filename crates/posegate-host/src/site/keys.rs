@@ -202,6 +202,13 @@ pub(super) const FRAME: Key = Key::new(
     "{ x = 0.6, y = 0.0, z = 0.4, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }",
 );
 
+// The origin.
+pub(super) const ORIGIN: Key = Key::new(
+    "origin",
+    "the point of the map that is subtracted from every position in it: `x` and `y` in metres",
+    "{ x = 448000.0, y = 5412000.0 }",
+);
+
 // Imports.
 pub(super) const IMPORTS: Key = Key::new("import", "one [import.NAME] table per file", "{ ... }");
 pub(super) const IMPORT: Key = Key::new(

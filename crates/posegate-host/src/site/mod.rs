@@ -120,6 +120,9 @@ pub struct Site {
     pub files: Vec<PathBuf>,
     /// The learnt error models, by name.
     pub error_models: BTreeMap<String, ErrorModel>,
+    /// The point of the map that is subtracted from every position in the file, in estimates and in the truth, metres. All poses of the
+    /// site are relative to it.
+    pub map_origin: [f64; 2],
     /// What was assumed where the files that the site names do not say it.
     pub remarks: Vec<Remark>,
     /// The error models that are formulas, by name.

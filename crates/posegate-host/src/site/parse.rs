@@ -47,7 +47,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
 }
 
 /// The sections of a site file.
-const SECTIONS: [&Key; 16] = [
+const SECTIONS: [&Key; 17] = [
     &keys::CAMERAS,
     &keys::TAGS,
     &keys::CANDIDATES,
@@ -63,6 +63,7 @@ const SECTIONS: [&Key; 16] = [
     &keys::ERROR_MODELS,
     &keys::GOALS,
     &keys::FRAMES,
+    &keys::ORIGIN,
     &keys::IMPORTS,
 ];
 
@@ -73,15 +74,16 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     let root = &Table::root(source, &document);
     root.refuse_unknown(&SECTIONS)?;
 
-    let parts = NamedParts::read(root)?;
-    let names = parts.names();
+    let origin = section(root, &keys::ORIGIN, poses::point)?.unwrap_or_default();
+    let parts = NamedParts::read(root, origin)?;
+    let names = parts.names(origin);
     let defaults = section(root, &keys::TABLE, TableKeys::read)?.unwrap_or_default();
     let tasks = entries(root, &keys::TASKS, &keys::TASK, |_, node| {
         task(node, &names, &defaults)
     })?;
     let goals = tasks.values().map(|task| task.success.goal);
     let goals: Vec<[f64; 2]> = goals.map(|goal| [goal.x, goal.y]).collect();
-    let candidates = candidate::candidates(root, &parts.tags, &parts.walls, &goals)?;
+    let candidates = candidate::candidates(root, origin, &parts.tags, &parts.walls, &goals)?;
     let epsilon = section(root, &keys::CONFIDENCE, |node| {
         node.table(&[&keys::EPSILON])?.number(&keys::EPSILON)
     })?;
@@ -93,7 +95,8 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         planner::planner(node, &names, &candidates)
     })?;
     let chains = entries(root, &keys::CHAINS, &keys::CHAIN, |_, node| {
-        chain::chain(node, &tasks, &navigation, epsilon)
+        let chain = chain::chain(node, &tasks, &navigation, epsilon)?;
+        Ok(chain.less(origin))
     })?;
     entries(root, &keys::TASKS, &keys::TASK, |_, node| {
         match node.any_table()?.optional(&keys::TASK_FROM) {
@@ -110,6 +113,7 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         files: parts.files.into_iter().map(|file| file.path).collect(),
         cameras: parts.cameras,
         remarks: parts.remarks,
+        map_origin: origin,
         tags: parts.tags,
         candidates,
         tasks,
@@ -167,7 +171,7 @@ struct NamedParts {
 
 impl NamedParts {
     /// Reads the sections without tasks, and the imports.
-    fn read(root: &Table<'_>) -> Result<Self, SiteError> {
+    fn read(root: &Table<'_>, origin: [f64; 2]) -> Result<Self, SiteError> {
         let mut remarks = Vec::new();
         let noted = RefCell::new(&mut remarks);
         let cameras = entries(root, &keys::CAMERAS, &keys::CAMERA, |name, node| {
@@ -187,7 +191,18 @@ impl NamedParts {
             poses::pose2(node)
         })?;
         let imports = import::imports(root, &mut tags, &mut goals, &mut remarks)?;
-        let walls = entries(root, &keys::WALLS, &keys::WALL, places::wall)?;
+        let mut walls = entries(root, &keys::WALLS, &keys::WALL, places::wall)?;
+        let [east, north] = origin;
+        for tag in tags.values_mut() {
+            let pose = &mut tag.tag.pose;
+            (pose.x, pose.y) = (pose.x - east, pose.y - north);
+        }
+        for goal in goals.values_mut() {
+            (goal.x, goal.y) = (goal.x - east, goal.y - north);
+        }
+        for [x, y] in walls.values_mut().flat_map(|wall| &mut wall.corners) {
+            (*x, *y) = (*x - east, *y - north);
+        }
         let reach = reach(&cameras);
         let models = entries(
             root,
@@ -209,8 +224,9 @@ impl NamedParts {
     }
 
     /// Returns the entries that success sets refer to.
-    const fn names(&self) -> Names<'_> {
+    const fn names(&self, origin: [f64; 2]) -> Names<'_> {
         Names {
+            origin,
             cameras: &self.cameras,
             tags: &self.tags,
             walls: &self.walls,

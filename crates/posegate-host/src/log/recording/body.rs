@@ -22,6 +22,8 @@ pub struct BodyFrames {
     base: Option<String>,
     /// The frame of estimates that name no child frame; `None` for the base.
     of_estimates: Option<String>,
+    /// Subtracted from every position in the map, metres.
+    origin: [f64; 2],
     /// `true` if covariances lack terms, so that those of the base do not follow from them.
     is_partial: bool,
     /// Static transforms: the parent, the child, and the child's pose in the parent.
@@ -76,6 +78,17 @@ impl BodyFrames {
     pub fn with_base(mut self, name: Option<&str>) -> Self {
         self.base = name.map(|name| bare(name).to_owned());
         self
+    }
+
+    /// Gives the point of the map that is subtracted from the poses of estimates and of the truth, metres.
+    #[must_use]
+    pub const fn with_origin(mut self, origin: [f64; 2]) -> Self {
+        self.origin = origin;
+        self
+    }
+
+    pub(super) const fn origin(&self) -> [f64; 2] {
+        self.origin
     }
 
     /// States that the covariances of estimates lack terms: then those of frames beside the base are refused.

@@ -356,7 +356,13 @@ impl Intake {
             let child = shared(&mut self.child, child);
             self.diagnostics.note_child(&child);
         }
-        let (pose, covariance, lever_m) = of_base(body, pose, covariance);
+        let (mut pose, covariance, lever_m) = of_base(body, pose, covariance);
+        // The odometry has an origin of its own; only its increments count.
+        if role != Role::Odometry {
+            let [east, north] = self.body.origin();
+            let [x, y, _] = &mut pose.position;
+            (*x, *y) = (*x - east, *y - north);
+        }
         let frame = shared(&mut self.frame, frame);
         Ok(Some(match role {
             Role::Estimates(source) => Item::Estimate(Sample {

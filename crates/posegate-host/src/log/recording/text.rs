@@ -187,7 +187,14 @@ impl<R: Read> Recording for Text<R> {
         };
         // A text names no frame; one that the user names has a place, or is the base.
         let body = self.body.body(None, true).unwrap_or(Body::Base);
-        Ok(Some(Item::Estimate(sample_of_base(sample, body))))
+        let mut sample = sample_of_base(sample, body);
+        let [east, north] = self.body.origin();
+        let belief = &mut sample.belief;
+        (belief.x_m, belief.y_m) = (belief.x_m - east, belief.y_m - north);
+        if let Some([x, y, _]) = &mut sample.truth {
+            (*x, *y) = (*x - east, *y - north);
+        }
+        Ok(Some(Item::Estimate(sample)))
     }
 
     fn diagnostics(&self) -> &ReaderDiagnostics {
