@@ -88,7 +88,14 @@ fn poses(path: &Input, files: &Files, times: Option<Named<'_>>) -> Result<Poses,
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let success = match (&arguments.site, &arguments.task) {
-        (Some(file), Some(name)) => Some(task(&site(files, file)?, name)?.success.clone()),
+        (Some(file), Some(name)) => {
+            let site = site(files, file)?;
+            let mut success = task(&site, name)?.success.clone();
+            // The trajectories have the map's numbers.
+            let [east, north] = site.map_origin;
+            (success.goal.x, success.goal.y) = (success.goal.x + east, success.goal.y + north);
+            Some(success)
+        }
         _ => None,
     };
     let times = arguments

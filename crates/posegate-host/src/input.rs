@@ -182,7 +182,7 @@ mod tests {
         ));
         let endless = read_from(repeat(0), Limit::CALIBRATION).unwrap_err();
         assert!(
-            endless.to_string().starts_with("it has more than 1 MiB"),
+            endless.to_string().starts_with("it has more than 16 MiB"),
             "{endless}"
         );
     }

@@ -172,6 +172,14 @@ pub fn sentences(
     ))?;
     for (reason, count) in replay.reasons() {
         print(&format_args!("  {count} {reason}: {}", reason.action()))?;
+        if reason == Reason::Tilted {
+            print(&format_args!(
+                "    by up to {:.1} deg: if these are the poses of a camera, name its frame with --child-frame, and its place on the robot in the site ([frame.NAME])",
+                summary["findings"]["most_tilt_deg"]
+                    .as_f64()
+                    .unwrap_or(f64::NAN)
+            ))?;
+        }
         if reason == Reason::FrameMismatch {
             print(&format_args!("    {}", frames(&summary["frame_mismatch"])))?;
         }
@@ -225,6 +233,29 @@ pub fn sentences(
         if count > 0 {
             print(&format_args!("found: {count} {name}"))?;
         }
+    }
+    if let Some(names) = summary["child_frames"]
+        .as_array()
+        .filter(|all| !all.is_empty())
+    {
+        let of = |name: &Value| {
+            let text = printable(name.as_str().unwrap_or_default()).into_owned();
+            let place = name.as_str().map(|name| &summary["body_frames"][name]);
+            match place.and_then(Value::as_array).map(Vec::as_slice) {
+                Some([x, y, yaw]) => {
+                    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+                    format!(
+                        "`{text}` at ({:.3} m, {:.3} m, {:.1} deg) on the robot",
+                        number(x),
+                        number(y),
+                        number(yaw).to_degrees()
+                    )
+                }
+                _ => format!("`{text}`, as the robot's base"),
+            }
+        };
+        let names: Vec<String> = names.iter().map(of).collect();
+        print(&format_args!("child frames: {}", names.join(", ")))?;
     }
     for key in ["skipped_topics", "looks"] {
         let part = summary["recording"].get(key).or(summary.get(key));

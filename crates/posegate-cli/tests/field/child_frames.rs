@@ -60,7 +60,13 @@ fn unknown_child_frame_is_refused_with_advice() {
     ]);
     let summary = case.run(&format!("{REPLAY} --child-frame antenna")).json(0);
     assert_eq!(summary["child_frames"], serde_json::json!(["antenna"]));
-    // Neither the odometry nor the truth of another frame.
+    let text = case.run(&REPLAY.replace("--json", "--child-frame antenna"));
+    assert!(
+        text.out
+            .contains("child frames: `antenna`, as the robot's base"),
+        "{}",
+        text.out
+    );
     let fixes = "replay site.toml drive.mcap --task dock --topic /odometry --child-frame antenna";
     assert_eq!(
         case.run(&format!(
@@ -77,6 +83,10 @@ fn child_frame_with_a_place_gives_the_pose_of_the_base() {
     let bag = drive("antenna", AT_DOCK, false);
     let [permits_at_dock, all] = permits(&with_frame, &bag, "");
     assert_eq!([permits_at_dock, all], [20, 20]);
+    let case = Case::new(&[("site.toml", with_frame.as_bytes()), ("drive.mcap", &bag)]);
+    let text = case.run(&REPLAY.replace("--json", ""));
+    let words = "child frames: `antenna` at (0.600 m, 0.100 m, 90.0 deg) on the robot";
+    assert!(text.out.contains(words), "{}", text.out);
     // The antenna at the dock: the robot is 0.6 m away.
     assert_eq!(
         permits(&with_frame, &drive("antenna", [0.0; 3], false), ""),
@@ -176,4 +186,27 @@ fn poses_of_a_camera_use_the_named_frame() {
             assert_eq!(summary["reasons"], reasons, "{log} {named}");
         }
     }
+}
+
+/// An optical frame looks along z: its poses are tilted by 90 degrees until its place is named.
+#[test]
+fn tilt_of_a_camera_is_reported_with_the_option() {
+    let frame = "\n[frame.optical]\nx = 0.2\ny = 0.0\nz = 0.5\nroll_deg = -90.0\npitch_deg = 0.0\nyaw_deg = -90.0\n";
+    let site = format!("{SITE}{frame}");
+    // The optical frame of a robot at the dock: z ahead, x right, y down.
+    let trajectory = "1.0 0.2 0 0.5 -0.5 0.5 -0.5 0.5\n";
+    let case = Case::new(&[
+        ("site.toml", site.as_bytes()),
+        ("slam.txt", trajectory.as_bytes()),
+    ]);
+    let replay =
+        "replay site.toml slam.txt --task dock --set bounded --translation 0.01 --yaw-deg 0.5";
+    let tilted = case.run(replay);
+    for words in ["tilted", "by up to 90.0 deg", "--child-frame"] {
+        assert!(tilted.out.contains(words), "{}", tilted.out);
+    }
+    let found = case
+        .run(&format!("{replay} --json --child-frame optical"))
+        .json(0);
+    assert_eq!(found["reasons"], serde_json::json!({}), "{found:#}");
 }

@@ -96,7 +96,7 @@ pub(super) const COEFFICIENTS: Key = Key::new(
 );
 pub(super) const CALIBRATION: Key = Key::new(
     "calibration",
-    "a ROS camera calibration file or a Kalibr camchain, with a path relative to the site file's folder",
+    "a calibration of ROS, OpenCV, Kalibr, VINS or PhotonVision, or a CameraInfo message as text, with a path relative to the site file's folder",
     "\"front.yaml\"",
 );
 pub(super) const BORDER: Key = Key::number(
@@ -223,7 +223,7 @@ pub(super) const FILE: Key = Key::new(
 );
 pub(super) const FORMAT: Key = Key::new(
     "format",
-    "\"wpilib\" (a field layout), \"apriltag_ros\" (tags.yaml), \"nav2_docks\" (a dock database) or \"posegate\" \
+    "\"wpilib\" or \"fmap\" (a field layout), \"apriltag_ros\" (tags.yaml), \"nav2_docks\" (a dock database, or parameters of the docking server) or \"posegate\" \
      ([tag.NAME] and [goal.NAME] tables)",
     "\"wpilib\"",
 );

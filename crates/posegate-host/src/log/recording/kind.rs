@@ -54,10 +54,15 @@ pub fn format_of(start: &[u8]) -> Format {
         return Format::Tum;
     };
     if first.contains(&b',') || first.contains(&b'_') {
-        let time = first.split(|byte| *byte == b',').next().unwrap_or_default();
-        let time = time.trim_ascii();
-        let is_nanoseconds = time.len() >= NANOSECONDS && time.iter().all(u8::is_ascii_digit);
-        return if is_nanoseconds {
+        // A CSV has a header: names, not numbers.
+        let number = |field: &[u8]| {
+            let text = std::str::from_utf8(field).ok();
+            text.is_some_and(|text| text.trim().parse::<f64>().is_ok())
+        };
+        let mut fields = first.split(|byte| *byte == b',');
+        let time = fields.next().unwrap_or_default().trim_ascii();
+        let is_whole = !time.is_empty() && time.iter().all(u8::is_ascii_digit);
+        return if is_whole && first.contains(&b',') && fields.all(number) {
             Format::Euroc
         } else {
             Format::Csv
@@ -70,9 +75,6 @@ pub fn format_of(start: &[u8]) -> Format {
         _ => Format::Tum,
     }
 }
-
-/// The fewest digits of a time in nanoseconds: a second has ten.
-const NANOSECONDS: usize = 10;
 
 #[cfg(test)]
 mod tests {
@@ -93,6 +95,7 @@ mod tests {
                 b"#timestamp [ns],p_x\n1403636579763555584,0.1,0.2,0.3,1,0,0,0\n",
                 Format::Euroc,
             ),
+            (b"0,0.1,0.2,0.3,1,0,0,0\n", Format::Euroc),
             (b"1 0 0 0.1 0 1 0 0.2 0 0 1 0\n", Format::Kitti),
             (b"\x28\xb5\x2f\xfd", Format::Zstd),
         ] {

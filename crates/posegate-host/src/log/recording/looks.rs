@@ -107,7 +107,11 @@ impl TagLocalizer {
         };
         let (belief, other, fault) = match found {
             Ok(fixes) => match fixes.as_slice() {
-                [best, others @ ..] => (estimate(best), others.first().map(estimate), None),
+                [best, others @ ..] => (
+                    estimate(best),
+                    others.first().map(estimate).map(Box::new),
+                    None,
+                ),
                 [] => (none, None, Some(Reason::CornersDoNotFit)),
             },
             Err(FixError::NoTag) => return None,

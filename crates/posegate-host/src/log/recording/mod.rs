@@ -85,7 +85,7 @@ pub struct Sample {
     /// base; what the covariance's derivative leaves out grows with this lever.
     pub lever_m: f64,
     /// A second pose that fits a detection as well; the robot is at one of the two.
-    pub other: Option<PoseEstimate>,
+    pub other: Option<Box<PoseEstimate>>,
     /// `true` if poses that are far apart fit a detection: two poses, or all poses between them.
     pub is_ambiguous: bool,
     /// The reason why a detection gives no pose; the estimate's numbers are NaN then.

@@ -446,7 +446,8 @@ impl<'a> Replay<'a> {
         if let Some(reason) = sample.fault {
             return self.gate.inhibit(now_ms, reason);
         }
-        let other = sample.other.map(|other| self.spread(&other, sample));
+        let other = sample.other.as_ref();
+        let other = other.map(|other| self.spread(other, sample));
         let Some(carry) = &mut self.carry else {
             let evidence = Evidence {
                 since_fix_ms: sample.since_fix_ms,

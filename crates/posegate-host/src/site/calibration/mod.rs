@@ -121,7 +121,7 @@ pub(super) fn read(
                 "`camera_matrix` (ROS, OpenCV), `k` (a CameraInfo message), `cam0` (Kalibr) or `projection_parameters` (VINS)",
             )
             .help(
-                "use the file that ROS's cameracalibrator saves as ost.yaml, `ros2 topic echo --once CAMERA_INFO`, an OpenCV calibration, \
+                "use the file that ROS's cameracalibrator saves as ost.yaml, a CameraInfo message of `ros2 topic echo --once`, an OpenCV calibration, \
                  Kalibr's camchain, or PhotonVision's JSON",
             ));
     };
@@ -194,7 +194,8 @@ pub(super) fn lens(model: &str, coefficients: &[f64]) -> Option<Result<Lens, Mis
     if !COUNTS.contains(&count) {
         return Some(match coefficients {
             [] if !is_fisheye => Ok(Lens::Pinhole),
-            _ => Err(Misfit::Count(own)),
+            // Kalibr's radtan has no k3.
+            _ => Err(Misfit::Count(if model == "radtan" { 4 } else { own })),
         });
     }
     let at = |index: usize| coefficients.get(index).copied().unwrap_or(0.0);
