@@ -1,6 +1,7 @@
 //! Distance limits as success sets: discs and ellipses.
 
 use crate::run::Case;
+use serde_json::{Value, json};
 
 const TABLE: &str = "[table]\nextent = { x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-20.0, 20.0] }\nstep = { xy = 0.01, yaw_deg = 0.5 }\n";
 
@@ -25,22 +26,21 @@ fn verdicts(success: &str, poses: &[[f64; 3]]) -> Vec<[bool; 2]> {
     ]);
     let built = case.run("table build site.toml --task dock -o t.posegate");
     assert_eq!(built.code, Some(0), "{}", built.err);
-    let lines = |arguments: &str, key: &str, yes: &str| -> Vec<bool> {
+    let lines = |arguments: &str, key: &str, yes: Value| -> Vec<bool> {
         let ended = case.run(arguments);
         let lines = ended.out.lines();
-        let lines =
-            lines.map(|line| serde_json::from_str::<serde_json::Value>(line).expect("JSON"));
-        lines.map(|line| line[key].to_string() == yes).collect()
+        let lines = lines.map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        lines.map(|line| line[key] == yes).collect()
     };
     let permits = lines(
         "gate t.posegate --estimates e.csv --json",
         "verdict",
-        "\"permit\"",
+        json!("permit"),
     );
     let inside = lines(
         "contains site.toml --task dock --poses e.csv --json",
         "inside",
-        "true",
+        json!(true),
     );
     assert_eq!([permits.len(), inside.len()], [poses.len(); 2]);
     permits
