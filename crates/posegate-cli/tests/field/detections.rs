@@ -47,6 +47,12 @@ fn causes_have_their_own_reasons() {
     for summary in [head_on, raised, missing] {
         assert_eq!(summary["findings"]["pose_not_finite"], 0);
         assert_eq!(summary["gate_reasons"], summary["reasons"]);
+        // The interlock is shut for that reason, too.
+        let shut = summary["interlock"]["shut_s_by"]
+            .as_object()
+            .expect("reasons");
+        let reasons = summary["reasons"].as_object().expect("reasons");
+        assert!(shut.keys().eq(reasons.keys()), "{shut:?}");
     }
     let case = Case::new(&[]);
     for (reason, words) in [

@@ -503,6 +503,10 @@ impl<'a> Replay<'a> {
         // One of the two poses is outside, whichever the gate names.
         if sample.is_ambiguous && step.verdict.is_err_and(|reason| !remembers(reason)) {
             step.verdict = Err(Reason::TagPosesAmbiguous);
+            step.state = match step.state {
+                State::Inhibited(_) => State::Inhibited(Reason::TagPosesAmbiguous),
+                other => other,
+            };
         }
         self.last_now_ms = now_ms;
         let verdict = examined.unwrap_or_else(|| match step.verdict {
