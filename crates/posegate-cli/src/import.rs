@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long, allow_hyphen_values = true)]
     pose: Option<String>,
     /// How the robot enters the docks, if the file does not say it (nav2_docks): backward turns their headings by 180 degrees
-    #[arg(long, value_parser = PossibleValuesParser::new(DockDirection::NAMES))]
+    #[arg(long, value_name = "WAY", value_parser = PossibleValuesParser::new(DockDirection::NAMES))]
     dock_direction: Option<String>,
     /// Read only the docks of this frame (nav2_docks)
     #[arg(long, value_name = "NAME")]
