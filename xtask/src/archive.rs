@@ -82,6 +82,17 @@ impl Core {
         need::command(&command, package)?;
         Ok(cmd(&command))
     }
+
+    /// Returns the bytes of code, constants and initial values of a program.
+    pub fn flash(&self, elf: &Path) -> Result<u64> {
+        let sizes = self.tool("size")?.arg(elf).read()?;
+        let line = sizes.lines().nth(1).unwrap_or_default();
+        let mut numbers = line.split_whitespace().map(str::parse::<u64>);
+        match (numbers.next(), numbers.next()) {
+            (Some(Ok(text)), Some(Ok(data))) => Ok(text + data),
+            _ => Err(format!("no sizes in: {sizes}").into()),
+        }
+    }
 }
 
 /// Returns the words after `cargo` that build the library of a core with some features at a level of optimization. A library that is

@@ -17,6 +17,7 @@ pub mod miri;
 pub mod msrv;
 pub mod mutants;
 pub mod no_panic;
+pub mod own_library;
 pub mod package;
 pub mod planning;
 pub mod python;
