@@ -19,6 +19,7 @@ pub mod mutants;
 pub mod no_panic;
 pub mod own_library;
 pub mod package;
+pub mod packages;
 pub mod planning;
 pub mod python;
 pub mod recorded;
