@@ -23,18 +23,8 @@ const SOURCES: [&str; 5] = [
     "robot.c",
     "tables.S",
 ];
-/// The three lines of a user of an installed release.
-const FOUND: &str = "find_package(posegate 0.1 REQUIRED COMPONENTS turning-s)
-add_executable(firmware.elf ${SOURCES})
-target_link_libraries(firmware.elf PRIVATE posegate::posegate c)
-";
-/// The same from the file of a release.
-const FETCHED: &str = "include(FetchContent)
-FetchContent_Declare(posegate URL ${RELEASE})
-FetchContent_MakeAvailable(posegate)
-add_executable(firmware.elf ${SOURCES})
-target_link_libraries(firmware.elf PRIVATE posegate::posegate c)
-";
+/// The page with the lines of a user of CMake: first of an unpacked release, then of its file.
+const PAGE: &str = "docs/for-c.md";
 /// Prints the archive that is chosen, below `lib`.
 const CHOICE: &str = r#"cmake_minimum_required(VERSION 3.16)
 project(choice LANGUAGES NONE)
@@ -105,14 +95,21 @@ pub fn packages(_: &Arguments) -> Result {
         .arg(scratch.path())
         .arg(&name)
         .run()?;
+    let page = files::read(PAGE)?;
+    let mut blocks = page.split("```cmake\n").skip(1);
+    let mut lines = || -> Result<String> {
+        let block = blocks.next().and_then(|rest| rest.split("```").next());
+        let block = block.ok_or_else(|| format!("{PAGE}: no two blocks of cmake"))?;
+        Ok(block.replace("PATH/", &format!("{}/", scratch.path().display())))
+    };
     let programs = [
         (
             "find_package",
-            project(&scratch.join("found"), FOUND, &release, &file)?,
+            project(&scratch.join("found"), &lines()?, &release)?,
         ),
         (
             "FetchContent",
-            project(&scratch.join("fetched"), FETCHED, &release, &file)?,
+            project(&scratch.join("fetched"), &lines()?, &release)?,
         ),
         ("pkg-config", pkg_config(&release, &scratch)?),
     ];
@@ -182,8 +179,8 @@ fn gate(release: &Path) -> (String, Vec<PathBuf>) {
     (options, SOURCES.map(|name| examples.join(name)).into())
 }
 
-/// Builds a user's project with these lines, which link the smallest gate, and returns the folder of its program.
-fn project(folder: &Path, lines: &str, release: &Path, file: &Path) -> Result<PathBuf> {
+/// Builds a user's project with these lines, which link the smallest gate, and returns its program.
+fn project(folder: &Path, lines: &str, release: &Path) -> Result<PathBuf> {
     let core = core()?;
     let (options, sources) = gate(release);
     let sources: Vec<String> = sources
@@ -191,22 +188,22 @@ fn project(folder: &Path, lines: &str, release: &Path, file: &Path) -> Result<Pa
         .map(|path| path.display().to_string())
         .collect();
     files::make_folder(folder)?;
-    let head = "cmake_minimum_required(VERSION 3.16)\nproject(firmware C ASM)\n";
-    files::write(folder.join("CMakeLists.txt"), format!("{head}{lines}"))?;
+    let text = format!(
+        "cmake_minimum_required(VERSION 3.16)\nproject(firmware C ASM)\nadd_executable(firmware ${{SOURCES}})\n{lines}\ntarget_link_libraries(firmware PRIVATE c)\n"
+    );
+    files::write(folder.join("CMakeLists.txt"), text)?;
     let built = folder.join("build");
     cmd("cmake -DCMAKE_SYSTEM_NAME=Generic -DCMAKE_SYSTEM_PROCESSOR=arm -DCMAKE_TRY_COMPILE_TARGET_TYPE=STATIC_LIBRARY")
         .words("-DCMAKE_C_COMPILER=arm-none-eabi-gcc -DCMAKE_ASM_COMPILER=arm-none-eabi-gcc")
         .args(["C", "ASM"].map(|language| format!("-DCMAKE_{language}_FLAGS={} {options}", core.flags)))
         .arg(format!("-DSOURCES={}", sources.join(";")))
-        .arg(format!("-DCMAKE_PREFIX_PATH={}", release.display()))
-        .arg(format!("-DRELEASE={}", file.display()))
         .arg("-S")
         .arg(folder)
         .arg("-B")
         .arg(&built)
         .run()?;
     cmd("cmake --build").arg(&built).run()?;
-    Ok(built.join("firmware.elf"))
+    Ok(built.join("firmware"))
 }
 
 /// Links the smallest gate with the options of pkg-config. If no core is named, it must not link.

@@ -113,7 +113,8 @@ pub fn lay_out_c(
     for licence in LICENCES {
         put(&repository.join(licence), &top.join(licence))?;
     }
-    files::write(top.join("README.md"), include_str!("readme_c.md"))
+    let readme = include_str!("readme_c.md").replace("@VERSION@", version);
+    files::write(top.join("README.md"), readme)
 }
 
 /// Makes the package for Debian and its relatives. The programs are static, so it depends on nothing.
