@@ -840,6 +840,18 @@ enum posegate_reason
      * The counter of the controller's clock stands still.
      */
     POSEGATE_REASON_CLOCK_STOPPED = 46,
+    /**
+     * Two poses of the robot fit the corners of a tag, and not both are inside.
+     */
+    POSEGATE_REASON_TAG_POSES_AMBIGUOUS = 47,
+    /**
+     * No pose of the robot fits the corners of the tags.
+     */
+    POSEGATE_REASON_CORNERS_DO_NOT_FIT = 48,
+    /**
+     * A detected tag has fewer than four corners.
+     */
+    POSEGATE_REASON_TOO_FEW_CORNERS = 49,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

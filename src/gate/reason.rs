@@ -116,6 +116,12 @@ pub enum Reason {
     PartMissing = 45,
     /// The counter of the controller's clock stands still.
     ClockStopped = 46,
+    /// Two poses of the robot fit the corners of a tag, and not both are inside.
+    TagPosesAmbiguous = 47,
+    /// No pose of the robot fits the corners of the tags.
+    CornersDoNotFit = 48,
+    /// A detected tag has fewer than four corners.
+    TooFewCorners = 49,
 }
 
 /// Makes [`Reason::ALL`] and the texts of each reason: its variant, its name in `snake_case`, what to do in a form for programs, a sentence that says what
@@ -124,7 +130,7 @@ macro_rules! reasons {
     ($($variant:ident $name:literal $advice:ident $meaning:literal $action:literal;)+) => {
         impl Reason {
             /// Every reason, in the order of the codes.
-            pub const ALL: [Self; 46] = [$(Self::$variant),+];
+            pub const ALL: [Self; 49] = [$(Self::$variant),+];
 
             /// Returns the name in `snake_case`, the same in every output.
             #[must_use]
@@ -298,6 +304,15 @@ reasons! {
     ClockStopped "clock_stopped" Service
         "The counter of the controller's clock stands still, so no permit would end by its age."
         "Service: start the timer, and check that it runs in every mode of the controller (sleep, debug halt); then reset the gate.";
+    TagPosesAmbiguous "tag_poses_ambiguous" Relocalise
+        "The corners of the tag fit two poses of the robot, or more, and the task does not succeed from all of them: a small tag, seen head-on, looks the same from both sides of its normal."
+        "Relocalise: look at a second tag in the same image, at a larger tag, from nearer, or at the tag from an angle (psi_min_deg).";
+    CornersDoNotFit "corners_do_not_fit" Service
+        "No pose of the robot fits the detected corners within the noise of the detector: a tag has another size or place than in the site, or the camera another calibration or mount."
+        "Service: measure the tag's size (the black border's outer edge) and its place, and compare calibration, image (rect or raw) and mount of the camera with the site.";
+    TooFewCorners "too_few_corners" Service
+        "A detected tag has fewer than four corners that are finite numbers, so no pose follows from it."
+        "Service: make the detector report all four corners of each tag, in pixels.";
 }
 
 impl Reason {
@@ -359,6 +374,6 @@ mod tests {
             );
         }
         assert_eq!(Reason::from_code(0), None);
-        assert_eq!(Reason::from_code(47), None);
+        assert_eq!(Reason::from_code(50), None);
     }
 }

@@ -3,7 +3,7 @@
 use super::camera::Sighted;
 use super::{
     BoxSet, Camera, Clear, Edge, ErrorLimit, ErrorModel, Exclusion, Footprint, Lens, Pose3Deg,
-    PoseDeg, Shape, Sharpness, SuccessSet, Tag, Tolerance, Visibility, Wall, Window,
+    PoseDeg, Round, Shape, Sharpness, SuccessSet, Tag, Tolerance, Visibility, Wall, Window,
 };
 use sha2::{Digest, Sha256};
 
@@ -87,7 +87,7 @@ deciding! {
     PoseDeg { x, y, yaw_deg }
     Pose3Deg { x, y, z, roll_deg, pitch_deg, yaw_deg }
     BoxSet { x, y, yaw_deg }
-    Footprint { footprint, region, inset }
+    Round { centre, axes, turn_deg }
     Clear { footprint, obstacle, gap }
     Camera { width_px, height_px, fx, fy, cx, cy, sighted }
     Sighted { lens, window, edge, numbers }
@@ -98,6 +98,24 @@ deciding! {
     Visibility {
         camera, mount, tag, d_max, phi_max_deg, psi_max_deg, z_near, tag_tolerance, mount_tolerance,
         sharpness, error_room
+    }
+}
+
+impl Deciding for Footprint {
+    fn add_to(&self, to: &mut Sha256) {
+        let Self {
+            footprint,
+            region,
+            inset,
+            round,
+        } = self;
+        footprint.add_to(to);
+        region.add_to(to);
+        inset.add_to(to);
+        // A set without an ellipse has the digest that it had before there were any.
+        if let Some(round) = round {
+            round.add_to(to);
+        }
     }
 }
 

@@ -80,9 +80,7 @@ impl Node {
         let mut note = |slack: f64| holds &= slack >= 0.0;
         match self {
             Self::Box(own) => own.slacks(pose.x, pose.y, yaw, &mut |_, slack| note(slack)),
-            Self::Footprint(own) => {
-                own.slacks(pose, ALL, 0, &mut |_, _, slack| note(slack));
-            }
+            Self::Footprint(own) => own.exact_slacks(pose, &mut |_, slack| note(slack)),
             Self::View(view, limit) => {
                 return is_seen(view, pose)
                     && limit
@@ -108,7 +106,7 @@ impl Node {
             }),
             Self::Footprint(own) => {
                 let most = distance + own.lever() * turn;
-                own.slacks(pose, ALL, 0, &mut |_, _, slack| excluded |= slack < -most);
+                own.exact_slacks(pose, &mut |_, slack| excluded |= slack < -most);
             }
             Self::View(view, _) => {
                 let [x, y, _] = view.centre;

@@ -1,8 +1,8 @@
 //! Footprints in regions: every vertex of the robot's outline lies inside a convex polygon.
 
-use super::Tolerance;
 use super::planar::Planar;
 use super::scalar::{NONE, Scalar, Selection, selected};
+use super::{Round, Tolerance};
 
 /// The poses at which a convex footprint lies inside a convex region.
 ///
@@ -12,6 +12,8 @@ pub struct Footprint {
     pub(super) footprint: Vec<[f64; 2]>,
     pub(super) region: Vec<[f64; 2]>,
     pub(super) inset: f64,
+    /// The ellipse that the region is inscribed in, if that is the set.
+    pub(super) round: Option<Round>,
 }
 
 impl Footprint {
@@ -41,7 +43,35 @@ impl Footprint {
             footprint,
             region,
             inset: 0.0,
+            round: None,
         })
+    }
+
+    /// Returns the set of an ellipse in which the region is inscribed: tables use the region, membership the ellipse.
+    #[must_use]
+    pub(super) fn within_round(mut self, round: Round) -> Self {
+        self.round = Some(round);
+        self
+    }
+
+    /// Returns the ellipse that the region is inscribed in, if that is the set.
+    #[must_use]
+    pub const fn round(&self) -> Option<&Round> {
+        self.round.as_ref()
+    }
+
+    /// Computes the slacks of the set itself, by name: those of the region, or that of the ellipse.
+    pub(super) fn exact_slacks(
+        &self,
+        pose: &Planar<f64>,
+        note: &mut impl FnMut(&'static str, f64),
+    ) {
+        match &self.round {
+            Some(round) => note(round.name(), round.slack(pose) - self.inset),
+            None => {
+                self.slacks(pose, super::ALL, 0, &mut |_, name, slack| note(name, slack));
+            }
+        }
     }
 
     /// Checks that [`Footprint::new`] accepts these corners as a footprint.

@@ -115,9 +115,7 @@ fn slacks(
     };
     match shape {
         Shape::Box(set) => set.slacks(plain[0], plain[1], plain[2], &mut note),
-        Shape::Footprint(set) => {
-            set.slacks(pose, ALL, 0, &mut |_, name, value| note(name, value));
-        }
+        Shape::Footprint(set) => set.exact_slacks(pose, &mut note),
         Shape::Visibility(set) => {
             seen(&set.resolve::<f64>(goal), pose, &mut note);
         }

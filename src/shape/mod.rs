@@ -43,6 +43,7 @@ pub(crate) use self::part::Parts;
 pub(crate) use self::part::Ready;
 pub use self::part::{Convex, ConvexPart};
 pub use self::planar::Planar;
+pub use self::round::{Round, RoundError};
 pub use self::scalar::Scalar;
 pub use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::SeparatingHalfPlane;
@@ -70,6 +71,7 @@ mod lens;
 mod membership;
 mod part;
 mod planar;
+mod round;
 mod scalar;
 mod side;
 mod survey;
@@ -226,7 +228,10 @@ impl Shape {
             Self::Apart(Exclusion::Gap { .. }) => "footprint",
             Self::Apart(_) => "visibility",
             Self::Any(_) => "any",
-            Self::All(_) => "all",
+            Self::All(sets) => match sets.as_slice() {
+                [Self::Footprint(set), Self::Box(_)] if set.round().is_some() => "disc",
+                _ => "all",
+            },
         }
     }
 }

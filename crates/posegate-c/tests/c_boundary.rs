@@ -852,8 +852,8 @@ fn an_inhibited_gate_qualifies_again() {
     for (reason, kind, status) in [
         (35, posegate_state_kind::Inhibited, posegate_status::Ok),
         (0, posegate_state_kind::Latched, posegate_status::BadValue),
-        (46, posegate_state_kind::Inhibited, posegate_status::Ok),
-        (47, posegate_state_kind::Latched, posegate_status::BadValue),
+        (49, posegate_state_kind::Inhibited, posegate_status::Ok),
+        (50, posegate_state_kind::Latched, posegate_status::BadValue),
         (291, posegate_state_kind::Latched, posegate_status::BadValue),
     ] {
         let gate = open_gate();

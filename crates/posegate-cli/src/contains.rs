@@ -30,11 +30,13 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let task = task(&site, &arguments.task)?;
     let (bytes, name) = files.read(&arguments.poses)?;
     let rows = estimates(bytes.as_slice(), &name, Columns::Poses).map_err(Failure::input)?;
+    let [east, north] = site.map_origin;
     let bar = progress(rows.len() as u64, "looking");
     for (index, row) in rows.iter().enumerate() {
         bar.inc(1);
         let pose = row.estimate;
-        let membership = task.success.membership([pose.x_m, pose.y_m, pose.yaw_rad]);
+        let [x, y] = [pose.x_m - east, pose.y_m - north];
+        let membership = task.success.membership([x, y, pose.yaw_rad]);
         if arguments.json {
             let slack: Map<String, Value> = membership
                 .slack

@@ -95,7 +95,14 @@ impl Failure {
                 "make the extent smaller or the steps coarser in [table] or task.NAME.table"
             }
             BakeError::NoPieces(_) => "write layout = \"grid\" in [table] or task.NAME.table",
-            BakeError::Goal { .. } => "choose a world origin nearer to the site",
+            BakeError::Goal { x, y } => {
+                let help = format!(
+                    "add the map's origin to the site, which is subtracted from goals, tags, estimates and truth: [origin] x = {:?}, y = {:?}",
+                    x.round(),
+                    y.round()
+                );
+                return Self::usage(format!("{}: task `{task}`: {error}", site.display()), &help);
+            }
             BakeError::Epsilon(_) => "write an epsilon such as 0.99 in [confidence]",
             _ => "see [table] and task.NAME.table in the site file",
         };

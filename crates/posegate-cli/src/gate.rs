@@ -4,6 +4,7 @@ use crate::site_input::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
 use posegate::gate::{Reason, Verdict};
 use posegate::motion::MotionBounds;
+use posegate::pose::Pose;
 use posegate::recordings::Evaluator;
 use posegate::set::{Growth, PoseSet, RadiusSquared};
 use posegate::table::Table;
@@ -25,6 +26,9 @@ pub struct Arguments {
     /// Estimates in the world frame (CSV); `-` for standard input
     #[arg(long)]
     estimates: Input,
+    /// The site's [origin], which is subtracted from the estimates: metres
+    #[arg(long, value_name = "X,Y", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<[f64; 2]>,
     /// Confidence of the Gaussian pose-sets [default: the table's]
     #[arg(long)]
     epsilon: Option<f64>,
@@ -54,6 +58,18 @@ pub struct Arguments {
     json: bool,
 }
 
+fn origin(text: &str) -> Result<[f64; 2], String> {
+    let expected = "expected two numbers in metres, like 448000,5412000";
+    let (x, y) = text.split_once(',').ok_or(expected)?;
+    let number = |text: &str| {
+        let value = text.trim().parse().ok();
+        value
+            .filter(|value: &f64| value.is_finite())
+            .ok_or_else(|| expected.to_string())
+    };
+    Ok([number(x)?, number(y)?])
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Kind {
     Gaussian,
@@ -76,7 +92,12 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         Kind::Bounded => Columns::TimedPoses,
     };
     let (text, name) = files.read(&arguments.estimates)?;
-    let rows = estimates(text.as_slice(), &name, columns).map_err(Failure::input)?;
+    let mut rows = estimates(text.as_slice(), &name, columns).map_err(Failure::input)?;
+    let [east, north] = arguments.origin.unwrap_or_default();
+    for row in &mut rows {
+        let pose = &mut row.estimate;
+        (pose.x_m, pose.y_m) = (pose.x_m - east, pose.y_m - north);
+    }
     if rows.is_empty() {
         return Err(Failure::usage(
             format!("{name} has a header and no estimates"),
@@ -96,11 +117,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             *reasons.entry(reason).or_default() += 1;
         }
         if arguments.json {
-            let mut line = line(index, &decided);
+            let mut line = line(index, &decided, [east, north]);
             line["task_digest"] = json!(task_digest);
             print_json(&line)?;
         } else {
-            print(&sentence(index, &decided))?;
+            print(&sentence(index, &decided, [east, north]))?;
         }
     }
     bar.finish_and_clear();
@@ -228,7 +249,13 @@ fn judge_row(
     }
 }
 
-fn line(index: usize, decided: &Decided) -> Value {
+/// Returns a pose in the map's numbers: m, m, rad.
+fn in_map(pose: Pose, [east, north]: [f64; 2]) -> [f64; 3] {
+    let [x, y, yaw] = coordinates(pose);
+    [x + east, y + north, yaw]
+}
+
+fn line(index: usize, decided: &Decided, origin: [f64; 2]) -> Value {
     let mut line = match &decided.verdict {
         Verdict::Permit { margin } => json!({
             "index": index, "verdict": "permit", "reason": null,
@@ -240,7 +267,7 @@ fn line(index: usize, decided: &Decided) -> Value {
             worst_pose,
         } => json!({
             "index": index, "verdict": "deny", "reason": reason.name(),
-            "margin": margin.map(factor), "worst_pose": worst_pose.map(coordinates),
+            "margin": margin.map(factor), "worst_pose": worst_pose.map(|pose| in_map(pose, origin)),
         }),
     };
     if let Some(hypothesis) = decided.hypothesis {
@@ -249,7 +276,7 @@ fn line(index: usize, decided: &Decided) -> Value {
     line
 }
 
-fn sentence(index: usize, decided: &Decided) -> String {
+fn sentence(index: usize, decided: &Decided, origin: [f64; 2]) -> String {
     let about = decided
         .hypothesis
         .map_or(String::new(), |number| format!(", hypothesis {number}"));
@@ -264,7 +291,7 @@ fn sentence(index: usize, decided: &Decided) -> String {
         } => {
             let margin = margin.map_or(String::new(), |m| format!(", margin {}", factor_text(m)));
             let worst = worst_pose.map_or(String::new(), |pose| {
-                let [x, y, yaw] = coordinates(pose);
+                let [x, y, yaw] = in_map(pose, origin);
                 format!(
                     ", worst pose ({x:.3} m, {y:.3} m, {:.2} deg)",
                     yaw.to_degrees()

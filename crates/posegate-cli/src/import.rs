@@ -1,10 +1,11 @@
 //! `posegate import`: converts a map of tags or docks to tables of a site file.
 
-use crate::site_input::{Failure, Outcome, answer, print, print_json};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
 use clap::builder::PossibleValuesParser;
 use posegate::shape::Pose3Deg;
 use posegate_host::files::{Files, Input, Output};
-use posegate_host::site::{Convention, Format, Import, ImportError, Imported};
+use posegate_host::printable::printable;
+use posegate_host::site::{Convention, DockDirection, Format, Import, ImportError, Imported};
 use serde_json::json;
 use std::ffi::OsString;
 
@@ -13,7 +14,7 @@ use std::ffi::OsString;
 /// The same settings in an [import.NAME] table of a site file give the same tags and goals.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  posegate import field.json --format wpilib --size 0.1651 --family tag36h11\n  posegate import tags.yaml#dock --format apriltag_ros --convention apriltag_ros --family tag36h11 --pose x=4,y=0,z=0.5,yaw_deg=180 -o tags.toml\n  posegate import docks.yaml --format nav2_docks"
+    after_help = "Examples:\n  posegate import field.json --format wpilib --size 0.1651 --family tag36h11\n  posegate import tags.yaml#dock --format apriltag_ros --convention apriltag_ros --family tag36h11 --pose x=4,y=0,z=0.5,yaw_deg=180 -o tags.toml\n  posegate import map.fmap --format fmap\n  posegate import nav2_params.yaml --format nav2_docks --dock-direction backward\n\nFormats:\n  wpilib        a field layout of WPILib (JSON), with the keys of any year; needs --size and --family\n  fmap          a field map of Limelight (JSON); its origin is the middle of the field\n  apriltag_ros  a tags.yaml with bundles; needs --convention, --family and --pose\n  nav2_docks    a dock database of Nav2, or parameters with the docking server's docks\n  posegate      [tag.NAME] and [goal.NAME] tables"
 )]
 pub struct Arguments {
     /// The file; `-` for standard input; `tags.yaml#NAME` is one bundle or tag of apriltag_ros
@@ -34,6 +35,12 @@ pub struct Arguments {
     /// are not named are 0). The pose of a bundle is written like that of a tag: x out of its face
     #[arg(long, allow_hyphen_values = true)]
     pose: Option<String>,
+    /// How the robot enters the docks, if the file does not say it (nav2_docks): backward turns their headings by 180 degrees
+    #[arg(long, value_parser = PossibleValuesParser::new(DockDirection::NAMES))]
+    dock_direction: Option<String>,
+    /// Read only the docks of this frame (nav2_docks)
+    #[arg(long, value_name = "NAME")]
+    frame: Option<String>,
     /// Prefix of a tag's number or a dock's name [default: t before numbers]
     #[arg(long)]
     prefix: Option<String>,
@@ -62,6 +69,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         pose: arguments.pose.as_deref().map(pose).transpose()?,
         prefix: arguments.prefix.clone(),
         part: part.map(str::to_owned),
+        dock_direction: arguments
+            .dock_direction
+            .as_deref()
+            .and_then(DockDirection::named),
+        frame: arguments.frame.clone(),
         ..Import::of(format)
     };
     let (text, name) = files.read_text(&OsString::from(path).into())?;
@@ -70,8 +82,16 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         Err(ImportError::File(error)) => return Err(Failure::in_file(&error)),
         Err(error) => return Err(setting(&name, &error)),
     };
+    let remarks: String = imported
+        .remarks
+        .iter()
+        .map(|remark| format!("# Remark: {}\n", printable(remark)))
+        .collect();
+    for remark in &imported.remarks {
+        warn(&format_args!("remark: {remark}"));
+    }
     let tables = format!(
-        "# From {name:?}, format {}.\n{}",
+        "# From {name:?}, format {}.\n{remarks}{}",
         format.name(),
         imported.to_toml()
     );
@@ -107,10 +127,14 @@ fn setting(name: &str, error: &ImportError) -> Failure {
             key,
             like: Some(like),
             ..
-        } => format!("write --{key} {}", like.replace('"', "")),
+        } => format!(
+            "write --{} {}",
+            key.replace('_', "-"),
+            like.replace('"', "")
+        ),
         ImportError::Setting {
             key, like: None, ..
-        } => format!("leave --{key} out"),
+        } => format!("leave --{} out", key.replace('_', "-")),
         _ => "see posegate import --help".into(),
     };
     Failure::usage(format!("{name}: {error}"), &help)
@@ -172,5 +196,13 @@ fn as_json(
             |(name, goal)| json!({"name": name, "x": goal.x, "y": goal.y, "yaw_deg": goal.yaw_deg}),
         )
         .collect();
-    json!({"format": format.name(), "convention": convention.map(Convention::name), "tags": tags, "goals": goals})
+    let tasks: Vec<_> = imported
+        .tasks
+        .iter()
+        .map(|(name, task)| json!({"name": name, "goal": name, "radius": task.radius}))
+        .collect();
+    json!({
+        "format": format.name(), "convention": convention.map(Convention::name), "tags": tags, "goals": goals, "tasks": tasks,
+        "remarks": imported.remarks,
+    })
 }

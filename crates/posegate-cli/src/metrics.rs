@@ -6,12 +6,13 @@ use posegate_host::log::metrics::{
     self, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,
     correct_rate, in_set, relative,
 };
-use posegate_host::log::tum::{Stamped, trajectory};
+use posegate_host::log::trajectories::{Named, Poses, read};
 use serde_json::{Map, Value, json};
 
 /// Compares an estimated trajectory with a reference: ATE, RPE, Correct Rate
 ///
-/// Both are files in the TUM format (timestamp tx ty tz qx qy qz qw). Errors and statistics are those of evo.
+/// Both are files of TUM (timestamp tx ty tz qx qy qz qw), EuRoC (nanoseconds, x, y, z, qw, qx, qy, qz) or KITTI (12 numbers; --times). A
+/// time that is there twice is used once. Errors and statistics are those of evo.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate metrics truth.txt estimate.txt --align se3 --json\n  posegate metrics truth.txt estimate.txt --correct-rate 0.05,2 --site site.toml --task dock"
@@ -21,6 +22,9 @@ pub struct Arguments {
     reference: Input,
     /// The estimate; `-` for standard input
     estimate: Input,
+    /// The times of KITTI trajectories: one in each line, seconds
+    #[arg(long, value_name = "FILE")]
+    times: Option<Input>,
     /// How the estimate is moved onto the reference before it is compared
     #[arg(long, value_enum, default_value = "none")]
     align: Align,
@@ -77,27 +81,44 @@ fn thresholds(text: &str) -> Result<[f64; 2], String> {
     Ok([number(translation)?, number(rotation)?])
 }
 
-fn poses(path: &Input, files: &Files) -> Result<Vec<Stamped>, Failure> {
-    let (text, name) = files.read_text(path)?;
-    trajectory(&text, &name).map_err(Failure::input)
+fn poses(path: &Input, files: &Files, times: Option<Named<'_>>) -> Result<Poses, Failure> {
+    let (text, name) = files.read(path)?;
+    read(&text, &name, times).map_err(Failure::input)
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let success = match (&arguments.site, &arguments.task) {
-        (Some(file), Some(name)) => Some(task(&site(files, file)?, name)?.success.clone()),
+        (Some(file), Some(name)) => {
+            let site = site(files, file)?;
+            let mut success = task(&site, name)?.success.clone();
+            // The trajectories have the map's numbers.
+            let [east, north] = site.map_origin;
+            (success.goal.x, success.goal.y) = (success.goal.x + east, success.goal.y + north);
+            Some(success)
+        }
         _ => None,
     };
+    let times = arguments
+        .times
+        .as_ref()
+        .map(|times| files.read(times))
+        .transpose()?;
+    let times = times
+        .as_ref()
+        .map(|(text, name)| (text.as_slice(), name.as_str()));
     let (reference, estimate) = (
-        poses(&arguments.reference, files)?,
-        poses(&arguments.estimate, files)?,
+        poses(&arguments.reference, files, times)?,
+        poses(&arguments.estimate, files, times)?,
     );
-    let matched = associated(&reference, &estimate, arguments.max_diff).map_err(|error| {
-        let help = match error {
-            PairError::Difference(_) => "give seconds, like --max-diff 0.01",
-            _ => "check that both have the same clock, or give a larger --max-diff",
-        };
-        Failure::usage(format!("{}: {error}", names(arguments)), help)
-    })?;
+    let duplicates = reference.duplicates + estimate.duplicates;
+    let matched =
+        associated(&reference.poses, &estimate.poses, arguments.max_diff).map_err(|error| {
+            let help = match error {
+                PairError::Difference(_) => "give seconds, like --max-diff 0.01",
+                _ => "check that both have the same clock, or give a larger --max-diff",
+            };
+            Failure::usage(format!("{}: {error}", names(arguments)), help)
+        })?;
     let align = match arguments.align {
         Align::None => metrics::Align::None,
         Align::Se3 => metrics::Align::Se3,
@@ -112,7 +133,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         )
     })?;
     let absolute = absolute(&matched);
-    let mut line = json!({"pairs": matched.estimate.len(), "ape": statistics(&absolute)});
+    let mut line = json!({"pairs": matched.estimate.len(), "duplicates": duplicates, "ape": statistics(&absolute)});
     for (name, pairs) in PAIRS {
         line["rpe"][name] = statistics(&relative(&matched, pairs));
     }
@@ -171,6 +192,12 @@ fn statistics(errors: &Errors) -> Value {
 /// Prints the result as text.
 fn table(line: &Value) -> Result<(), Failure> {
     print(&format_args!("{} pairs of poses", line["pairs"]))?;
+    if line["duplicates"] != json!(0) {
+        print(&format_args!(
+            "{} poses have the time of the pose before, and are left out",
+            line["duplicates"]
+        ))?;
+    }
     print(&format_args!(
         "{:<44} {:>10} {:>10} {:>10} {:>10}",
         "", "rmse", "mean", "median", "max"

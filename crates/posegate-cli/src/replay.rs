@@ -1,6 +1,7 @@
 //! `posegate replay`: runs a recording through the gate, and through the rules that are in use today.
 
 mod arguments;
+mod bag;
 mod inflation;
 mod input;
 mod odometry;
@@ -12,15 +13,15 @@ pub use self::arguments::Arguments;
 use self::inflation::Inflated;
 use self::input::Recorded;
 use self::outputs::Outputs;
-use self::words::{check_requested, no_estimates, recording, sentences};
+use self::words::{check_requested, check_topics, no_estimates, recording, sentences};
 use crate::site_input::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::set::CrossTerms;
 use posegate::table::Table;
 use posegate_host::draw::replay_picture;
-use posegate_host::files::{FileError, Files, Output};
-use posegate_host::log::recording::{RecordingError, TagLocalizer};
+use posegate_host::files::{Files, Output};
+use posegate_host::log::recording::TagLocalizer;
 use posegate_host::log::replay::{PlayError, Replay, ReplayConfig, play};
 use posegate_host::site::{Site, Task};
 use serde_json::{Map, Value, json};
@@ -36,7 +37,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
     let inflated = Inflated::of(arguments, files, radius.radius_squared())?;
     let mut input = Recorded::open(arguments, files, &site, radius_squared, &inflated)?;
-    let odometry = odometry::odometry(arguments, files)?;
+    let odometry = odometry::odometry(arguments, files, &site)?;
     let trust = arguments.trust(inflated.factors.inflation);
     // A fix that is carried along an odometry has the trust applied already.
     let carried = odometry.is_some();
@@ -87,6 +88,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     played.map_err(play_failure)?;
     let diagnostics = input.recording.diagnostics();
     let [permits, estimates] = replay.permits();
+    if !arguments.topic.is_empty() {
+        check_topics(arguments, diagnostics)?;
+    }
     if estimates == 0 {
         return Err(no_estimates(arguments, diagnostics, input.part.outside));
     }
@@ -174,6 +178,9 @@ fn summary(
         summary["inflation"] = inflated.to_json();
     }
     summary["recording"] = recording(input);
+    summary["child_frames"] = json!(input.recording.diagnostics().child_frames);
+    summary["body_frames"] = input.body_frames();
+    summary["truth"]["duplicates"] = json!(input.duplicates);
     if let Some(looks) = &input.part.looks
         && has_detections(input)
     {
@@ -249,12 +256,7 @@ fn table(
 
 fn play_failure(error: PlayError<Failure>) -> Failure {
     match error {
-        PlayError::Recording(RecordingError::Io { file, source }) => FileError::Unread {
-            name: file,
-            cause: source,
-        }
-        .into(),
-        PlayError::Recording(error) => Failure::input(error),
+        PlayError::Recording(error) => bag::failure(error),
         PlayError::NoCamera => Failure::usage(
             "detections need a camera: the site has none, or several".into(),
             "name it: --camera front",

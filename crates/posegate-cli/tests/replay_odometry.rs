@@ -182,7 +182,7 @@ fn faulty_odometry_is_refused_with_its_line() {
             b"\x89MCAP0\r\n".to_vec(),
             &[
                 "odom.csv",
-                "neither TUM nor CSV",
+                "not TUM, EuRoC or CSV",
                 "a file with poses and times",
             ],
         ),

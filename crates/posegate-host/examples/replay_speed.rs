@@ -162,7 +162,7 @@ fn write(path: &Path, compression: Compression, count: u32, payload: usize) -> D
     Ok(())
 }
 
-fn bag(path: &Path) -> Done<Bag<File>> {
+fn bag(path: &Path) -> Done<Bag<'static>> {
     let wanted = Wanted {
         topic: TOPIC.into(),
         role: Role::Estimates(0),

@@ -176,6 +176,40 @@ mod tests {
         }
     }
 
+    /// The first screen of the README has the figures.
+    #[test]
+    fn readme_has_the_figures() {
+        let readme = include_str!("../../../README.md");
+        let kilobytes = |bytes: u64| (bytes + 500) / 1000;
+        let grouped = |number: u64| match number {
+            0..1000 => number.to_string(),
+            _ => format!("{},{:03}", number / 1000, number % 1000),
+        };
+        for (core, name) in CORES
+            .into_iter()
+            .zip(["Cortex-M4F", "Cortex-M0+", "RV32IMC"])
+        {
+            let flash = |level, parts| {
+                let figures = Figures::of(core, level, parts);
+                let [gate, tracker] =
+                    [figures.flash_of_gate, figures.flash_of_tracker].map(kilobytes);
+                format!("{gate} + {tracker} kB")
+            };
+            let fast = Figures::of(core, Level::Fast, "turning");
+            let cycle = fast.odometry + fast.step;
+            let row = format!(
+                "| {name} | {} | {} | {} | {} B | {} | {:.2} ms |",
+                flash(Level::Small, "boxes"),
+                flash(Level::Small, "turning"),
+                flash(Level::Fast, "turning"),
+                grouped(fast.stack_of_step.max(fast.stack_of_tracked)),
+                grouped(cycle),
+                cycle as f64 * 2.0 / 64_000.0,
+            );
+            assert!(readme.contains(&row), "{row}");
+        }
+    }
+
     #[test]
     fn small_code_takes_less_flash_and_more_instructions() {
         let table = Table::parse(DOCK).unwrap();

@@ -36,7 +36,8 @@ impl Limit {
     };
     /// A camera's calibration.
     pub const CALIBRATION: Self = Self {
-        bytes: MIB,
+        // PhotonVision adds its observations.
+        bytes: 16 * MIB,
         help: "check that it is the correct file; a calibration has some kilobytes",
     };
     /// A finished part or a manifest of a site build.
@@ -181,7 +182,7 @@ mod tests {
         ));
         let endless = read_from(repeat(0), Limit::CALIBRATION).unwrap_err();
         assert!(
-            endless.to_string().starts_with("it has more than 1 MiB"),
+            endless.to_string().starts_with("it has more than 16 MiB"),
             "{endless}"
         );
     }

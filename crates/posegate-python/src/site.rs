@@ -52,7 +52,9 @@ impl PySite {
         let task = calls::task(&self.site, task).map_err(|error| refused(py, error))?;
         let poses = Numbers::new(poses, "poses", &[None, Some(3)])?;
         let poses: &[[f64; 3]] = poses.numbers()?.as_chunks().0;
-        let is_inside = |pose: &[f64; 3]| task.success.membership(*pose).inside;
+        let [east, north] = self.site.map_origin;
+        let is_inside =
+            |[x, y, yaw]: &[f64; 3]| task.success.membership([x - east, y - north, *yaw]).inside;
         let inside: Vec<bool> = py.detach(|| {
             if poses.len() < CHUNK {
                 return poses.iter().map(is_inside).collect();

@@ -229,13 +229,28 @@ impl Bag {
 
     /// Writes a pose of an odometry as `nav_msgs/msg/Odometry`, in the frame of the pose, of `base_link`.
     pub fn odometry(&mut self, topic: &str, pose: &Pose) {
+        self.odometry_of(
+            "base_link",
+            topic,
+            &Pose {
+                covariance: [0.0; 3],
+                ..*pose
+            },
+        );
+    }
+
+    /// As [`Bag::odometry`], of a child frame, with the covariance.
+    pub fn odometry_of(&mut self, child: &str, topic: &str, pose: &Pose) {
         let mut cdr = Cdr::new(false);
         cdr.header(pose.t_s, pose.frame);
-        cdr.text("base_link");
+        cdr.text(child);
         let (sin, cos) = (0.5 * pose.yaw).sin_cos();
         cdr.floats(&[pose.x, pose.y, 0.0, 0.0, 0.0, sin, cos]);
         // The covariance of the pose, the twist and its covariance.
-        cdr.floats(&[0.0; 78]);
+        let mut covariance = [0.0; 36];
+        [covariance[0], covariance[7], covariance[35]] = pose.covariance;
+        cdr.floats(&covariance);
+        cdr.floats(&[0.0; 42]);
         let definition = format!("{HEADER}{ODOMETRY}{PARTS}");
         let name = "nav_msgs/msg/Odometry";
         self.write(topic, name, &definition, Self::logged(pose), &cdr.bytes);

@@ -38,7 +38,7 @@ pub const LINES: [(&str, &str); 35] = [
     ),
     (
         "metrics",
-        "metrics {reference} {estimate} --site {site} --task dock",
+        "metrics {reference} {estimate} --site {site} --task dock --times {times}",
     ),
     (
         "learn bounds",
@@ -54,7 +54,7 @@ pub const LINES: [(&str, &str); 35] = [
     ("predict", "predict {model} --at {at}"),
     (
         "replay",
-        "replay {site} {log} --task dock --truth {truth} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --mcap {mcap} -o {output}",
+        "replay {site} {log} --task dock --truth {truth} --times {times} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --mcap {mcap} -o {output}",
     ),
     (
         "replay",
@@ -154,7 +154,7 @@ pub fn file_of(leaf: &str, argument: &str) -> &'static str {
         (_, "site") => "site.toml",
         (_, "table") => "dock.posegate",
         (_, "poses" | "estimates" | "log") => "estimates.csv",
-        (_, "reference" | "truth" | "odom") => "truth.tum",
+        (_, "reference" | "truth" | "odom" | "times") => "truth.tum",
         (_, "costs") => "costs.csv",
         (_, "detections") => "detections.csv",
         (_, "outcomes") => "outcomes.csv",

@@ -25,6 +25,8 @@ pub mod replay;
 #[cfg(feature = "host")]
 pub mod sites;
 pub mod stepped;
+#[cfg(feature = "host")]
+pub mod storages;
 pub mod vectors;
 pub mod warehouse;
 pub mod wrapped;

@@ -12,7 +12,8 @@ use posegate_host::log::replay::{Clock, Thresholds};
 /// false
 ///
 /// The recording is CSV (the columns of `posegate gate`, with t_s; true_x_m, true_y_m, true_yaw_rad if the truth is
-/// known), TUM, or MCAP with ROS 2 topics. It is read as a stream; its faults are counted and reported.
+/// known), a trajectory (TUM, EuRoC, KITTI), or a bag: MCAP, SQLite (.db3), ROS 1 (.bag), or a rosbag2 folder with its metadata.yaml, also
+/// split and compressed. It is read as a stream; its faults are counted and reported.
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  posegate replay site.toml drive.mcap --task dock --topic /amcl_pose --cross-terms yaw-unknown --json\n  posegate replay site.toml estimates.csv --task dock --inflation 4 -o replay.svg --mcap verdicts.mcap\n\nRules that are compared with the gate, and the sources of their limits:\n  distance  position within --distance of the goal (Nav2: docking_threshold, 0.05 m)\n  sigma     deviations of x, y, yaw below --sigma and --sigma-yaw-deg (Nav2's docking threshold and undock_angular_tolerance)\n  ellipse   3-sigma error ellipse: long radius below --ellipse, lateral radius below --ellipse-lateral (Autoware's localization_error_monitor, 1.5 m and 0.3 m)\n  ate       everything if the recording's RMSE is below --ate, else nothing\n\nExit code 1: the gate permitted an estimate whose true pose was outside of the success set."
@@ -20,18 +21,21 @@ use posegate_host::log::replay::{Clock, Thresholds};
 pub struct Arguments {
     /// The site file
     pub site: Input,
-    /// The recording; `-` for standard input
+    /// The recording: a file, or the folder of a ROS 2 bag; `-` for standard input
     pub log: Input,
     /// The task
     #[arg(long)]
     pub task: String,
-    /// A topic with estimates (MCAP): PoseWithCovarianceStamped, Odometry, PoseStamped, AprilTagDetectionArray, or TFMessage (map to odom
+    /// A topic with estimates (of a bag): PoseWithCovarianceStamped, Odometry, PoseStamped, AprilTagDetectionArray, or TFMessage (map to odom
     /// composed with odom to the robot; it has no covariance: --set bounded); may be repeated
     #[arg(long)]
     pub topic: Vec<String>,
-    /// The truth: a file in the TUM format or a CSV (t_s, x_m, y_m, yaw_rad), or a topic of the bag
+    /// The truth: a file of TUM, EuRoC or KITTI (--times), a CSV (t_s, x_m, y_m, yaw_rad), or a topic of the bag
     #[arg(long)]
     pub truth: Option<Input>,
+    /// The times of a KITTI trajectory, as the truth or as the recording: one in each line, seconds
+    #[arg(long, value_name = "FILE")]
+    pub times: Option<Input>,
     /// Longest time between two true poses across which the truth is interpolated, seconds
     #[arg(long, default_value_t = 0.2)]
     pub truth_gap: f64,
@@ -69,6 +73,10 @@ pub struct Arguments {
     /// The robot's frame in /tf [default: base_link or base_footprint, whichever is the child of the odometry's frame]
     #[arg(long)]
     pub base_frame: Option<String>,
+    /// The frame whose poses are recorded, if it is not the robot's base; may be repeated. At its place in the site ([frame.NAME]) or in the
+    /// bag's /tf_static, else it counts as the base. Also for types without a child frame: the pose of a camera
+    #[arg(long, value_name = "NAME")]
+    pub child_frame: Vec<String>,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
     /// else log times, unless nearly all stamps are of another clock
     #[arg(long, value_enum, default_value = "auto")]

@@ -2,17 +2,21 @@
 
 use super::Arguments;
 use super::arguments::Kind;
+use super::bag;
 use super::inflation::Inflated;
 use crate::site_input::Failure;
-use posegate_host::files::{FileError, Files, Input, Opened};
+use posegate_host::files::{FileError, Files, Opened};
 use posegate_host::log::corners::MountedCamera;
 use posegate_host::log::recording::{
-    Bag, Format, ReaderDiagnostics, Recording, Role, TagLocalizer, Text, Wanted, format_of,
+    BAD_FOLDER, Bag, BagFile, BodyFrames, Format, ReaderDiagnostics, Recording, Role, TagLocalizer,
+    Text, Wanted, files_of, format_of,
 };
 use posegate_host::log::replay::{Clock, Part};
-use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, tum};
+use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, trajectories};
 use posegate_host::printable::printable;
 use posegate_host::site::Site;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 
 /// The largest number of true poses of a topic that are kept.
@@ -27,6 +31,10 @@ pub struct Recorded {
     pub part: Part,
     /// The gate's clock, if the recording's format defines it.
     pub clock: Option<Clock>,
+    /// The places of frames on the robot.
+    body: BodyFrames,
+    /// Poses of the truth's file that are left out because the one before has the same time.
+    pub duplicates: u64,
 }
 
 impl Recorded {
@@ -37,40 +45,37 @@ impl Recorded {
         radius_squared: f64,
         inflated: &Inflated,
     ) -> Result<Self, Failure> {
-        let Opened {
-            reader,
+        let Source {
+            mut input,
+            format,
             name,
             length,
-        } = open(files, &arguments.log)?;
-        let mut input = BufReader::with_capacity(1 << 18, reader);
-        let start = input.fill_buf().map_err(|cause| FileError::Unread {
-            name: name.clone(),
-            cause,
-        })?;
-        let format = format_of(start);
-        if matches!(format, Format::Sqlite | Format::Ros1) {
-            return Err(foreign(&name));
-        }
-        let is_bag = format == Format::Mcap;
+        } = Source::open(arguments, files)?;
+        let is_bag = format.is_bag();
         if is_bag == arguments.topic.is_empty() {
             return Err(if is_bag {
-                which_topic(input, &name)
+                which_topic(Bag::of_files(input.parts(arguments, files)?, &[]), &name)?
             } else {
                 Failure::usage(
-                    format!("{name} is not an MCAP file: it has no topics"),
+                    format!("{name} is not a bag: it has no topics"),
                     "leave --topic out",
                 )
             });
         }
-        let (track, truth_topic) = truth(arguments, files, is_bag)?;
+        let Truth {
+            track,
+            topic: truth_topic,
+            duplicates,
+        } = truth(arguments, files, site, is_bag)?;
         let looks = if is_bag {
             looks(arguments, site, radius_squared)?
         } else {
             None
         };
         let mut clock = None;
+        let body;
         let recording: Box<dyn Recording + Send> = match format {
-            Format::Mcap => {
+            format if format.is_bag() => {
                 let numbered = (0u8..=255).zip(&arguments.topic);
                 let mut wanted: Vec<Wanted> = numbered
                     .map(|(number, topic)| Wanted {
@@ -82,22 +87,46 @@ impl Recorded {
                     topic,
                     role: Role::Truth,
                 }));
-                Box::new(Bag::new(input, &name, &wanted).with_frames(arguments.frames()))
+                body = bag::body(arguments, files, site, &wanted)?;
+                let bag = Bag::of_files(input.parts(arguments, files)?, &wanted);
+                let bag = bag.with_frames(arguments.frames());
+                Box::new(bag.with_body(body.clone()))
             }
             Format::Csv => {
                 let gaussian = arguments.set == Kind::Gaussian;
-                let mut text = Text::csv(input, &name, gaussian).map_err(Failure::input)?;
+                let mut text = Text::csv(input.reader, &name, gaussian).map_err(Failure::input)?;
                 inflated.reads(&mut text, &name);
+                body = bag::of_site(arguments, site)?;
                 // A recorded time of use is the clock, however far it is from the stamps.
                 clock = Some(if text.has_use() {
                     Clock::Logged
                 } else {
                     Clock::Stamps
                 });
-                Box::new(text)
+                Box::new(text.with_body(body.clone()))
             }
-            Format::Tum => Box::new(Text::tum(input, &name)),
-            _ => return Err(foreign(&name)),
+            Format::Tum => {
+                body = bag::of_site(arguments, site)?;
+                Box::new(Text::tum(input.reader, &name).with_body(body.clone()))
+            }
+            Format::Euroc | Format::Kitti => {
+                body = bag::of_site(arguments, site)?;
+                let mut text = Vec::new();
+                let times = times(arguments, files)?;
+                let times = times
+                    .as_ref()
+                    .map(|(text, name)| (text.as_slice(), name.as_str()));
+                input
+                    .reader
+                    .read_to_end(&mut text)
+                    .map_err(|cause| FileError::Unread {
+                        name: name.clone(),
+                        cause,
+                    })?;
+                let text = Text::<std::io::Empty>::trajectory(&text, &name, times);
+                Box::new(text.map_err(Failure::input)?.with_body(body.clone()))
+            }
+            _ => return Err(Failure::internal("a format without a reader".into())),
         };
         Ok(Self {
             recording,
@@ -113,64 +142,132 @@ impl Recorded {
                 outside: 0,
             },
             clock,
+            body,
+            duplicates,
+        })
+    }
+
+    /// Returns the frames of the recorded poses with a known place on the robot: x, y (m) and yaw (rad).
+    pub fn body_frames(&self) -> Value {
+        let frames = self.recording.diagnostics().child_frames.iter();
+        let known = frames.filter_map(|name| Some((name.clone(), json!(self.body.place(name)?))));
+        Value::Object(known.collect())
+    }
+}
+
+/// The recording, open or to be opened.
+struct Source {
+    input: Beginning,
+    format: Format,
+    name: String,
+    /// Bytes; 0 if it is not known.
+    length: u64,
+}
+
+/// The bytes of a recording that is a stream or a text; for a bag at a path they are read again from the path.
+struct Beginning {
+    reader: BufReader<Box<dyn Read + Send>>,
+}
+
+impl Source {
+    fn open(arguments: &Arguments, files: &Files) -> Result<Self, Failure> {
+        let log = &arguments.log;
+        if log.as_path().is_dir() {
+            let paths =
+                files_of(log.as_path()).map_err(|fault| Failure::usage(fault, BAD_FOLDER))?;
+            let lengths = paths.iter().filter_map(|path| path.metadata().ok());
+            return Ok(Self {
+                input: Beginning {
+                    reader: BufReader::new(Box::new(std::io::empty())),
+                },
+                format: Format::Mcap,
+                name: log.display().to_string(),
+                length: lengths.map(|data| data.len()).sum(),
+            });
+        }
+        let Opened {
+            reader,
+            name,
+            length,
+        } = files.open(log)?;
+        let mut reader = BufReader::with_capacity(1 << 18, reader);
+        let start = reader.fill_buf().map_err(|cause| FileError::Unread {
+            name: name.clone(),
+            cause,
+        })?;
+        Ok(Self {
+            format: format_of(start),
+            input: Beginning { reader },
+            name,
+            length,
         })
     }
 }
 
-/// Returns the failure for a bag in a format that is not read, with or without --topic.
-fn foreign(name: &str) -> Failure {
-    Failure::usage(
-        format!("{name} is a bag of ROS 1 or SQLite, which cannot be read"),
-        "convert it: `ros2 bag convert`, or `rosbags-convert --dst-storage mcap`",
-    )
-}
-
-/// Opens the recording.
-fn open(files: &Files, input: &Input) -> Result<Opened, Failure> {
-    if input.as_path().is_dir() {
-        return Err(Failure::usage(
-            format!("{} is a folder", input.display()),
-            "give the .mcap file in it",
-        ));
+impl Beginning {
+    /// Returns the files of a bag.
+    fn parts(self, arguments: &Arguments, files: &Files) -> Result<Vec<BagFile<'static>>, Failure> {
+        let log = &arguments.log;
+        // A pipe gives its bytes once.
+        if log.as_path().is_file() || log.as_path().is_dir() {
+            return bag::parts(files, log);
+        }
+        let name = log.display().to_string();
+        Ok(vec![BagFile::Stream(Box::new(self.reader), name)])
     }
-    Ok(files.open(input)?)
 }
 
-/// Lists the topics that are not read, one line each.
+/// Lists the topics of a bag, one line each.
 pub fn topics(diagnostics: &ReaderDiagnostics) -> String {
-    let lines = diagnostics.skipped.iter().map(|(topic, skipped)| {
-        format!(
-            "\n  {} ({}, {} messages)",
-            printable(topic),
+    let read = diagnostics.read.iter();
+    let read = read.map(|(topic, count)| (topic, format!("{count} messages")));
+    let skipped = diagnostics.skipped.iter().map(|(topic, skipped)| {
+        let words = format!(
+            "{}, {} messages",
             printable(&skipped.schema),
             skipped.messages
-        )
+        );
+        (topic, words)
     });
+    let all: BTreeMap<&String, String> = read.chain(skipped).collect();
+    let lines = all
+        .into_iter()
+        .map(|(topic, words)| format!("\n  {} ({words})", printable(topic)));
     lines.collect()
 }
 
 /// Returns the failure for a bag without --topic, with the bag's topics.
-fn which_topic(input: impl Read, name: &str) -> Failure {
-    let mut bag = Bag::new(input, name, &[]);
-    while let Ok(Some(_)) = bag.next() {}
-    Failure::list(
+fn which_topic(mut bag: Bag<'_>, name: &str) -> Result<Failure, Failure> {
+    while bag.next().map_err(bag::failure)?.is_some() {}
+    Ok(Failure::list(
         &format!(
             "{} has topics:{}",
             printable(name),
             topics(bag.diagnostics())
         ),
         "name the topic with the estimates, such as --topic /amcl_pose",
-    )
+    ))
+}
+
+/// The true poses.
+#[derive(Default)]
+struct Truth {
+    track: Option<Trajectory>,
+    /// The topic that has them.
+    topic: Option<String>,
+    /// Poses of a file that are left out because the one before has the same time.
+    duplicates: u64,
 }
 
 /// Returns the truth from a file, or the topic that has it.
 fn truth(
     arguments: &Arguments,
     files: &Files,
+    site: &Site,
     is_bag: bool,
-) -> Result<(Option<Trajectory>, Option<String>), Failure> {
+) -> Result<Truth, Failure> {
     let Some(truth) = &arguments.truth else {
-        return Ok((None, None));
+        return Ok(Truth::default());
     };
     if !(arguments.truth_gap > 0.0) {
         return Err(Failure::usage(
@@ -183,7 +280,7 @@ fn truth(
         if !is_bag {
             return Err(Failure::usage(
                 format!("--truth {topic}: there is no such file"),
-                "give a TUM file or a CSV; topics are those of MCAP files",
+                "give a TUM file or a CSV; topics are those of bags",
             ));
         }
         if arguments.topic.contains(&topic) {
@@ -193,9 +290,15 @@ fn truth(
             ));
         }
         let track = Trajectory::new(MOST_TRUE, arguments.truth_gap);
-        return Ok((Some(track), Some(topic)));
+        return Ok(Truth {
+            track: Some(track),
+            topic: Some(topic),
+            duplicates: 0,
+        });
     }
     let (bytes, name) = files.read(truth)?;
+    let mut duplicates = 0;
+    let [east, north] = site.map_origin;
     let track = match format_of(&bytes) {
         Format::Csv => {
             let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
@@ -205,26 +308,43 @@ fn truth(
                 let pose = row.estimate;
                 track.push(
                     row.t_s.unwrap_or(f64::NAN),
-                    [pose.x_m, pose.y_m, pose.yaw_rad],
+                    [pose.x_m - east, pose.y_m - north, pose.yaw_rad],
                 );
             }
             track.complete();
             track
         }
-        Format::Tum => {
-            // A comment may have another encoding; numbers have none.
-            let text = String::from_utf8_lossy(&bytes);
-            let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
-            Trajectory::of(&poses, arguments.truth_gap)
+        Format::Tum | Format::Euroc | Format::Kitti => {
+            let times = times(arguments, files)?;
+            let times = times
+                .as_ref()
+                .map(|(text, name)| (text.as_slice(), name.as_str()));
+            let mut found = trajectories::read(&bytes, &name, times).map_err(Failure::input)?;
+            duplicates = found.duplicates;
+            for pose in &mut found.poses {
+                pose.position.x -= east;
+                pose.position.y -= north;
+            }
+            Trajectory::of(&found.poses, arguments.truth_gap)
         }
         _ => {
             return Err(Failure::usage(
-                format!("--truth {name} is neither TUM nor CSV"),
-                "name a topic of the recording, or give a TUM file",
+                format!("--truth {name} is neither a trajectory nor a CSV"),
+                "name a topic of the recording, or give a file of TUM, EuRoC or KITTI",
             ));
         }
     };
-    Ok((Some(track), None))
+    Ok(Truth {
+        track: Some(track),
+        duplicates,
+        ..Truth::default()
+    })
+}
+
+/// Reads the times of a KITTI trajectory. Returns the file and its name.
+fn times(arguments: &Arguments, files: &Files) -> Result<Option<(Vec<u8>, String)>, Failure> {
+    let times = arguments.times.as_ref();
+    Ok(times.map(|times| files.read(times)).transpose()?)
 }
 
 /// Returns the localizer for detections, with the camera and the tags. `None` if the site has no camera, or has several and

@@ -1,20 +1,25 @@
 //! The odometry of a replay: a topic of the recording, or a file.
 
-use super::Arguments;
+use super::input::topics;
+use super::{Arguments, bag};
 use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
 use posegate_host::files::{Files, Input};
 use posegate_host::log::recording::{
-    Bag, Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
+    Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
 };
 use posegate_host::log::replay::{Odometry, OdometryPose, odometry_csv};
-use posegate_host::log::tum;
+use posegate_host::log::trajectories;
 use posegate_host::printable::printable;
-use std::io::BufReader;
+use posegate_host::site::Site;
 
 /// Reads the odometry; `None` without --odom.
-pub fn odometry(arguments: &Arguments, files: &Files) -> Result<Option<Odometry>, Failure> {
+pub fn odometry(
+    arguments: &Arguments,
+    files: &Files,
+    site: &Site,
+) -> Result<Option<Odometry>, Failure> {
     let Some(from) = &arguments.odom else {
         return Ok(None);
     };
@@ -27,7 +32,7 @@ pub fn odometry(arguments: &Arguments, files: &Files) -> Result<Option<Odometry>
     let poses = if from.as_path().is_file() {
         of_file(from, files)?
     } else {
-        of_topic(arguments, &from.as_path().to_string_lossy(), files)?
+        of_topic(arguments, &from.as_path().to_string_lossy(), files, site)?
     };
     let odometry = Odometry::new(poses);
     if odometry.is_empty() {
@@ -43,14 +48,13 @@ fn of_file(from: &Input, files: &Files) -> Result<Vec<OdometryPose>, Failure> {
     let (bytes, name) = files.read(from)?;
     match format_of(&bytes) {
         Format::Csv => odometry_csv(bytes.as_slice(), &name).map_err(Failure::input),
-        Format::Tum => {
-            // A comment may have another encoding; numbers have none.
-            let text = String::from_utf8_lossy(&bytes);
-            let poses = tum::trajectory(&text, &name).map_err(Failure::input)?;
-            Ok(poses.iter().map(|pose| (pose.t_s, pose.level())).collect())
+        Format::Tum | Format::Euroc => {
+            let found = trajectories::read(&bytes, &name, None).map_err(Failure::input)?;
+            let poses = found.poses.iter();
+            Ok(poses.map(|pose| (pose.t_s, pose.level())).collect())
         }
         _ => Err(Failure::usage(
-            format!("--odom {name} is neither TUM nor CSV"),
+            format!("--odom {name} is not TUM, EuRoC or CSV"),
             "name a topic of the recording, or give a file with poses and times",
         )),
     }
@@ -61,11 +65,12 @@ fn of_topic(
     arguments: &Arguments,
     topic: &str,
     files: &Files,
+    site: &Site,
 ) -> Result<Vec<OdometryPose>, Failure> {
     if arguments.topic.is_empty() {
         return Err(Failure::usage(
             format!("--odom {topic}: there is no such file"),
-            "give a TUM file or a CSV; topics are those of MCAP files",
+            "give a TUM file or a CSV; topics are those of bags",
         ));
     }
     if arguments.topic.iter().any(|known| known == topic) {
@@ -74,21 +79,20 @@ fn of_topic(
             "name the topic of the odometry",
         ));
     }
-    let opened = files.open(&arguments.log)?;
-    let wanted = Wanted {
+    let wanted = [Wanted {
         topic: topic.to_string(),
         role: Role::Odometry,
-    };
-    let reader = BufReader::with_capacity(1 << 18, opened.reader);
-    let bag = Bag::new(reader, &opened.name, &[wanted]);
-    let mut bag = bag.with_frames(arguments.frames());
+    }];
+    let body = bag::body(arguments, files, site, &wanted)?;
+    let mut bag = bag::open(arguments, files, &wanted)?.with_body(body);
     let mut poses = Vec::new();
-    while let Some(item) = bag.next().map_err(Failure::input)? {
+    while let Some(item) = bag.next().map_err(bag::failure)? {
         if let Item::Truth(pose) = item {
             poses.push((pose.t_s, pose.level()));
         }
     }
     let diagnostics = bag.diagnostics();
+    let name = arguments.log.display();
     if !diagnostics.read.contains_key(topic) {
         let refused = diagnostics.skipped.get(topic);
         let transforms = diagnostics
@@ -105,22 +109,28 @@ fn of_topic(
                 )
             },
         );
-        let (name, topic) = (&opened.name, printable(topic));
-        return Err(Failure::usage(
-            match refused {
-                Some(skipped) => format!(
+        let topic = printable(topic);
+        return Err(match refused {
+            Some(skipped) => Failure::usage(
+                format!(
                     "{name}: the topic {topic} is not an odometry: {} ({})",
                     skipped.why.name(),
                     printable(&skipped.schema)
                 ),
-                None => format!("{name} has no topic {topic}"),
-            },
-            &help,
-        ));
+                &help,
+            ),
+            None => Failure::list(
+                &format!(
+                    "{name} has no topic {topic}; it has:{}",
+                    topics(diagnostics)
+                ),
+                &help,
+            ),
+        });
     }
     if poses.is_empty() && !diagnostics.transforms.is_empty() {
         return Err(no_edge(
-            &format!("{}: {} has", opened.name, printable(topic)),
+            &format!("{}: {} has", name, printable(topic)),
             diagnostics,
             arguments,
         ));

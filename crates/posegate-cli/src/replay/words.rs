@@ -45,42 +45,50 @@ pub fn no_estimates(
         .map_or(String::new(), |damage| format!("; broken {damage}"));
     let bytes = diagnostics.first_undecodable.as_deref();
     let bytes = bytes.map_or(String::new(), |first| format!("; {first}"));
-    let others = topics(diagnostics);
-    let others = if others.is_empty() {
-        others
+    let all = topics(diagnostics);
+    let all = if all.is_empty() {
+        all
     } else {
-        format!("; its other topics:{others}")
+        format!("; its topics:{all}")
     };
-    Failure::usage(
-        format!("{name}: no estimate{refused}{damage}{bytes}{others}"),
+    let why = printable(&format!("{name}: no estimate{refused}{damage}{bytes}")).into_owned();
+    Failure::list(
+        &format!("{why}{all}"),
         "give a recording with estimates, and the topic that has them",
     )
 }
 
-/// Checks that the named topics exist, and that a requested truth applies to at least one estimate.
+/// Checks that the named topics are in the bag.
+pub fn check_topics(arguments: &Arguments, diagnostics: &ReaderDiagnostics) -> Result<(), Failure> {
+    let is_there = |topic: &String| {
+        diagnostics.read.contains_key(topic) || diagnostics.skipped.contains_key(topic)
+    };
+    let missing: String = arguments
+        .topic
+        .iter()
+        .filter(|topic| !is_there(topic))
+        .map(|topic| format!(" {}", printable(topic)))
+        .collect();
+    // A damaged bag may have lost the topic.
+    if missing.is_empty() || diagnostics.damage.is_some() {
+        return Ok(());
+    }
+    let name = printable(&arguments.log.display().to_string()).into_owned();
+    Err(Failure::list(
+        &format!(
+            "{name} has no topic{missing}; it has:{}",
+            topics(diagnostics)
+        ),
+        "leave it out, or name an existing topic",
+    ))
+}
+
+/// Checks that a requested truth applies to at least one estimate.
 pub fn check_requested(
     arguments: &Arguments,
     diagnostics: &ReaderDiagnostics,
     replay: &Replay<'_>,
 ) -> Result<(), Failure> {
-    let name = arguments.log.display();
-    let missing: String = arguments
-        .topic
-        .iter()
-        .filter(|topic| {
-            !diagnostics.read.contains_key(*topic) && !diagnostics.skipped.contains_key(*topic)
-        })
-        .map(|topic| format!(" {topic}"))
-        .collect();
-    if !missing.is_empty() {
-        return Err(Failure::usage(
-            format!(
-                "{name} has no topic{missing}; its other topics:{}",
-                topics(diagnostics)
-            ),
-            "leave it out, or name an existing topic",
-        ));
-    }
     let [(_, verdicts), ..] = replay.tallies();
     let Some(truth) = arguments
         .truth
@@ -164,6 +172,14 @@ pub fn sentences(
     ))?;
     for (reason, count) in replay.reasons() {
         print(&format_args!("  {count} {reason}: {}", reason.action()))?;
+        if reason == Reason::Tilted {
+            print(&format_args!(
+                "    by up to {:.1} deg: if these are the poses of a camera, name its frame with --child-frame, and its place on the robot in the site ([frame.NAME])",
+                summary["findings"]["most_tilt_deg"]
+                    .as_f64()
+                    .unwrap_or(f64::NAN)
+            ))?;
+        }
         if reason == Reason::FrameMismatch {
             print(&format_args!("    {}", frames(&summary["frame_mismatch"])))?;
         }
@@ -217,6 +233,29 @@ pub fn sentences(
         if count > 0 {
             print(&format_args!("found: {count} {name}"))?;
         }
+    }
+    if let Some(names) = summary["child_frames"]
+        .as_array()
+        .filter(|all| !all.is_empty())
+    {
+        let of = |name: &Value| {
+            let text = printable(name.as_str().unwrap_or_default()).into_owned();
+            let place = name.as_str().map(|name| &summary["body_frames"][name]);
+            match place.and_then(Value::as_array).map(Vec::as_slice) {
+                Some([x, y, yaw]) => {
+                    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+                    format!(
+                        "`{text}` at ({:.3} m, {:.3} m, {:.1} deg) on the robot",
+                        number(x),
+                        number(y),
+                        number(yaw).to_degrees()
+                    )
+                }
+                _ => format!("`{text}`, as the robot's base"),
+            }
+        };
+        let names: Vec<String> = names.iter().map(of).collect();
+        print(&format_args!("child frames: {}", names.join(", ")))?;
     }
     for key in ["skipped_topics", "looks"] {
         let part = summary["recording"].get(key).or(summary.get(key));

@@ -3,6 +3,7 @@
 use crate::bags::{Bag, Compression, Pose};
 use crate::mutate::Kind;
 use posegate_testkit::mcap::{MAGIC, op};
+use posegate_testkit::storages::{ros1, sqlite, zstd};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -64,6 +65,16 @@ const FIELD: &str = "{\n  \"tags\": [\n    { \"ID\": 3, \"pose\": { \"translatio
     { \"ID\": 12, \"pose\": { \"translation\": { \"x\": 0.25, \"y\": 2.5, \"z\": 0.5 }, \"rotation\": { \"quaternion\": { \"W\": 1.0, \"X\": 0.0, \"Y\": 0.0, \"Z\": 0.0 } } } }\n  ],\n  \"field\": { \"length\": 16.5, \"width\": 8.0 }\n}\n";
 const BUNDLES: &str = "standalone_tags: []\ntag_bundles:\n  [\n    { name: dock, layout: [\n      {id: 7, size: 0.1, x: 0.0, y: 0.0, z: 0.0, qw: 1.0, qx: 0.0, qy: 0.0, qz: 0.0},\n      {id: 8, size: 0.2, x: 0.5, y: 0.0, z: 0.0, qw: 1.0, qx: 0.0, qy: 0.0, qz: 0.0}\n    ] }\n  ]\n";
 const DOCKS: &str = "docks:\n  dock1:\n    type: \"charging_dock\"\n    frame: map\n    pose: [1.0, 2.0, 1.57]\n  dock2:\n    type: \"charging_dock\"\n    pose: [-1.5, 0.25, -0.5]\n";
+const PARAMETERS: &str = "/**:\n  docking_server:\n    ros__parameters:\n      dock_plugins: [charger]\n      charger:\n        plugin: a\n        docking_threshold: 0.05\n        staging_x_offset: -0.7\n        use_external_detection_pose: true\n\
+    \x20       dock_direction: backward\n      docks: [home, b]\n      home: {type: charger, frame: map, pose: [1.5, -2.0, 1.57]}\n      b.pose: [0.5, 1.0, 0.0]\n";
+const OPENCV: &str = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 6.0e+02, 0., 3.2e+02, 0., 6.0e+02, 2.4e+02, 0., 0., 1. ]\n\
+    distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 1.0e-01, -2.0e-01, 0., 0., 0. ]\navg_reprojection_error: 1.4\n";
+const VINS: &str = "%YAML:1.0\nmodel_type: PINHOLE\ncamera_name: c\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n  k1: -0.29\n  k2: 0.08\n  p1: 0.0001\n  p2: 0.0\nprojection_parameters:\n  fx: 461.0\n  fy: 460.0\n  cx: 363.0\n  cy: 248.0\n";
+const ECHO: &str = "header:\n  frame_id: c\nheight: 480\nwidth: 640\ndistortion_model: rational_polynomial\nd: [0.1, 0.2, 0.0, 0.0, 0.01, 0.3, 0.1, 0.02, 0.0, 0.0, 0.0, 0.0]\nk: [600.0, 0.0, 320.0, 0.0, 600.0, 240.0, 0.0, 0.0, 1.0]\n\
+    binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, y_offset: 0, height: 480, width: 640}\n---\nheader: 1\n";
+const PHOTON: &str = "{\"resolution\":{\"width\":640.0,\"height\":480.0},\"cameraIntrinsics\":{\"rows\":3,\"cols\":3,\"type\":6,\"data\":[600,0,320,0,600,240,0,0,1]},\"distCoeffs\":{\"rows\":1,\"cols\":5,\"type\":6,\"data\":[0.1,-0.2,0,0,0]}}";
+const FMAP: &str = "{\"type\":\"frc\",\"fiducials\":[{\"family\":\"apriltag3_36h11_classic\",\"id\":4,\"size\":165.1,\"transform\":[0,-1,0,-2.5,1,0,0,1.25,0,0,1,0.6,0,0,0,1],\"unique\":1}]}";
+const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - a_0.mcap\n    - a_1.mcap\n  compression_mode: \"\"\n";
 const TABLES: &str = "[tag.t7]\nid = 7\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\n[goal.dock]\nx = 1.0\ny = 2.0\nyaw_deg = 90.0\n";
 /// A site with compact tables, which are quick to build.
 const SITE: &str = "[camera.front]\nwidth_px = 640\nheight_px = 480\nfx = 615.0\nfy = 615.0\ncx = 320.0\ncy = 240.0\ndistortion = { model = \"plumb_bob\", coefficients = [-0.05, 0.01, 0.0, 0.0, 0.0] }\n\
@@ -143,6 +154,22 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
         .map(|compression| bag(compression, 30))
         .collect();
     bags.push(without_checksums(bag(None, 30)));
+    let poses: Vec<Pose> = (0..20)
+        .map(|k| Pose {
+            t_s: 1.0 + 0.1 * f64::from(k),
+            ..Pose::AT_DOCK
+        })
+        .collect();
+    const TOPIC: &str = "/amcl_pose";
+    let storages = vec![
+        sqlite(TOPIC, &poses, false, |bytes| bytes),
+        sqlite(TOPIC, &poses, true, |bytes| zstd(&bytes)),
+        ros1(TOPIC, &poses, "none"),
+        ros1(TOPIC, &poses, "lz4"),
+        ros1(TOPIC, &poses, "bz2"),
+        zstd(&bags[0]),
+        zstd(&sqlite(TOPIC, &poses, false, |bytes| bytes)),
+    ];
     bags.extend(recorded.map(<[u8]>::to_vec));
 
     let format = |name, kind, file, seeds, commands| Format {
@@ -220,6 +247,49 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             ],
         ),
         format(
+            "bags SQLite and ROS 1",
+            Binary,
+            "mutant.db3",
+            storages,
+            &[
+                "replay dock.toml {} --task dock --topic /amcl_pose --json",
+                "replay dock.toml {} --task dock",
+                "replay dock.toml {} --task dock --topic /amcl_pose --odom /amcl_pose2 --max-speed 1",
+            ],
+        ),
+        format(
+            "metadata of a bag YAML",
+            Text,
+            "bag/metadata.yaml",
+            text(&[METADATA]),
+            &[
+                "replay dock.toml bag --task dock --topic /amcl_pose --json",
+                "replay dock.toml bag --task dock",
+            ],
+        ),
+        format(
+            "trajectories EuRoC and KITTI",
+            Text,
+            "mutant.csv",
+            text(&[&euroc(), &kitti()]),
+            &[
+                "metrics {} trajectory.txt --json",
+                "metrics trajectory.txt {} --times times.txt --json",
+                "replay dock.toml estimates.csv --task dock --truth {} --json",
+                "replay dock.toml {} --task dock --set bounded --translation 0.01 --yaw-deg 1 --times times.txt",
+            ],
+        ),
+        format(
+            "Limelight JSON",
+            Text,
+            "mutant.json",
+            text(&[FMAP]),
+            &[
+                "import {} --format fmap --json",
+                "import {} --format fmap --pose x=8,y=4",
+            ],
+        ),
+        format(
             "detections CSV",
             Text,
             "mutant.csv",
@@ -281,7 +351,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             "calibrations YAML",
             Text,
             "mutant.yaml",
-            text(&[ROS, KALIBR]),
+            text(&[ROS, KALIBR, OPENCV, VINS, ECHO, PHOTON]),
             &["check calibrated.toml", "check calibrated.toml --json"],
         ),
         format(
@@ -308,7 +378,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             "Nav2 docks YAML",
             Text,
             "mutant.yaml",
-            text(&[DOCKS]),
+            text(&[DOCKS, PARAMETERS]),
             &[
                 "import {} --format nav2_docks --json",
                 "check imported.toml",
@@ -416,6 +486,21 @@ fn without_checksums(mut bag: Vec<u8>) -> Vec<u8> {
 /// Returns the trajectory that mutants are compared with.
 pub fn tum() -> String {
     let line = |k: u32| format!("{}.5 {} 0.25 0 0 0 0 1\n", k, 0.1 * f64::from(k));
+    (0..40).map(line).collect()
+}
+
+/// Returns the times of the trajectory without times.
+pub fn times() -> String {
+    (0..40).map(|k| format!("{k}.5\n")).collect()
+}
+
+fn euroc() -> String {
+    let line = |k: u32| format!("{k}500000000,{},0.25,0,1,0,0,0,9\n", 0.1 * f64::from(k));
+    (1..40).map(line).collect()
+}
+
+fn kitti() -> String {
+    let line = |k: u32| format!("1 0 0 {} 0 1 0 0.25 0 0 1 0\n", 0.1 * f64::from(k));
     (0..40).map(line).collect()
 }
 

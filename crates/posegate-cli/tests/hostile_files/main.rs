@@ -107,6 +107,12 @@ impl Folder {
             std::fs::write(folder.path().join(name), bytes).expect("a file");
         }
         std::fs::write(folder.path().join("trajectory.txt"), formats::tum()).expect("a file");
+        std::fs::write(folder.path().join("times.txt"), formats::times()).expect("a file");
+        let bag = folder.path().join("bag");
+        std::fs::create_dir(&bag).expect("a folder");
+        for name in ["a_0.mcap", "a_1.mcap"] {
+            std::fs::write(bag.join(name), formats::bag(None, 4)).expect("a file");
+        }
         if let Some(from) = from {
             for entry in std::fs::read_dir(from).expect("a folder") {
                 let path = entry.expect("a file").path();

@@ -7,6 +7,7 @@ use super::{CameraFinding, Findings, TagFinding, TaskFinding, seen, view};
 use crate::cover::overlap;
 use crate::draw::ingredients::{Eye, Ingredients, axes, corners, frame, radians};
 use crate::site::{ErrorBound, Site, SiteTag, Task, line_of, stated_views};
+use posegate::certify::Calibration;
 use posegate::shape::{Exclusion, Pose3Deg, Shape, Tag, Visibility};
 
 /// The code of a warning about a stated error that no view can satisfy.
@@ -14,6 +15,8 @@ pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 
 /// The sine of 45 degrees: a direction with a larger elevation looks up or down.
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// The farthest that an optical axis is from the middle of an image, as a share of its width or height.
+const FARTHEST_AXIS: f64 = 0.15;
 /// A wall that begins higher is above the robot, metres.
 const FLOOR: f64 = 0.05;
 
@@ -45,11 +48,41 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     for camera in &findings.cameras {
         of_camera(findings, camera, &mut all);
     }
+    for (name, camera) in &site.cameras {
+        all.extend(off_centre(name, &camera.calibration));
+    }
+    all.extend(site.remarks.iter().map(|remark| {
+        let [kind, name] = &remark.about;
+        let note = &remark.note;
+        warn(note.code, [kind, name], note.message.clone(), note.help)
+    }));
     for (task, finding) in site.tasks.values().zip(&findings.tasks) {
         of_task(site, task, finding, &mut all);
     }
     all.extend(stated_errors(site));
     all
+}
+
+/// Returns a warning if a camera's axis is far from the middle of its image, as in a calibration of another resolution.
+fn off_centre(name: &str, calibration: &Calibration) -> Option<Warning> {
+    let Calibration {
+        size_px, axis_px, ..
+    } = calibration;
+    let offs = [0, 1].map(|axis| (axis_px[axis] - 0.5 * size_px[axis]).abs());
+    let shares = [offs[0] / size_px[0], offs[1] / size_px[1]];
+    let axis = usize::from(shares[1] > shares[0]);
+    (shares[axis] > FARTHEST_AXIS).then(|| {
+        warn(
+            "axis_off_centre",
+            ["camera", name],
+            format!(
+                "its optical axis ({} px, {} px) is {:.0} px from the middle of the image of {} x {} px, {:.0} % of the {}",
+                axis_px[0], axis_px[1], offs[axis], size_px[0], size_px[1], 100.0 * shares[axis],
+                ["width", "height"][axis]
+            ),
+            "check that the calibration is of this resolution, and not of a cropped or binned image",
+        )
+    })
 }
 
 /// Returns a warning for each task, and for the looks of the planner at tags and candidates, whose stated error is

@@ -11,7 +11,7 @@
 //! # Ok::<(), posegate_host::log::tum::TumError>(())
 //! ```
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// A pose with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,67 +49,13 @@ pub struct TumError {
     pub expected: &'static str,
 }
 
-/// The largest difference of a quaternion's length from 1: files are rounded to a few decimals.
-const ROUNDED: f64 = 1e-3;
-
-/// Reads a trajectory; `file` names it in errors. Numbers are separated by blanks or tabs.
+/// Reads a trajectory; `file` names it in errors. Numbers are separated by blanks or tabs. Of poses with the same time the first is used.
 ///
 /// # Errors
 /// A line with fewer or more than 8 numbers, a field that is not a finite number, a quaternion whose length is
-/// not 1 (within 1e-3), a time that is not after the previous one, or no pose at all.
+/// not 1 (within 1e-3), a time before the previous one, or no pose at all.
 pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
-    let mut poses: Vec<Stamped> = Vec::new();
-    let mut last = 0;
-    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-        let fail = |column: usize, message: String, expected: &'static str| {
-            fault(file, index + 1, column, message, expected)
-        };
-        last = index + 1;
-        let Some((numbers, places)) = numbers(line, file, index + 1)? else {
-            continue;
-        };
-        for (number, (place, field)) in numbers.iter().zip(fields(line)) {
-            if !number.is_finite() {
-                return Err(fail(place, format!("`{field}`"), "a finite decimal number"));
-            }
-        }
-        let [t_s, x, y, z, qx, qy, qz, qw] = numbers;
-        if let Some(before) = poses.last().map(|pose| pose.t_s)
-            && !(t_s > before)
-        {
-            let message = if t_s == before {
-                format!("the time {t_s} is there twice")
-            } else {
-                format!("the time {t_s} is before the {before} of the pose before")
-            };
-            return Err(fail(
-                places[0],
-                message,
-                "times that increase: sort the file, and keep one pose for each",
-            ));
-        }
-        let quaternion = Quaternion::new(qw, qx, qy, qz);
-        let length = quaternion.norm();
-        if !((length - 1.0).abs() <= ROUNDED) {
-            let message = format!("the quaternion's length is {length}");
-            return Err(fail(places[4], message, "1, in the order qx qy qz qw"));
-        }
-        poses.push(Stamped {
-            t_s,
-            position: Vector3::new(x, y, z),
-            rotation: UnitQuaternion::from_quaternion(quaternion),
-        });
-    }
-    if poses.is_empty() {
-        return Err(TumError {
-            file: file.to_owned(),
-            line: last.max(1),
-            column: 1,
-            message: "no pose".to_owned(),
-            expected: "lines of timestamp tx ty tz qx qy qz qw",
-        });
-    }
-    Ok(poses)
+    Ok(super::trajectories::read(text.as_bytes(), file, None)?.poses)
 }
 
 /// Eight numbers, and the character at which each begins.
@@ -147,7 +93,7 @@ pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Li
     Ok(Some((numbers, places)))
 }
 
-fn fault(
+pub(super) fn fault(
     file: &str,
     line: usize,
     column: usize,
@@ -164,7 +110,7 @@ fn fault(
 }
 
 /// Returns the fields before a comment, each with the character at which it begins.
-fn fields(line: &str) -> Vec<(usize, &str)> {
+pub(super) fn fields(line: &str) -> Vec<(usize, &str)> {
     let line = line.split('#').next().unwrap_or("");
     let mut fields = Vec::new();
     let mut start = None;
@@ -207,7 +153,6 @@ mod tests {
             ("2 0 0 0 0 0 0 1 9\n", "t.txt:2:17: 9 numbers"),
             ("2 0 zero 0 0 0 0 1\n", "t.txt:2:5: `zero`"),
             ("2 0  nan 0 0 0 0 1\n", "t.txt:2:6: `nan`"),
-            ("1 0 0 0 0 0 0 1\n", "t.txt:2:1: the time 1 is there twice"),
             ("0.5 0 0 0 0 0 0 1\n", "t.txt:2:1: the time 0.5 is before"),
             (
                 "2 0 0 0 0 0 0 2\n",

@@ -1,10 +1,11 @@
 //! Cameras from TOML.
 
+use super::calibration::Misfit;
 use super::calibration::{self, Numbers};
 use super::error::SiteError;
 use super::named::NamedFile;
 use super::reader::{Key, Node, Table};
-use super::{SiteCamera, keys, places, poses};
+use super::{Note, SiteCamera, keys, places, poses};
 use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
 use posegate::shape::{Intrinsics, Lens, Tolerance};
 
@@ -20,7 +21,11 @@ const NUMBERS: [&Key; 5] = [
 ];
 
 /// Reads a camera. Also returns its calibration file if it names one.
-pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>), SiteError> {
+/// Adds to `notes` what was assumed.
+pub(super) fn camera(
+    node: &Node<'_>,
+    notes: &mut Vec<Note>,
+) -> Result<(SiteCamera, Option<NamedFile>), SiteError> {
     let table = node.table(&[
         &keys::WIDTH,
         &keys::HEIGHT,
@@ -41,7 +46,8 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
     let (numbers, named) = match table.optional(&keys::CALIBRATION) {
         None => (own_numbers(&table)?, None),
         Some(file) => {
-            let (numbers, named) = of_file(&table, &file)?;
+            let (mut numbers, named) = of_file(&table, &file)?;
+            notes.append(&mut numbers.notes);
             (numbers, Some(named))
         }
     };
@@ -51,10 +57,13 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
         axis_px: numbers.axis_px,
         lens: numbers.lens,
         image: image(&table, &numbers)?,
-        roi: table.optional(&keys::ROI).as_ref().map(roi).transpose()?,
+        roi: match table.optional(&keys::ROI) {
+            Some(node) => Some(roi(&node)?),
+            None => numbers.roi,
+        },
         binning: match table.optional(&keys::BINNING) {
             Some(node) => binning(&node)?,
-            None => [1, 1],
+            None => numbers.binning,
         },
         border_px: match table.optional(&keys::BORDER) {
             Some(node) => node.number()?,
@@ -65,7 +74,8 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
         Some(node) => intrinsics(&node, &calibration)?,
         None => Intrinsics::NONE,
     };
-    let view = seen(&calibration, tolerance).map_err(|fault| unseen(&table, fault))?;
+    let (calibration, view) =
+        unfolded(calibration, tolerance, notes).map_err(|fault| unseen(&table, fault))?;
     let camera = SiteCamera {
         camera: view.camera,
         mount: poses::pose3(&table.required(&keys::MOUNT)?)?,
@@ -78,6 +88,53 @@ pub(super) fn camera(node: &Node<'_>) -> Result<(SiteCamera, Option<NamedFile>),
         calibration,
     };
     Ok((camera, named))
+}
+
+/// The steps of the search for a border within which a lens does not fold.
+const BORDER_STEPS: u32 = 10;
+
+/// Returns the certified camera and its calibration. If the lens folds within the image, the border of the image is not used, as if the
+/// site had a `border_px`, and a note says so.
+fn unfolded(
+    calibration: Calibration,
+    tolerance: Intrinsics,
+    notes: &mut Vec<Note>,
+) -> Result<(Calibration, CertifiedCamera), LensError> {
+    let fault = match seen(&calibration, tolerance) {
+        Ok(view) => return Ok((calibration, view)),
+        Err(fault) => fault,
+    };
+    let LensError::Folds { fold_px, image_px } = fault else {
+        return Err(fault);
+    };
+    let [width, height] = calibration.size_px;
+    let (mut folds, mut fits) = (calibration.border_px, 0.5 * width.min(height));
+    let mut found = None;
+    for _ in 0..BORDER_STEPS {
+        let border_px = libm::ceil(0.5 * (folds + fits));
+        let narrower = Calibration {
+            border_px,
+            ..calibration
+        };
+        match seen(&narrower, tolerance) {
+            Ok(view) => {
+                fits = border_px;
+                found = Some((narrower, view));
+            }
+            Err(LensError::Folds { .. }) => folds = border_px,
+            Err(_) => fits = border_px,
+        }
+    }
+    let (narrower, view) = found.ok_or(fault)?;
+    notes.push(Note {
+        code: "lens_folds",
+        message: format!(
+            "the distortion folds at {fold_px:.1} px from the optical axis, and the image reaches {image_px:.1} px: a border of {} px is not used",
+            narrower.border_px
+        ),
+        help: "calibrate again with the pattern in the corners of the image too, or with fewer coefficients",
+    });
+    Ok((narrower, view))
 }
 
 /// Returns the certified camera. Its border is widened by the farthest distance that the tolerance can move a point
@@ -143,7 +200,7 @@ fn own_numbers(table: &Table<'_>) -> Result<Numbers, SiteError> {
         axis_px,
         lens,
         rect: [focal_px[0], focal_px[1], axis_px[0], axis_px[1]],
-        turned: None,
+        ..Numbers::default()
     })
 }
 
@@ -157,10 +214,14 @@ fn distortion(node: &Node<'_>) -> Result<Lens, SiteError> {
     let numbers = numbers.collect::<Result<std::vec::Vec<f64>, SiteError>>()?;
     match calibration::lens(name, &numbers) {
         Some(Ok(lens)) => Ok(lens),
-        Some(Err(wanted)) => Err(node.error(format!(
+        Some(Err(Misfit::Count(wanted))) => Err(node.error(format!(
             "`{}` has {} coefficients, {name} has {wanted}",
             node.path(),
             numbers.len()
+        ))),
+        Some(Err(Misfit::Terms(terms))) => Err(node.error(format!(
+            "`{}` has {terms}, which {name} does not have",
+            node.path()
         ))),
         None => Err(model.unknown_word(["plumb_bob", "rational_polynomial", "equidistant"])),
     }

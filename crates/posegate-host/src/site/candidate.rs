@@ -11,6 +11,7 @@ use posegate::shape::{Tag, Tolerance, Wall};
 /// walls where `goals` are.
 pub(super) fn candidates(
     root: &Table<'_>,
+    [east, north]: [f64; 2],
     tags: &BTreeMap<String, SiteTag>,
     walls: &BTreeMap<String, Wall>,
     goals: &[[f64; 2]],
@@ -18,7 +19,9 @@ pub(super) fn candidates(
     let mut all = Candidates::new(tags);
     if let Some(node) = root.optional(&keys::CANDIDATES) {
         for (name, node) in node.any_table()?.named(&keys::CANDIDATE)? {
-            let made = candidate(&node)?;
+            let mut made = candidate(&node)?;
+            let pose = &mut made.tag.tag.pose;
+            (pose.x, pose.y) = (pose.x - east, pose.y - north);
             all.add(name.to_owned(), made, &node)?;
         }
     }

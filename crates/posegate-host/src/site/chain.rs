@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::error::SiteError;
 use super::names::named;
 use super::reader::{Node, Table};
-use super::{Site, Task, keys, places};
+use super::{Site, Task, keys, places, poses};
 use posegate::set::Estimate;
 use posegate::shape::{PoseDeg, Tolerance};
 use posegate::task::{BoundedDriveModel, Leg, Odometry};
@@ -109,6 +109,21 @@ pub enum StartUncertainty {
         /// The confidence of the set. The site's value if the file gives none.
         epsilon: f64,
     },
+}
+
+impl SiteChain {
+    /// Returns a chain in the map relative to the site's origin.
+    pub(super) fn less(mut self, [x, y]: [f64; 2]) -> Self {
+        if self.start.frame == StartFrame::World {
+            self.start.pose = poses::less(self.start.pose, [x, y]);
+        }
+        for step in &mut self.steps {
+            if let ChainStep::Navigate { from, .. } = step {
+                (from.x_m, from.y_m) = (from.x_m - x, from.y_m - y);
+            }
+        }
+        self
+    }
 }
 
 /// A step of a chain.

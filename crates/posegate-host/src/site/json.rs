@@ -182,6 +182,12 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// Returns a text.
+    pub(super) fn text(&self, like: &str) -> Result<&'a str, SiteError> {
+        serde_json::from_str(self.raw.get())
+            .map_err(|_| self.found("a text in quotes, without escapes", like))
+    }
+
     /// Returns a whole number.
     pub(super) fn whole(&self) -> Result<u32, SiteError> {
         serde_json::from_str(self.raw.get())

@@ -96,7 +96,7 @@ pub(super) const COEFFICIENTS: Key = Key::new(
 );
 pub(super) const CALIBRATION: Key = Key::new(
     "calibration",
-    "a ROS camera calibration file or a Kalibr camchain, with a path relative to the site file's folder",
+    "a calibration of ROS, OpenCV, Kalibr, VINS or PhotonVision, or a CameraInfo message as text, with a path relative to the site file's folder",
     "\"front.yaml\"",
 );
 pub(super) const BORDER: Key = Key::number(
@@ -190,6 +190,25 @@ pub(super) const ONE_GOAL: Key = Key::new(
     "{ x = 0.0, y = 0.0, yaw_deg = 0.0 }",
 );
 
+// Frames on the robot.
+pub(super) const FRAMES: Key = Key::new(
+    "frame",
+    "one [frame.NAME] table per frame on the robot whose poses are recorded",
+    "{ ... }",
+);
+pub(super) const FRAME: Key = Key::new(
+    "frame",
+    "the frame's pose on the robot: that of its origin in base_link",
+    "{ x = 0.6, y = 0.0, z = 0.4, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }",
+);
+
+// The origin.
+pub(super) const ORIGIN: Key = Key::new(
+    "origin",
+    "the point of the map that is subtracted from every position in it: `x` and `y` in metres",
+    "{ x = 448000.0, y = 5412000.0 }",
+);
+
 // Imports.
 pub(super) const IMPORTS: Key = Key::new("import", "one [import.NAME] table per file", "{ ... }");
 pub(super) const IMPORT: Key = Key::new(
@@ -204,7 +223,7 @@ pub(super) const FILE: Key = Key::new(
 );
 pub(super) const FORMAT: Key = Key::new(
     "format",
-    "\"wpilib\" (a field layout), \"apriltag_ros\" (tags.yaml), \"nav2_docks\" (a dock database) or \"posegate\" \
+    "\"wpilib\" or \"fmap\" (a field layout), \"apriltag_ros\" (tags.yaml), \"nav2_docks\" (a dock database, or parameters of the docking server) or \"posegate\" \
      ([tag.NAME] and [goal.NAME] tables)",
     "\"wpilib\"",
 );
@@ -219,6 +238,16 @@ pub(super) const IMPORT_POSE: Key = Key::new(
     "pose",
     "the pose of the file's frame in the world; for a bundle, like a tag's: x out of its face",
     POSE3,
+);
+pub(super) const DOCK_DIRECTION: Key = Key::new(
+    "dock_direction",
+    "\"forward\" or \"backward\": how the robot enters the docks of nav2_docks; \"backward\" turns their headings by 180 deg",
+    "\"backward\"",
+);
+pub(super) const DOCK_FRAME: Key = Key::new(
+    "frame",
+    "only the docks of this frame are read (nav2_docks)",
+    "\"map\"",
 );
 pub(super) const PREFIX: Key = Key::new(
     "prefix",
@@ -245,7 +274,7 @@ pub(super) const SUCCESS: Key = Key::new(
 );
 pub(super) const SHAPE: Key = Key::new(
     "shape",
-    "\"box\", \"footprint\", \"visibility\" or \"clear\"",
+    "\"box\", \"disc\", \"ellipse\", \"footprint\", \"visibility\" or \"clear\"",
     "\"box\"",
 );
 pub(super) const ANY: Key = Key::new(
@@ -287,6 +316,22 @@ pub(super) const BOX_YAW: Key = Key::new(
     "an arc [lo, hi] in degrees, lo at most hi and hi at most lo + 360",
     "[-4.0, 4.0]",
 );
+pub(super) const RADIUS: Key = Key::number(
+    "radius",
+    "the farthest distance of the position from the centre in metres, above 0",
+    "0.03",
+    above_0,
+);
+const SEMI_AXIS: &str = "a semi-axis in metres, above 0";
+pub(super) const SEMI_AXIS_A: Key = Key::number("a", SEMI_AXIS, "0.05", above_0);
+pub(super) const SEMI_AXIS_B: Key = Key::number("b", SEMI_AXIS, "0.03", above_0);
+pub(super) const AXIS_TURN: Key = Key::new(
+    "turn_deg",
+    "the direction of the semi-axis `a` in degrees, counter-clockwise from the goal's x",
+    "0.0",
+);
+pub(super) const ROUND_X: Key = Key::new("x", "the centre in the goal frame in metres", "0.0");
+pub(super) const ROUND_Y: Key = Key::new("y", "the centre in the goal frame in metres", "0.0");
 pub(super) const FOOTPRINT: Key = Key::new(
     "footprint",
     "the robot's convex outline: [x, y] corners in metres, counter-clockwise (or one point)",

@@ -21,7 +21,9 @@ use std::path::{Path, PathBuf};
 
 use crate::learn::ErrorModel;
 use posegate::certify::Calibration;
-use posegate::shape::{Camera, Intrinsics, Mount, PoseDeg, SuccessSet, Tag, Tolerance, Wall};
+use posegate::shape::{
+    Camera, Intrinsics, Mount, Pose3Deg, PoseDeg, SuccessSet, Tag, Tolerance, Wall,
+};
 
 pub use posegate::bake::{Extent, Layout, Step, TableSpec};
 
@@ -33,13 +35,16 @@ pub use self::contents::SiteIndex;
 pub use self::controller::{Controller, Core};
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::families::FAMILIES;
-pub use self::import::{Convention, Format, Import, ImportError, Imported};
+pub use self::import::{
+    Convention, DockDirection, DockTask, Format, Import, ImportError, Imported,
+};
 pub(crate) use self::learnt::stated_views;
 pub use self::lines::line_of;
 pub use self::places::pose_line;
 pub use self::planner::{GeneratedLook, Planner};
 pub use self::sample::SAMPLE;
 pub use self::suggest::{question, similar};
+pub(crate) use self::yaml::texts as yaml_texts;
 
 mod calibration;
 mod camera;
@@ -92,6 +97,8 @@ pub struct Site {
     pub walls: Vec<Wall>,
     /// Poses that tasks can name as their goals, by name.
     pub goals: BTreeMap<String, PoseDeg>,
+    /// Frames on the robot whose poses are recorded, by name: the pose of each in the base.
+    pub frames: BTreeMap<String, Pose3Deg>,
     /// Chains of tasks, by name.
     pub chains: BTreeMap<String, SiteChain>,
     /// The driving of the robots.
@@ -113,6 +120,11 @@ pub struct Site {
     pub files: Vec<PathBuf>,
     /// The learnt error models, by name.
     pub error_models: BTreeMap<String, ErrorModel>,
+    /// The point of the map that is subtracted from every position in the file, in estimates and in the truth, metres. All poses of the
+    /// site are relative to it.
+    pub map_origin: [f64; 2],
+    /// What was assumed where the files that the site names do not say it.
+    pub remarks: Vec<Remark>,
     /// The error models that are formulas, by name.
     pub error_formulas: BTreeMap<String, posegate::shape::ErrorModel>,
 }
@@ -235,6 +247,37 @@ pub(crate) fn chosen_table(success: &SuccessSet, wish: &TableOverrides) -> Optio
         step: wish.step.unwrap_or(Site::DEFAULT_STEP),
         layout: wish.layout.unwrap_or_default(),
     })
+}
+
+/// What was assumed about an entry of a site, or is unlikely in a file that it names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Remark {
+    /// The kind and the name of the entry: `["camera", "front"]`.
+    pub about: [String; 2],
+    /// The assumption, or the unlikely number.
+    pub note: Note,
+}
+
+/// A text of a [`Remark`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// The kind of remark: a word for scripts.
+    pub code: &'static str,
+    /// The assumption, or the unlikely number.
+    pub message: String,
+    /// Advice on what to check.
+    pub help: &'static str,
+}
+
+impl Note {
+    /// Returns the note of an assumption.
+    pub(crate) fn assumed(message: String) -> Self {
+        Self {
+            code: "assumed",
+            message,
+            help: "check that this is so; the file does not say it",
+        }
+    }
 }
 
 /// A camera of the robot.

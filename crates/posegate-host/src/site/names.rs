@@ -10,6 +10,8 @@ use posegate::shape::{PoseDeg, Wall};
 
 /// The entries that a success set can refer to by name.
 pub(super) struct Names<'a> {
+    /// Subtracted from every position in the map, metres; the entries below have it subtracted.
+    pub origin: [f64; 2],
     pub cameras: &'a BTreeMap<String, SiteCamera>,
     pub tags: &'a BTreeMap<String, SiteTag>,
     pub walls: &'a BTreeMap<String, Wall>,

@@ -1,5 +1,6 @@
 //! Converts TOML to a [`Site`].
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str;
@@ -16,8 +17,8 @@ use super::syntax::syntax;
 use super::table_keys::TableKeys;
 use super::task::task;
 use super::{
-    Navigation, Planner, Site, SiteCamera, SiteTag, camera, candidate, chain, controller, import,
-    keys, places, planner, poses, tags,
+    Navigation, Planner, Remark, Site, SiteCamera, SiteTag, camera, candidate, chain, controller,
+    import, keys, places, planner, poses, tags,
 };
 use crate::input::{self, Limit};
 use crate::learn::ErrorModel;
@@ -46,7 +47,7 @@ pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
 }
 
 /// The sections of a site file.
-const SECTIONS: [&Key; 15] = [
+const SECTIONS: [&Key; 17] = [
     &keys::CAMERAS,
     &keys::TAGS,
     &keys::CANDIDATES,
@@ -61,6 +62,8 @@ const SECTIONS: [&Key; 15] = [
     &keys::WALLS,
     &keys::ERROR_MODELS,
     &keys::GOALS,
+    &keys::FRAMES,
+    &keys::ORIGIN,
     &keys::IMPORTS,
 ];
 
@@ -71,15 +74,16 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     let root = &Table::root(source, &document);
     root.refuse_unknown(&SECTIONS)?;
 
-    let parts = NamedParts::read(root)?;
-    let names = parts.names();
+    let origin = section(root, &keys::ORIGIN, poses::point)?.unwrap_or_default();
+    let parts = NamedParts::read(root, origin)?;
+    let names = parts.names(origin);
     let defaults = section(root, &keys::TABLE, TableKeys::read)?.unwrap_or_default();
     let tasks = entries(root, &keys::TASKS, &keys::TASK, |_, node| {
         task(node, &names, &defaults)
     })?;
     let goals = tasks.values().map(|task| task.success.goal);
     let goals: Vec<[f64; 2]> = goals.map(|goal| [goal.x, goal.y]).collect();
-    let candidates = candidate::candidates(root, &parts.tags, &parts.walls, &goals)?;
+    let candidates = candidate::candidates(root, origin, &parts.tags, &parts.walls, &goals)?;
     let epsilon = section(root, &keys::CONFIDENCE, |node| {
         node.table(&[&keys::EPSILON])?.number(&keys::EPSILON)
     })?;
@@ -91,7 +95,8 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
         planner::planner(node, &names, &candidates)
     })?;
     let chains = entries(root, &keys::CHAINS, &keys::CHAIN, |_, node| {
-        chain::chain(node, &tasks, &navigation, epsilon)
+        let chain = chain::chain(node, &tasks, &navigation, epsilon)?;
+        Ok(chain.less(origin))
     })?;
     entries(root, &keys::TASKS, &keys::TASK, |_, node| {
         match node.any_table()?.optional(&keys::TASK_FROM) {
@@ -99,16 +104,22 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
             None => Ok(()),
         }
     })?;
+    let frames = entries(root, &keys::FRAMES, &keys::FRAME, |_, node| {
+        poses::pose3(node)
+    })?;
     let (error_formulas, error_models) = split_models(parts.error_models);
     Ok(Site {
         digest: digest(sha256, parts.files.iter().map(|file| &file.digest)),
         files: parts.files.into_iter().map(|file| file.path).collect(),
         cameras: parts.cameras,
+        remarks: parts.remarks,
+        map_origin: origin,
         tags: parts.tags,
         candidates,
         tasks,
         walls: parts.walls.into_values().collect(),
         goals: parts.goals,
+        frames,
         chains,
         navigation,
         planner: planner.unwrap_or_default(),
@@ -154,21 +165,44 @@ struct NamedParts {
     goals: BTreeMap<String, PoseDeg>,
     /// Calibrations in the order of the cameras' names, then imports, then learnt error models.
     files: Vec<NamedFile>,
+    /// What the files do not say.
+    remarks: Vec<Remark>,
 }
 
 impl NamedParts {
     /// Reads the sections without tasks, and the imports.
-    fn read(root: &Table<'_>) -> Result<Self, SiteError> {
-        let cameras = entries(root, &keys::CAMERAS, &keys::CAMERA, |_, node| {
-            camera::camera(node)
+    fn read(root: &Table<'_>, origin: [f64; 2]) -> Result<Self, SiteError> {
+        let mut remarks = Vec::new();
+        let noted = RefCell::new(&mut remarks);
+        let cameras = entries(root, &keys::CAMERAS, &keys::CAMERA, |name, node| {
+            let mut notes = Vec::new();
+            let camera = camera::camera(node, &mut notes)?;
+            noted
+                .borrow_mut()
+                .extend(notes.into_iter().map(|note| Remark {
+                    about: ["camera", name].map(str::to_owned),
+                    note,
+                }));
+            Ok(camera)
         })?;
         let (cameras, calibrations) = split_files(cameras);
         let mut tags = entries(root, &keys::TAGS, &keys::TAG, |_, node| tags::tag(node))?;
         let mut goals = entries(root, &keys::GOALS, &keys::ONE_GOAL, |_, node| {
             poses::pose2(node)
         })?;
-        let imports = import::imports(root, &mut tags, &mut goals)?;
-        let walls = entries(root, &keys::WALLS, &keys::WALL, places::wall)?;
+        let imports = import::imports(root, &mut tags, &mut goals, &mut remarks)?;
+        let mut walls = entries(root, &keys::WALLS, &keys::WALL, places::wall)?;
+        let [east, north] = origin;
+        for tag in tags.values_mut() {
+            let pose = &mut tag.tag.pose;
+            (pose.x, pose.y) = (pose.x - east, pose.y - north);
+        }
+        for goal in goals.values_mut() {
+            (goal.x, goal.y) = (goal.x - east, goal.y - north);
+        }
+        for [x, y] in walls.values_mut().flat_map(|wall| &mut wall.corners) {
+            (*x, *y) = (*x - east, *y - north);
+        }
         let reach = reach(&cameras);
         let models = entries(
             root,
@@ -184,13 +218,15 @@ impl NamedParts {
             walls,
             error_models,
             goals,
+            remarks,
             files: files.chain(learnt).collect(),
         })
     }
 
     /// Returns the entries that success sets refer to.
-    const fn names(&self) -> Names<'_> {
+    const fn names(&self, origin: [f64; 2]) -> Names<'_> {
         Names {
+            origin,
             cameras: &self.cameras,
             tags: &self.tags,
             walls: &self.walls,

@@ -34,3 +34,18 @@ pub(super) fn pose2(node: &Node<'_>) -> Result<PoseDeg, SiteError> {
         yaw_deg: table.number(&keys::YAW)?,
     })
 }
+
+/// Reads a point of the map, metres.
+pub(super) fn point(node: &Node<'_>) -> Result<[f64; 2], SiteError> {
+    let table = node.table(&[&keys::X, &keys::Y])?;
+    Ok([table.number(&keys::X)?, table.number(&keys::Y)?])
+}
+
+/// Returns a pose in the map relative to the site's origin.
+pub(super) fn less(pose: PoseDeg, [x, y]: [f64; 2]) -> PoseDeg {
+    PoseDeg {
+        x: pose.x - x,
+        y: pose.y - y,
+        ..pose
+    }
+}

@@ -5,11 +5,11 @@ use super::families::{FAMILIES, family_bits};
 use super::learnt;
 use super::names::{Names, named};
 use super::places::SiteModel;
-use super::reader::{Node, Table};
+use super::reader::{Key, Node, Table};
 use super::{Site, SiteCamera, SiteTag, camera, keys, suggest};
 use posegate::shape::{
     BoxSet, Clear, ErrorLimit, ErrorModel, Exclusion, Footprint, Intrinsics, Lens, PolygonError,
-    Shape, Sharpness, Visibility, Wall, is_arc,
+    Round, Shape, Sharpness, Visibility, Wall, is_arc,
 };
 
 /// Deepest nesting of `any` and `all`.
@@ -44,10 +44,12 @@ fn nested(node: &Node<'_>, names: &Names<'_>, depth: u32) -> Result<Shape, SiteE
     let name = table.required(&keys::SHAPE)?;
     match name.text()? {
         "box" => box_set(node).map(Shape::Box),
+        "disc" => round(node, true),
+        "ellipse" => round(node, false),
         "footprint" => footprint(node),
         "visibility" => visibility(node, names),
         "clear" => clear(node),
-        _ => Err(name.unknown_word(["box", "footprint", "visibility", "clear"])),
+        _ => Err(name.unknown_word(["box", "disc", "ellipse", "footprint", "visibility", "clear"])),
     }
 }
 
@@ -57,6 +59,40 @@ fn box_set(node: &Node<'_>) -> Result<BoxSet, SiteError> {
         x: table.interval(&keys::BOX_X, |lo, hi| lo <= hi)?,
         y: table.interval(&keys::BOX_Y, |lo, hi| lo <= hi)?,
         yaw_deg: table.interval(&keys::BOX_YAW, |lo, hi| lo <= hi && is_arc([lo, hi]))?,
+    })
+}
+
+/// Reads a disc or an ellipse.
+fn round(node: &Node<'_>, is_disc: bool) -> Result<Shape, SiteError> {
+    let own: &[&Key] = if is_disc {
+        &[&keys::RADIUS]
+    } else {
+        &[&keys::SEMI_AXIS_A, &keys::SEMI_AXIS_B, &keys::AXIS_TURN]
+    };
+    let common = [&keys::SHAPE, &keys::ROUND_X, &keys::ROUND_Y, &keys::BOX_YAW];
+    let table = node.table(&[&common[..], own].concat())?;
+    let or_0 = |key| {
+        let node = table.optional(key);
+        node.map_or(Ok(0.0), |node| node.number())
+    };
+    let (axes, turn_deg) = if is_disc {
+        ([table.number(&keys::RADIUS)?; 2], 0.0)
+    } else {
+        let axes = [
+            table.number(&keys::SEMI_AXIS_A)?,
+            table.number(&keys::SEMI_AXIS_B)?,
+        ];
+        (axes, or_0(&keys::AXIS_TURN)?)
+    };
+    let round = Round {
+        centre: [or_0(&keys::ROUND_X)?, or_0(&keys::ROUND_Y)?],
+        axes,
+        turn_deg,
+    };
+    let yaw_deg = table.interval(&keys::BOX_YAW, |lo, hi| lo <= hi && is_arc([lo, hi]))?;
+    round.set(yaw_deg).map_err(|fault| {
+        node.error(format!("`{}`: {fault}", node.path()))
+            .help("choose a goal nearer to the centre, and semi-axes of similar length")
     })
 }
 

@@ -28,7 +28,7 @@ pub(super) fn task(
     let goal = if goal.is_text() {
         *named(&goal, "goal", names.goals)?
     } else {
-        poses::pose2(&goal)?
+        poses::less(poses::pose2(&goal)?, names.origin)
     };
     let set = table.required(&keys::SUCCESS)?;
     let mut shape = success::shape(&set, names)?;

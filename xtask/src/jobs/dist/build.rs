@@ -149,6 +149,8 @@ fn crate_of(id: &str) -> Option<Crate> {
 /// Builds the programs, static.
 pub fn programs(sources: &Sources) -> Result<Built> {
     say("static programs");
+    // SQLite, which reads bags of ROS 2, is compiled with the programs.
+    need::command("musl-gcc", "musl-tools")?;
     let node = "--manifest-path crates/posegate-ros2/Cargo.toml";
     let crates = vec![
         (

@@ -58,7 +58,7 @@ impl Budget {
         }
     }
 
-    fn spend(&mut self, size: u64, compressed: usize) -> Result<(), BadChunk> {
+    pub(in crate::log) fn spend(&mut self, size: u64, compressed: usize) -> Result<(), BadChunk> {
         self.left = self
             .left
             .saturating_add(Self::TIMES.saturating_mul(compressed as u64));

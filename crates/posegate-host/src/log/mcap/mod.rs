@@ -7,7 +7,7 @@ pub(super) use self::writer::{Head, Writer};
 
 pub(super) mod chunk;
 pub(super) mod records;
-mod unpack;
+pub(super) mod unpack;
 mod writer;
 
 /// First and last bytes of a file.

@@ -1,4 +1,4 @@
-//! Decompression of a chunk's records: zstd by `ruzstd`, LZ4 frames by `lz4_flex`, both without C.
+//! Decompression of a chunk's records: zstd by `ruzstd`, LZ4 frames by `lz4_flex`, bzip2 by `bzip2`, all without C.
 //!
 //! Entry point: [`unpacked`]. Its result has exactly the stated size. A chunk that holds more or fewer bytes is an error, so
 //! the output never grows beyond the size that the caller has checked.
@@ -38,17 +38,18 @@ pub(in crate::log) enum BadData {
 
 /// Compression of a chunk's records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Compression {
+pub(in crate::log) enum Compression {
     None,
     Zstd,
     Lz4,
+    Bzip2,
 }
 
 /// Returns the decompressed records, `size` bytes. Bytes after the frame that completes them are padding.
 ///
 /// # Errors
 /// [`BadData`] if the frames are damaged or do not hold exactly `size` bytes.
-pub(super) fn unpacked(
+pub(in crate::log) fn unpacked(
     compression: Compression,
     mut data: &[u8],
     size: usize,
@@ -62,6 +63,7 @@ pub(super) fn unpacked(
         Compression::None => return Ok(data.to_vec()),
         Compression::Zstd => zstd_frame,
         Compression::Lz4 => lz4_frame,
+        Compression::Bzip2 => bzip2_stream,
     };
     let mut output = Vec::with_capacity(size);
     for _ in 0..MOST_FRAMES {
@@ -137,6 +139,19 @@ fn lz4_frame(data: &mut &[u8], output: &mut Vec<u8>, size: usize) -> Result<(), 
     // One extra byte distinguishes a longer frame from a frame of the stated size. `take` limits the output.
     let needed = (size - output.len()) as u64 + 1;
     Lz4::new(data)
+        .take(needed)
+        .read_to_end(output)
+        .map_err(|error| BadData::Frame(error.to_string()))?;
+    if output.len() > size {
+        return Err(BadData::Long { size });
+    }
+    Ok(())
+}
+
+/// Decodes all bzip2 streams. The decoder holds a block of at most 900 kB, and what it needs to sort it.
+fn bzip2_stream(data: &mut &[u8], output: &mut Vec<u8>, size: usize) -> Result<(), BadData> {
+    let needed = (size - output.len()) as u64 + 1;
+    bzip2::bufread::MultiBzDecoder::new(data)
         .take(needed)
         .read_to_end(output)
         .map_err(|error| BadData::Frame(error.to_string()))?;

@@ -21,6 +21,8 @@ pub(super) struct Cdr<'b> {
     body: &'b [u8],
     at: usize,
     is_big_endian: bool,
+    /// ROS 1's own encoding: no alignment, and texts without a NUL.
+    is_ros1: bool,
 }
 
 impl<'b> Cdr<'b> {
@@ -30,7 +32,22 @@ impl<'b> Cdr<'b> {
             body,
             at: 0,
             is_big_endian,
+            is_ros1: false,
         }
+    }
+
+    /// Reads a message of ROS 1, which has no encapsulation header.
+    pub(super) const fn ros1(body: &'b [u8]) -> Self {
+        Self {
+            body,
+            at: 0,
+            is_big_endian: false,
+            is_ros1: true,
+        }
+    }
+
+    pub(super) const fn is_ros1(&self) -> bool {
+        self.is_ros1
     }
 
     /// Returns the number of bytes after the last field that was read.
@@ -47,7 +64,9 @@ impl<'b> Cdr<'b> {
 
     /// Reads a number of `N` bytes, in little-endian order.
     fn number<const N: usize>(&mut self) -> Result<[u8; N], BadCdr> {
-        self.at = self.at.next_multiple_of(N);
+        if !self.is_ros1 {
+            self.at = self.at.next_multiple_of(N);
+        }
         let mut number = [0; N];
         number.copy_from_slice(self.bytes(N)?);
         if self.is_big_endian {
@@ -95,7 +114,10 @@ impl<'b> Cdr<'b> {
     pub(super) fn text(&mut self) -> Result<&'b str, BadCdr> {
         let length = usize::try_from(self.u32()?).map_err(|_| BadCdr::Short)?;
         let bytes = self.bytes(length)?;
-        let text = bytes.split_last().map_or(bytes, |(_, text)| text);
+        let text = match bytes.split_last() {
+            Some((_, text)) if !self.is_ros1 => text,
+            _ => bytes,
+        };
         str::from_utf8(text).map_err(|_| BadCdr::NotText)
     }
 }

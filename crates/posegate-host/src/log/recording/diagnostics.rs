@@ -57,6 +57,8 @@ pub struct ReaderDiagnostics {
     pub read: BTreeMap<String, u64>,
     /// Number of transforms between two frames, parent and child, on the topics of transforms that are read.
     pub transforms: BTreeMap<(String, String), u64>,
+    /// Child frames of the poses that are read, in the order of the recording, at most 32.
+    pub child_frames: Vec<String>,
     /// Number of messages of requested topics that could not be decoded.
     pub undecodable: u64,
     /// The first message that could not be decoded: its description. `None` if every message was decoded.
@@ -73,4 +75,17 @@ pub struct ReaderDiagnostics {
     pub damage: Option<String>,
     /// `true` if a bag has an index; `None` for other files, and for bags that end before it.
     pub indexed: Option<bool>,
+}
+
+/// The most child frames that are named.
+const MOST_CHILDREN: usize = 32;
+
+impl ReaderDiagnostics {
+    /// Records the child frame of a pose.
+    pub(super) fn note_child(&mut self, child: &str) {
+        let children = &mut self.child_frames;
+        if children.len() < MOST_CHILDREN && !children.iter().any(|known| known == child) {
+            children.push(child.to_owned());
+        }
+    }
 }

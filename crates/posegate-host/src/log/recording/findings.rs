@@ -25,6 +25,8 @@ pub struct Findings {
     pub pose_not_finite: u64,
     /// Quaternions whose length is not 1.
     pub quaternion_not_unit: u64,
+    /// The largest angle between the robot's vertical axis and that of the frame, radians.
+    pub most_tilt_rad: f64,
     /// Estimates in another frame than the world frame.
     pub other_frame: u64,
     /// The number of estimates in each other frame, by the frame's name.
@@ -46,9 +48,14 @@ impl Findings {
         } else {
             self.time_not_finite += 1;
         }
-        self.pose_not_finite += u64::from(!(is_finite(&sample.belief) && sample.z_m.is_finite()));
-        self.quaternion_not_unit += u64::from(!is_unit(&sample.belief.heading));
-        self.without_covariance += u64::from(sample.belief.spread.is_none());
+        // A detection without a pose has its own reason.
+        if sample.fault.is_none() {
+            let is_finite = is_finite(&sample.belief) && sample.z_m.is_finite();
+            self.pose_not_finite += u64::from(!is_finite);
+            self.quaternion_not_unit += u64::from(!is_unit(&sample.belief.heading));
+            self.without_covariance += u64::from(sample.belief.spread.is_none());
+            self.most_tilt_rad = self.most_tilt_rad.max(tilt_rad(&sample.belief.heading));
+        }
         if let Some(frame) = &sample.frame
             && frame.trim_start_matches('/') != world.trim_start_matches('/')
         {
@@ -79,6 +86,19 @@ impl Findings {
             ("without_covariance", self.without_covariance),
         ]
     }
+}
+
+/// Returns the angle between the vertical axes of the robot and of the frame; 0 if it is not known.
+fn tilt_rad(heading: &Heading) -> f64 {
+    let cosine = match *heading {
+        Heading::Radians(_) => return 0.0,
+        Heading::RollPitchYaw([roll, pitch, _]) => libm::cos(roll) * libm::cos(pitch),
+        Heading::Quaternion([x, y, z, w]) => {
+            1.0 - 2.0 * (x * x + y * y) / (x * x + y * y + z * z + w * w)
+        }
+    };
+    let tilt = libm::acos(cosine.clamp(-1.0, 1.0));
+    if tilt.is_finite() { tilt } else { 0.0 }
 }
 
 fn is_finite(belief: &PoseEstimate) -> bool {

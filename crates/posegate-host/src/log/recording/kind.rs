@@ -10,10 +10,24 @@ pub enum Format {
     Csv,
     /// TUM: eight numbers per line.
     Tum,
-    /// A ROS 2 bag in SQLite; not supported.
+    /// EuRoC: nanoseconds and seven numbers per line, separated by commas.
+    Euroc,
+    /// KITTI: twelve numbers per line, without times.
+    Kitti,
+    /// A ROS 2 bag in SQLite.
     Sqlite,
-    /// A ROS 1 bag; not supported.
+    /// A ROS 1 bag.
     Ros1,
+    /// A file that is compressed as a whole by zstd.
+    Zstd,
+}
+
+impl Format {
+    /// Returns `true` for a bag, which has topics, also if it is compressed.
+    #[must_use]
+    pub const fn is_bag(self) -> bool {
+        matches!(self, Self::Mcap | Self::Sqlite | Self::Ros1 | Self::Zstd)
+    }
 }
 
 /// Returns the format of a file from its first bytes. A text has a header if its first line has a letter that is
@@ -29,12 +43,37 @@ pub fn format_of(start: &[u8]) -> Format {
     if start.starts_with(b"#ROSBAG") {
         return Format::Ros1;
     }
+    if start.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
+        return Format::Zstd;
+    }
     let first = start
         .split(|byte| *byte == b'\n')
         .map(|line| line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line))
         .find(|line| !line.trim_ascii().is_empty() && !line.trim_ascii_start().starts_with(b"#"));
-    let is_header = first.is_some_and(|line| line.contains(&b',') || line.contains(&b'_'));
-    if is_header { Format::Csv } else { Format::Tum }
+    let Some(first) = first else {
+        return Format::Tum;
+    };
+    if first.contains(&b',') || first.contains(&b'_') {
+        // A CSV has a header: names, not numbers.
+        let number = |field: &[u8]| {
+            let text = std::str::from_utf8(field).ok();
+            text.is_some_and(|text| text.trim().parse::<f64>().is_ok())
+        };
+        let mut fields = first.split(|byte| *byte == b',');
+        let time = fields.next().unwrap_or_default().trim_ascii();
+        let is_whole = !time.is_empty() && time.iter().all(u8::is_ascii_digit);
+        return if is_whole && first.contains(&b',') && fields.all(number) {
+            Format::Euroc
+        } else {
+            Format::Csv
+        };
+    }
+    let fields = first.split(|byte| *byte == b'#').next().unwrap_or_default();
+    let fields = fields.split(u8::is_ascii_whitespace);
+    match fields.filter(|field| !field.is_empty()).count() {
+        12 => Format::Kitti,
+        _ => Format::Tum,
+    }
 }
 
 #[cfg(test)]
@@ -52,6 +91,13 @@ mod tests {
             (b"# t x y\n1.5 0 nan 0 0 0 0 1 # a, b\n", Format::Csv),
             (b"# t x y\n1.5e3 0 nan 0 0 0 0 1\n", Format::Tum),
             (b"", Format::Tum),
+            (
+                b"#timestamp [ns],p_x\n1403636579763555584,0.1,0.2,0.3,1,0,0,0\n",
+                Format::Euroc,
+            ),
+            (b"0,0.1,0.2,0.3,1,0,0,0\n", Format::Euroc),
+            (b"1 0 0 0.1 0 1 0 0.2 0 0 1 0\n", Format::Kitti),
+            (b"\x28\xb5\x2f\xfd", Format::Zstd),
         ] {
             assert_eq!(format_of(start), format);
         }

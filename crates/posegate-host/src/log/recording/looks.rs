@@ -2,11 +2,16 @@
 
 use super::{Detection, Exact, Sample};
 use crate::log::KnownTags;
-use crate::log::corners::{FixError, MountedCamera, TagObservation, locate};
+use crate::log::corners::{Fix, FixError, MountedCamera, TagObservation, locate_all};
+use posegate::gate::Reason;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// The widest valley of fits that counts as one pose, relative to its first-order covariance: that of
+/// [`locate`](crate::log::corners::locate).
+const WIDEST: f64 = 4.0;
 
 /// A camera and the tags that it may observe.
 #[derive(Clone, Debug)]
@@ -57,8 +62,8 @@ impl TagLocalizer {
         self.frame.as_deref()
     }
 
-    /// Returns the estimate from an observation; `None` if no known tag was observed. If there is no pose for another
-    /// reason, the estimate has NaN coordinates and no covariance: the gate denies it.
+    /// Returns the estimate from an observation, or both if two poses fit ([`locate_all`]); `None` if no known tag was observed. If there is
+    /// no pose for another reason, the estimate has NaN coordinates and no covariance, and the reason.
     pub fn estimate(
         &mut self,
         source: u8,
@@ -78,15 +83,41 @@ impl TagLocalizer {
             })
             .collect();
         self.unknown += (found.len() - seen.len()) as u64;
-        let fix = locate(&self.camera, &seen, self.sigma_px, self.radius_squared);
-        match fix {
+        let found = locate_all(&self.camera, &seen, self.sigma_px, self.radius_squared);
+        let is_ambiguous = match &found {
+            Ok(fixes) => fixes.len() > 1 || fixes.iter().any(|fix| fix.grown > WIDEST),
+            Err(_) => false,
+        };
+        match &found {
+            Ok(_) if is_ambiguous => *self.counts.entry(FixError::Ambiguous).or_default() += 1,
             Ok(_) => self.fixes += 1,
-            Err(why) => *self.counts.entry(why).or_default() += 1,
+            Err(why) => *self.counts.entry(*why).or_default() += 1,
         }
-        let (pose, spread) = match fix {
-            Ok(fix) => (fix.pose, Some(Uncertainty::Gaussian(fix.covariance))),
+        let estimate = |fix: &Fix| PoseEstimate {
+            x_m: fix.pose[0],
+            y_m: fix.pose[1],
+            heading: Heading::Radians(fix.pose[2]),
+            spread: Some(Uncertainty::Gaussian(fix.covariance)),
+        };
+        let none = PoseEstimate {
+            x_m: f64::NAN,
+            y_m: f64::NAN,
+            heading: Heading::Radians(f64::NAN),
+            spread: None,
+        };
+        let (belief, other, fault) = match found {
+            Ok(fixes) => match fixes.as_slice() {
+                [best, others @ ..] => (
+                    estimate(best),
+                    others.first().map(estimate).map(Box::new),
+                    None,
+                ),
+                [] => (none, None, Some(Reason::CornersDoNotFit)),
+            },
             Err(FixError::NoTag) => return None,
-            Err(_) => ([f64::NAN; 3], None),
+            Err(FixError::NotFinite) => (none, None, Some(Reason::TooFewCorners)),
+            Err(FixError::Ambiguous) => (none, None, Some(Reason::TagPosesAmbiguous)),
+            Err(FixError::NoPose | FixError::Misfit) => (none, None, Some(Reason::CornersDoNotFit)),
         };
         Some(Sample {
             source,
@@ -95,14 +126,13 @@ impl TagLocalizer {
             exact_ns,
             frame: None,
             z_m: 0.0,
-            belief: PoseEstimate {
-                x_m: pose[0],
-                y_m: pose[1],
-                heading: Heading::Radians(pose[2]),
-                spread,
-            },
+            belief,
             truth: None,
             since_fix_ms: None,
+            lever_m: 0.0,
+            other,
+            is_ambiguous,
+            fault,
         })
     }
 

@@ -1,4 +1,4 @@
-//! ROS 2 messages from CDR: poses and detections.
+//! ROS messages from CDR (ROS 2) or ROS 1's encoding: poses and detections.
 
 use super::cdr::{BadCdr, Cdr};
 use super::layout::{layout, short};
@@ -44,6 +44,10 @@ impl Kind {
     /// Returns the kind with a name, with or without `/msg/`.
     pub(super) fn of(name: &str) -> Option<Self> {
         let name = short(name);
+        // Before tf2.
+        if name == "tf/tfMessage" {
+            return Some(Self::Transforms);
+        }
         Self::ALL
             .into_iter()
             .find(|kind| short(kind.name()) == name)
@@ -51,15 +55,24 @@ impl Kind {
 
     /// Returns `true` if a definition has the expected fields. Some writers leave the definition empty: then the name
     /// decides, and each message must be decodable up to its last byte.
-    pub(super) fn has_fields_of(self, definition: &str) -> bool {
-        let fields = match self {
+    pub(super) fn has_fields_of(self, encoding: Encoding, definition: &str) -> bool {
+        let ros2 = match self {
             Self::PoseWithCovariance => "int32 uint32 string float64x43",
             Self::Odometry => "int32 uint32 stringx2 float64x85",
             Self::Pose => "int32 uint32 string float64x7",
             Self::Detections => "int32 uint32 string sequence<string int32x2 float32x2 float64x19>",
             Self::Transforms => "sequence<int32 uint32 stringx2 float64x7>",
         };
-        definition.trim().is_empty() || layout(definition, self.name()).as_deref() == Some(fields)
+        if definition.trim().is_empty() {
+            return true;
+        }
+        let fields = match encoding {
+            Encoding::Cdr => ros2.into(),
+            // The header of ROS 1 begins with a counter, and its time is unsigned; the layout does not show the sign of a time.
+            Encoding::Ros1 => ros2.replacen("int32 uint32", "uint32 int32 uint32", 1),
+        };
+        layout(definition, self.name()).as_ref() == Some(&fields)
+            || self == Self::Transforms && layout(definition, "tf/tfMessage") == Some(fields)
     }
 }
 
@@ -79,6 +92,8 @@ pub(super) struct Message {
     /// Nanoseconds, exactly as written: an `f64` cannot hold them.
     pub stamp_ns: i64,
     pub frame: String,
+    /// The frame whose pose it is; `None` if the type has no such field.
+    pub child: Option<String>,
     pub content: Content,
 }
 
@@ -86,20 +101,29 @@ pub(super) struct Message {
 #[allow(clippy::large_enum_variant)]
 pub(super) enum Content {
     Pose {
-        position: [f64; 3],
-        orientation: [f64; 4],
+        pose: Pose,
         covariance: Option<[[f64; 6]; 6]>,
     },
     Detections(Vec<Detection>),
     Transforms(Vec<Transform>),
 }
 
+/// The encoding of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    /// ROS 2.
+    Cdr,
+    /// ROS 1: no alignment, and texts without a NUL.
+    Ros1,
+}
+
 /// Decodes a message. Up to three bytes of padding may follow it.
 ///
 /// # Errors
 /// A text that states why the bytes are not a message of this kind.
-pub(super) fn decoded(kind: Kind, bytes: &[u8]) -> Result<Message, String> {
+pub(super) fn decoded(kind: Kind, encoding: Encoding, bytes: &[u8]) -> Result<Message, String> {
     let mut cdr = match bytes {
+        _ if encoding == Encoding::Ros1 => Cdr::ros1(bytes),
         // Both byte orders of plain CDR; the other two bytes are unused options.
         [0, order @ (0 | 1), _, _, body @ ..] => Cdr::new(body, *order == 0),
         [a, b, _, _, ..] => {
@@ -109,7 +133,8 @@ pub(super) fn decoded(kind: Kind, bytes: &[u8]) -> Result<Message, String> {
     };
     let message = message(kind, &mut cdr).map_err(|error| error.to_string())?;
     match cdr.left() {
-        ..=3 => Ok(message),
+        0 => Ok(message),
+        ..=3 if encoding == Encoding::Cdr => Ok(message),
         left => Err(format!("{left} bytes are left over")),
     }
 }
@@ -120,10 +145,11 @@ fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
         return transforms(cdr);
     }
     let (stamp_ns, frame) = header(cdr)?;
+    let mut child = None;
     let content = match kind {
         Kind::PoseWithCovariance => pose(cdr, true)?,
         Kind::Odometry => {
-            let _child_frame = cdr.text()?;
+            child = Some(cdr.name()?.into());
             let pose = pose(cdr, true)?;
             let (_twist, _covariance) = (cdr.floats::<6>()?, cdr.floats::<36>()?);
             pose
@@ -142,12 +168,16 @@ fn message(kind: Kind, cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
     Ok(Message {
         stamp_ns,
         frame,
+        child,
         content,
     })
 }
 
 /// Reads a stamp, nanoseconds, and the name of a frame.
 fn header(cdr: &mut Cdr<'_>) -> Result<(i64, String), BadCdr> {
+    if cdr.is_ros1() {
+        let _sequence = cdr.u32()?;
+    }
     let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
     let stamp_ns = i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds);
     Ok((stamp_ns, cdr.name()?.into()))
@@ -174,6 +204,7 @@ fn transforms(cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
     Ok(Message {
         stamp_ns: 0,
         frame: String::new(),
+        child: None,
         content: Content::Transforms(transforms),
     })
 }
@@ -181,8 +212,10 @@ fn transforms(cdr: &mut Cdr<'_>) -> Result<Message, BadCdr> {
 /// Reads the position, then the quaternion x, y, z, w.
 fn pose(cdr: &mut Cdr<'_>, has_covariance: bool) -> Result<Content, BadCdr> {
     Ok(Content::Pose {
-        position: cdr.floats()?,
-        orientation: cdr.floats()?,
+        pose: Pose {
+            position: cdr.floats()?,
+            orientation: cdr.floats()?,
+        },
         covariance: if has_covariance {
             Some(cdr.rows()?)
         } else {

@@ -1,4 +1,4 @@
-//! Recordings, read one estimate at a time: CSV, TUM and MCAP (ROS 2), as streams.
+//! Recordings, read one estimate at a time: CSV, trajectories, and bags of ROS 2 (MCAP, SQLite) and ROS 1, as streams.
 //!
 //! Nothing is dropped silently. Every message that can be a report is passed on, even with impossible numbers: the gate
 //! denies it with a reason, and [`Findings`] counts it. Every other message (another type, or undecodable bytes) is
@@ -21,30 +21,41 @@
 //! # Ok::<(), posegate_host::log::recording::RecordingError>(())
 //! ```
 
-pub use self::bag::{Bag, Role, Wanted};
+pub use self::body::BodyFrames;
 pub use self::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::findings::Findings;
+pub use self::folder::{BAD_FOLDER, files_of};
+pub use self::intake::{Role, Wanted};
 pub use self::kind::{Format, format_of};
 pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
+pub use self::storage::{Bag, BagFile};
 pub use self::text::Text;
 pub use self::transforms::FrameNames;
 
-mod bag;
+mod body;
 mod cdr;
 mod diagnostics;
 mod findings;
+mod folder;
+mod intake;
 mod kind;
 mod layout;
 mod looks;
+mod mcap_file;
 mod message;
+mod ros1_file;
+mod sqlite_file;
+mod storage;
 mod text;
 mod transforms;
+mod whole;
 
-pub(crate) use self::bag::yaw_of;
+pub(crate) use self::intake::yaw_of;
 
 use super::LogError;
 use super::tum::TumError;
+use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
 use std::sync::Arc;
 
@@ -70,6 +81,15 @@ pub struct Sample {
     pub truth: Option<[f64; 3]>,
     /// The time since the last fix of the source, milliseconds, rounded up; `None` if it is not known.
     pub since_fix_ms: Option<u32>,
+    /// How far the frame of the recorded pose is from the robot's vertical axis, metres. The pose and its covariance are those of the
+    /// base; what the covariance's derivative leaves out grows with this lever.
+    pub lever_m: f64,
+    /// A second pose that fits a detection as well; the robot is at one of the two.
+    pub other: Option<Box<PoseEstimate>>,
+    /// `true` if poses that are far apart fit a detection: two poses, or all poses between them.
+    pub is_ambiguous: bool,
+    /// The reason why a detection gives no pose; the estimate's numbers are NaN then.
+    pub fault: Option<Reason>,
 }
 
 /// Times in nanoseconds.
@@ -150,6 +170,36 @@ pub enum RecordingError {
     /// A fault in a trajectory.
     #[error(transparent)]
     Tum(#[from] TumError),
+    /// A pose is that of a frame with an unknown place on the robot.
+    #[error(
+        "the topic {topic} has poses of the frame `{child}`, and its place on the robot is not known"
+    )]
+    ChildFrame {
+        /// The topic.
+        topic: String,
+        /// The child frame that a message names.
+        child: String,
+        /// The frames with a known place.
+        known: String,
+    },
+    /// The file is not a bag of the format that its first bytes say.
+    #[error("{file}: {why}")]
+    NotABag {
+        /// The file.
+        file: String,
+        /// The fault.
+        why: String,
+    },
+    /// A covariance without all its terms is that of a frame beside the robot's base.
+    #[error(
+        "the topic {topic} has poses of the frame `{child}`, and covariances without cross terms: that of the base does not follow"
+    )]
+    PartialCovariance {
+        /// The topic.
+        topic: String,
+        /// The child frame that a message names.
+        child: String,
+    },
     /// The bytes cannot be read.
     #[error("{file}: {source}")]
     Io {

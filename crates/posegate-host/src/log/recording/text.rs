@@ -1,10 +1,13 @@
 //! CSV and TUM files as streams of estimates.
 
+use super::body::{Body, BodyFrames};
 use super::diagnostics::ReaderDiagnostics;
+use super::intake::sample_of_base;
 use super::{Item, Recording, RecordingError, Sample};
 use crate::input::Lines as Limited;
 use crate::log::estimates::Rows;
-use crate::log::tum::numbers;
+use crate::log::trajectories;
+use crate::log::tum::{Stamped, TumError, numbers};
 use crate::log::{Columns, Row};
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
@@ -19,6 +22,7 @@ pub struct Text<R: Read> {
     diagnostics: ReaderDiagnostics,
     bytes: Arc<AtomicU64>,
     covariance: bool,
+    body: BodyFrames,
 }
 
 enum Lines<R: Read> {
@@ -28,6 +32,7 @@ enum Lines<R: Read> {
         line: Vec<u8>,
         number: usize,
     },
+    Poses(std::vec::IntoIter<Stamped>),
 }
 
 /// A reader that counts bytes.
@@ -71,7 +76,7 @@ impl<R: Read> Text<R> {
     pub fn has_use(&self) -> bool {
         match &self.lines {
             Lines::Csv(rows) => rows.has_use(),
-            Lines::Tum { .. } => false,
+            Lines::Tum { .. } | Lines::Poses(_) => false,
         }
     }
 
@@ -79,7 +84,7 @@ impl<R: Read> Text<R> {
     pub fn reads_since_fix(&mut self, column: &str) -> bool {
         match &mut self.lines {
             Lines::Csv(rows) => rows.reads_since_fix(column),
-            Lines::Tum { .. } => false,
+            Lines::Tum { .. } | Lines::Poses(_) => false,
         }
     }
 
@@ -94,6 +99,21 @@ impl<R: Read> Text<R> {
         Self::of(lines, file, bytes, false)
     }
 
+    /// Returns a reader of a trajectory in any format: estimates without a covariance.
+    ///
+    /// # Errors
+    /// As [`trajectories::read`].
+    pub fn trajectory(
+        text: &[u8],
+        file: &str,
+        times: Option<trajectories::Named<'_>>,
+    ) -> Result<Self, TumError> {
+        let found = trajectories::read(text, file, times)?;
+        let bytes = Arc::new(AtomicU64::new(text.len() as u64));
+        let lines = Lines::Poses(found.poses.into_iter());
+        Ok(Self::of(lines, file, bytes, false))
+    }
+
     fn of(lines: Lines<R>, file: &str, bytes: Arc<AtomicU64>, covariance: bool) -> Self {
         Self {
             lines,
@@ -101,7 +121,15 @@ impl<R: Read> Text<R> {
             diagnostics: ReaderDiagnostics::default(),
             bytes,
             covariance,
+            body: BodyFrames::default(),
         }
+    }
+
+    /// Gives the places of frames on the robot: the poses are those of a frame that the user names.
+    #[must_use]
+    pub fn with_body(mut self, body: BodyFrames) -> Self {
+        self.body = body;
+        self
     }
 }
 
@@ -117,6 +145,10 @@ fn counted<R: Read>(input: R) -> (Counted<R>, Arc<AtomicU64>) {
 impl<R: Read> Recording for Text<R> {
     fn next(&mut self) -> Result<Option<Item>, RecordingError> {
         let sample = match &mut self.lines {
+            Lines::Poses(poses) => match poses.next() {
+                None => return Ok(None),
+                Some(pose) => of_pose(&pose),
+            },
             Lines::Csv(rows) => match rows.next() {
                 None => return Ok(None),
                 Some(row) => of_row(&row?, self.covariance),
@@ -153,6 +185,15 @@ impl<R: Read> Recording for Text<R> {
                 }
             },
         };
+        // A text names no frame; one that the user names has a place, or is the base.
+        let body = self.body.body(None, true).unwrap_or(Body::Base);
+        let mut sample = sample_of_base(sample, body);
+        let [east, north] = self.body.origin();
+        let belief = &mut sample.belief;
+        (belief.x_m, belief.y_m) = (belief.x_m - east, belief.y_m - north);
+        if let Some([x, y, _]) = &mut sample.truth {
+            (*x, *y) = (*x - east, *y - north);
+        }
         Ok(Some(Item::Estimate(sample)))
     }
 
@@ -186,7 +227,16 @@ fn of_row(row: &Row, covariance: bool) -> Sample {
         belief,
         truth: row.truth,
         since_fix_ms: row.since_fix_s.and_then(milliseconds),
+        lever_m: 0.0,
+        other: None,
+        is_ambiguous: false,
+        fault: None,
     }
+}
+
+fn of_pose(pose: &Stamped) -> Sample {
+    let (p, q) = (pose.position, pose.rotation);
+    of_numbers([pose.t_s, p.x, p.y, p.z, q.i, q.j, q.k, q.w])
 }
 
 fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
@@ -205,5 +255,9 @@ fn of_numbers([t_s, x, y, z_m, qx, qy, qz, qw]: [f64; 8]) -> Sample {
         },
         truth: None,
         since_fix_ms: None,
+        lever_m: 0.0,
+        other: None,
+        is_ambiguous: false,
+        fault: None,
     }
 }

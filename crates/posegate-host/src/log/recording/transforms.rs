@@ -5,14 +5,13 @@
 //! the composition is at the *latest common time*: the older one of the two newest stamps. If one of the transforms
 //! is no longer published, this time does not advance, so a gate gets no new estimates.
 
+use super::body::BASES;
 use std::collections::VecDeque;
 
 /// Transforms are kept for this time, as in tf2, nanoseconds.
 const KEPT_NS: i64 = 10_000_000_000;
 /// The most transforms of one edge that are kept.
 const MOST_KEPT: usize = 1 << 14;
-/// The robot's frame if none is named.
-const BASES: [&str; 2] = ["base_link", "base_footprint"];
 
 /// The names of the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,8 +53,24 @@ pub(super) struct Pose {
 }
 
 impl Pose {
+    /// The parent frame itself.
+    pub const NONE: Self = Self {
+        position: [0.0; 3],
+        orientation: [0.0, 0.0, 0.0, 1.0],
+    };
+
+    /// Returns the pose of the parent in the child.
+    pub fn inverse(&self) -> Self {
+        let [a, b, c, d] = self.orientation;
+        let orientation = [-a, -b, -c, d];
+        Self {
+            position: rotated(orientation, self.position).map(|part| -part),
+            orientation,
+        }
+    }
+
     /// Converts a pose in `self` to a pose in the parent of `self`.
-    fn of(&self, inner: &Self) -> Self {
+    pub fn of(&self, inner: &Self) -> Self {
         let [x, y, z] = rotated(self.orientation, inner.position);
         let [a, b, c] = self.position;
         Self {
@@ -177,6 +192,11 @@ impl Composer {
     /// Returns the world frame's name.
     pub fn world(&self) -> &str {
         &self.names.world
+    }
+
+    /// Returns the name of the robot's frame; `None` if none was named and none was found.
+    pub fn base(&self) -> Option<&str> {
+        self.names.base.as_deref()
     }
 
     /// Returns `true` if a transform is that of the odometry.

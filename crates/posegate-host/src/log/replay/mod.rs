@@ -95,7 +95,7 @@ use crate::log::{clock_ms, factor};
 use posegate::contain::Margin;
 use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
-use posegate::report::{FrameId, Heading, Report};
+use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::InputError;
 use posegate::set::{Trust, Uncertainty};
 use posegate::shape::SuccessSet;
@@ -288,13 +288,7 @@ impl<'a> Replay<'a> {
 
     /// Returns the report of a sample. Its sequence number is not set yet.
     fn report(&self, sample: &Sample) -> Report {
-        let mut belief = sample.belief;
-        if let Some([translation_m, yaw_rad]) = self.setup.bounded {
-            belief.spread = Some(Uncertainty::Bounded {
-                translation_m,
-                yaw_rad,
-            });
-        }
+        let belief = self.spread(&sample.belief, sample);
         let frame = sample
             .frame
             .as_ref()
@@ -306,6 +300,39 @@ impl<'a> Replay<'a> {
             stamp_ms: stamp_ms(sample).unwrap_or(0),
             belief,
         }
+    }
+
+    /// Returns a pose of a sample with the uncertainty that the gate uses.
+    fn spread(&self, belief: &PoseEstimate, sample: &Sample) -> PoseEstimate {
+        let mut belief = *belief;
+        if let Some([translation_m, yaw_rad]) = self.setup.bounded {
+            belief.spread = Some(Uncertainty::Bounded {
+                translation_m,
+                yaw_rad,
+            });
+        }
+        if sample.lever_m > 0.0 {
+            let trust = self.trust(sample);
+            let inflation = f64::from(trust.map_or(0, |trust| trust.inflation.q16())) / 65536.0;
+            let radius_squared = f64::from(self.judge.radius_squared().q16()) / 65536.0;
+            belief.spread = belief
+                .spread
+                .map(|spread| of_base(spread, sample.lever_m, radius_squared * inflation));
+        }
+        belief
+    }
+
+    /// Returns the trust in a sample's source; `None` if the source is not known.
+    fn trust(&self, sample: &Sample) -> Option<Trust> {
+        let source = self
+            .setup
+            .settings
+            .sources
+            .get(usize::from(sample.source))?;
+        Some(self.carry.as_ref().map_or_else(
+            || source.trust_after(sample.since_fix_ms),
+            |carry| carry.trust,
+        ))
     }
 
     /// Returns the time when a sample was recorded if the gate uses that clock, or NaN if the sample has no such time.
@@ -336,20 +363,41 @@ impl<'a> Replay<'a> {
             || source.trust_after(sample.since_fix_ms),
             |carry| carry.trust,
         );
-        let set = report.belief.pose_set(self.judge.radius_squared(), trust);
+        if let Some(reason) = sample.fault {
+            return Verdict::deny(reason);
+        }
         let movement = self
             .setup
             .settings
             .movement(source.motion, now.wrapping_sub(stamp));
-        let set = set.map(|set| set.grown(movement));
-        if self.setup.examined {
-            return self.judge.evaluate(now, stamp, set);
+        let verdict = |belief: &PoseEstimate| {
+            let set = belief.pose_set(self.judge.radius_squared(), trust);
+            let set = set.map(|set| set.grown(movement));
+            if self.setup.examined {
+                return self.judge.evaluate(now, stamp, set);
+            }
+            match self.judge.permits(now, stamp, set) {
+                Ok(()) => Verdict::Permit {
+                    margin: Margin::ONE,
+                },
+                Err(reason) => Verdict::deny(reason),
+            }
+        };
+        let best = verdict(&report.belief);
+        if !sample.is_ambiguous {
+            return best;
         }
-        match self.judge.permits(now, stamp, set) {
-            Ok(()) => Verdict::Permit {
-                margin: Margin::ONE,
-            },
-            Err(reason) => Verdict::deny(reason),
+        let other = sample.other.as_ref();
+        let other = other.map(|other| verdict(&self.spread(other, sample)));
+        // Permitted only from both poses, with the smaller margin.
+        match (best, other) {
+            (Verdict::Permit { margin }, Some(Verdict::Permit { margin: of_other })) => {
+                Verdict::Permit {
+                    margin: margin.min(of_other),
+                }
+            }
+            (Verdict::Permit { margin }, None) => Verdict::Permit { margin },
+            _ => Verdict::deny(Reason::TagPosesAmbiguous),
         }
     }
 
@@ -394,14 +442,27 @@ impl<'a> Replay<'a> {
     }
 
     /// Passes a fix to the gate: unchanged, with the time since the source's last fix, or carried along the odometry.
-    fn take_fix(&mut self, now_ms: u32, report: &Report, since_fix_ms: Option<u32>) -> Step {
+    fn take_fix(&mut self, now_ms: u32, report: &Report, sample: &Sample) -> Step {
+        if let Some(reason) = sample.fault {
+            return self.gate.inhibit(now_ms, reason);
+        }
+        let other = sample.other.as_ref();
+        let other = other.map(|other| self.spread(other, sample));
         let Some(carry) = &mut self.carry else {
             let evidence = Evidence {
-                since_fix_ms,
+                since_fix_ms: sample.since_fix_ms,
+                others: other.as_slice(),
                 ..Evidence::of(report)
             };
             return self.gate.step_on(now_ms, &evidence);
         };
+        // One of two poses cannot be carried: the carried pose is unchanged.
+        if other.is_some() {
+            return Step {
+                verdict: Err(Reason::TagPosesAmbiguous),
+                ..self.gate.tick(now_ms)
+            };
+        }
         match carry.tracker.fix(report) {
             Ok(()) => match carry.tracker.tracked(now_ms) {
                 Ok(tracked) => self.gate.step_on(now_ms, &tracked.evidence()),
@@ -438,14 +499,22 @@ impl<'a> Replay<'a> {
         }
         self.drive_until(now_s);
         self.let_time_pass(now_ms);
-        let step = self.take_fix(now_ms, &report, sample.since_fix_ms);
+        let mut step = self.take_fix(now_ms, &report, sample);
+        // One of the two poses is outside, whichever the gate names.
+        if sample.is_ambiguous && step.verdict.is_err_and(|reason| !remembers(reason)) {
+            step.verdict = Err(Reason::TagPosesAmbiguous);
+            step.state = match step.state {
+                State::Inhibited(_) => State::Inhibited(Reason::TagPosesAmbiguous),
+                other => other,
+            };
+        }
         self.last_now_ms = now_ms;
         let verdict = examined.unwrap_or_else(|| match step.verdict {
             Ok(()) => Verdict::Permit {
                 margin: Margin::ONE,
             },
             // The reason may come from the gate's memory, so the verdict is computed from the estimate alone.
-            Err(reason) if remembers(reason) => self.judged(&report, sample),
+            Err(reason) if remembers(reason) || sample.is_ambiguous => self.judged(&report, sample),
             Err(reason) => Verdict::deny(reason),
         });
         let mut row = Row::of(sample, &report.belief, verdict, logged);
@@ -627,6 +696,49 @@ impl<'a> Replay<'a> {
     }
 }
 
+/// Returns the uncertainty of the base from that of a frame at a distance from the base's vertical axis. `radius_squared` is that of
+/// the pose-set, with the source's inflation.
+///
+/// A bound grows by the chord of the largest turn. A covariance has the derivative of the step already; what the derivative leaves out
+/// is at most `lever yaw^2 / 2` with the largest turn of the set, and a disc of that size is added: a sum of ellipsoids lies in
+/// `(1 + k) A + (1 + 1 / k) B` for every k above 0.
+fn of_base(spread: Uncertainty, lever_m: f64, radius_squared: f64) -> Uncertainty {
+    match spread {
+        Uncertainty::Bounded {
+            translation_m,
+            yaw_rad,
+        } => {
+            let turn = yaw_rad.min(core::f64::consts::PI);
+            Uncertainty::Bounded {
+                translation_m: translation_m + 2.0 * lever_m * libm::sin(0.5 * turn),
+                yaw_rad,
+            }
+        }
+        Uncertainty::Gaussian(mut rows) => {
+            let variance = rows[2][2];
+            let left_out = 0.5 * lever_m * radius_squared * variance;
+            let added = left_out * left_out / radius_squared;
+            let own = rows[0][0].min(rows[1][1]);
+            let best = libm::sqrt(added / own);
+            let share = if best > 0.0 && best.is_finite() {
+                best
+            } else {
+                1.0
+            };
+            // Without a turn, or without a valid covariance, nothing is added.
+            if added > 0.0 && added.is_finite() {
+                for entry in rows.as_flattened_mut() {
+                    *entry *= 1.0 + share;
+                }
+                for axis in [0, 1] {
+                    rows[axis][axis] += (1.0 + 1.0 / share) * added;
+                }
+            }
+            Uncertainty::Gaussian(rows)
+        }
+    }
+}
+
 /// Returns `true` if a reason of a gate's step may come from its memory, and not from the estimate. (Staleness is
 /// included: the gate's clock may not advance if a time is missing.)
 const fn remembers(reason: Reason) -> bool {
@@ -648,6 +760,9 @@ const fn remembers(reason: Reason) -> bool {
             | Reason::Tilted
             | Reason::FrameMismatch
             | Reason::SourceUnknown
+            | Reason::TagPosesAmbiguous
+            | Reason::CornersDoNotFit
+            | Reason::TooFewCorners
     )
 }
 

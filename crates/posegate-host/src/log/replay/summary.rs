@@ -157,6 +157,8 @@ fn findings(replay: &Replay<'_>) -> Value {
         .map(|(name, count)| (name.into(), json!(count)))
         .collect();
     all.insert("frames".into(), json!(findings.frames));
+    let most_tilt_deg = findings.most_tilt_rad.to_degrees();
+    all.insert("most_tilt_deg".into(), json!(most_tilt_deg));
     Value::Object(all)
 }
 

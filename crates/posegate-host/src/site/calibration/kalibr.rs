@@ -1,6 +1,6 @@
-//! Kalibr's camchain: several cameras in one file.
+//! Kalibr's camchain, and those of OpenVINS and TagSLAM: several cameras in one file.
 
-use super::{Numbers, ParsedCalibration, lens};
+use super::{Numbers, ParsedCalibration, lens_of_file};
 use crate::site::error::SiteError;
 use crate::site::suggest;
 use crate::site::yaml::{Document, Map, Node};
@@ -73,40 +73,13 @@ fn of_camera(
     let resolution = required("resolution")?;
     let size_px: [f64; 2] = document.numbers(resolution, "resolution")?;
 
+    let mut notes = Vec::new();
     let model = required("distortion_model")?;
-    let word = document.text(model)?;
-    let (coefficients_at, numbers) = match word {
-        "none" => (0..0, Vec::new()),
-        _ => {
-            let list = required("distortion_coeffs")?;
-            let numbers = document.finite_numbers(list, "distortion_coeffs")?;
-            (list.at.clone(), numbers)
-        }
+    let list = match document.text(model)? {
+        "none" => None,
+        _ => Some(required("distortion_coeffs")?),
     };
-    let found = match (word, numbers.as_slice()) {
-        ("none", _) => lens("plumb_bob", &[0.0; 5]),
-        // Kalibr's radtan is plumb_bob without k3.
-        ("radtan", [k1, k2, p1, p2]) => lens("plumb_bob", &[*k1, *k2, *p1, *p2, 0.0]),
-        ("equidistant", _) => lens("equidistant", &numbers),
-        ("radtan", _) => Some(Err(4)),
-        _ => None,
-    };
-    let lens = match found {
-        Some(Ok(lens)) => lens,
-        Some(Err(needed)) => {
-            let message = format!(
-                "distortion_coeffs has {} numbers, {word} has {needed}",
-                numbers.len()
-            );
-            let error = document.error(coefficients_at, message);
-            return Err(error.expected(format!("{needed} numbers")).help(AS_SAVED));
-        }
-        None => {
-            let help = "calibrate with `--models pinhole-radtan` or `pinhole-equi`";
-            let expected = "radtan, equidistant or none";
-            return Err(unknown(model, "distortion model", expected, help));
-        }
-    };
+    let lens = lens_of_file(document, Some(model), list, "distortion_coeffs", &mut notes)?;
     Ok(ParsedCalibration {
         size_at: resolution.at.clone(),
         numbers: Numbers {
@@ -115,7 +88,8 @@ fn of_camera(
             axis_px: [cx, cy],
             lens,
             rect: [fx, fy, cx, cy],
-            turned: None,
+            notes,
+            ..Numbers::default()
         },
     })
 }

@@ -17,6 +17,7 @@ const MESSAGES: FormatMessages = FormatMessages {
     numbers: "write numbers plainly, as 0.25 or 2.5e-01, and ids as whole numbers",
     not_finite: "measure the missing value, or remove the tag",
     length: "write lists in [ ]",
+    reads_first: false,
 };
 
 const MEMBER: &str = "write `{id: 7, size: 0.1, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}`: metres, the quaternion \

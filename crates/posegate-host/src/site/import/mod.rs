@@ -17,6 +17,7 @@ pub(super) use self::table::imports;
 
 mod apriltag_ros;
 mod convention;
+mod fmap;
 mod nav2;
 mod own;
 mod place;
@@ -30,11 +31,14 @@ mod write;
 /// The format of an import file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
+    /// `fmap`: a field map of Limelight in JSON. Its tag frame is [`Convention::Wpilib`]; its origin is the middle of the field.
+    Fmap,
     /// `wpilib`: a field layout in JSON. Its tag frame is [`Convention::Wpilib`].
     Wpilib,
     /// `apriltag_ros`: a `tags.yaml` with bundles of tags, and with single tags, which have no pose.
     AprilTagRos,
-    /// `nav2_docks`: a dock database in YAML. A dock's pose is that of the robot's base when it is docked.
+    /// `nav2_docks`: a dock database in YAML, or the parameters of the docking server. A dock's pose is that of the robot's base when it
+    /// is docked, with the opposite heading if the robot enters backward.
     Nav2Docks,
     /// `posegate`: `[tag.NAME]` and `[goal.NAME]` tables as in a site file.
     Posegate,
@@ -42,13 +46,14 @@ pub enum Format {
 
 impl Format {
     /// The names of the formats.
-    pub const NAMES: [&str; 4] = ["wpilib", "apriltag_ros", "nav2_docks", "posegate"];
+    pub const NAMES: [&str; 5] = ["wpilib", "fmap", "apriltag_ros", "nav2_docks", "posegate"];
 
     /// Returns the format with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
             "wpilib" => Self::Wpilib,
+            "fmap" => Self::Fmap,
             "apriltag_ros" => Self::AprilTagRos,
             "nav2_docks" => Self::Nav2Docks,
             "posegate" => Self::Posegate,
@@ -61,6 +66,7 @@ impl Format {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Wpilib => "wpilib",
+            Self::Fmap => "fmap",
             Self::AprilTagRos => "apriltag_ros",
             Self::Nav2Docks => "nav2_docks",
             Self::Posegate => "posegate",
@@ -71,7 +77,7 @@ impl Format {
     #[must_use]
     pub const fn convention(self) -> Option<Convention> {
         match self {
-            Self::Wpilib => Some(Convention::Wpilib),
+            Self::Wpilib | Self::Fmap => Some(Convention::Wpilib),
             Self::Posegate => Some(Convention::Posegate),
             Self::AprilTagRos | Self::Nav2Docks => None,
         }
@@ -85,6 +91,46 @@ impl Format {
             _ => (file, None),
         }
     }
+}
+
+/// How a robot enters a dock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DockDirection {
+    /// `forward`: the docked robot has the heading of the dock's pose.
+    Forward,
+    /// `backward`: the docked robot has the opposite heading.
+    Backward,
+}
+
+impl DockDirection {
+    /// The names of the directions.
+    pub const NAMES: [&str; 2] = ["forward", "backward"];
+
+    /// Returns the direction with a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "forward" => Some(Self::Forward),
+            "backward" => Some(Self::Backward),
+            _ => None,
+        }
+    }
+
+    /// Returns the direction's name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Forward => "forward",
+            Self::Backward => "backward",
+        }
+    }
+}
+
+/// A task of a dock: the robot's position within a distance of the goal of the same name, at any heading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DockTask {
+    /// Metres, above 0.
+    pub radius: f64,
 }
 
 /// The settings for reading a file of tags or docks: everything that the file itself does not contain.
@@ -107,6 +153,10 @@ pub struct Import {
     pub part: Option<String>,
     /// The tolerance of the tags' poses; `None` for none.
     pub tolerance: Option<Tolerance>,
+    /// How the robot enters docks, if the file does not say it; `None` is forward, with a remark.
+    pub dock_direction: Option<DockDirection>,
+    /// The frame whose docks are read; needed if the file has docks of several frames.
+    pub frame: Option<String>,
 }
 
 /// The contents of an import file.
@@ -117,6 +167,10 @@ pub struct Imported {
     pub tags: BTreeMap<String, SiteTag>,
     /// Goals by name, rounded in the same way.
     pub goals: BTreeMap<String, PoseDeg>,
+    /// Tasks by the names of their goals.
+    pub tasks: BTreeMap<String, DockTask>,
+    /// Everything that was assumed, and what the file says beyond tags and goals.
+    pub remarks: Vec<String>,
 }
 
 /// The reason why an import failed.
@@ -164,6 +218,8 @@ impl Import {
             prefix: None,
             part: None,
             tolerance: None,
+            dock_direction: None,
+            frame: None,
         }
     }
 
@@ -178,7 +234,29 @@ impl Import {
             file: file_name,
             text,
         };
+        let of_docks = self.format == Format::Nav2Docks;
+        self.refuse("dock_direction", self.dock_direction.is_some() && !of_docks)?;
+        self.refuse("frame", self.frame.is_some() && !of_docks)?;
         match self.format {
+            Format::Fmap => {
+                let convention = self.convention()?;
+                self.refuse("size", self.size.is_some())?;
+                self.refuse("family", self.family.is_some())?;
+                let world = self.world();
+                let found = fmap::read(source)?;
+                let tags = found.tags.into_iter().map(|tag| {
+                    let (id, size, frame) = tag.value;
+                    let pose = world.then(&frame).with_axes(convention.axes()).pose();
+                    (tag.at, Tag { id, size, pose })
+                });
+                let mut imported = self.numbered(source, &found.family, tags.collect())?;
+                if self.pose.is_none() {
+                    imported.remarks.push(
+                        "the origin is the middle of the field, as in the file (WPILib's is a corner): --pose moves it".into(),
+                    );
+                }
+                Ok(imported)
+            }
             Format::Wpilib => {
                 let convention = self.convention()?;
                 let (size, family) = (self.size()?, self.family()?);
@@ -214,15 +292,22 @@ impl Import {
                 self.refuse("family", self.family.is_some())?;
                 self.refuse("tolerance", self.tolerance.is_some())?;
                 self.flat()?;
-                let docks = nav2::read(source, self.pose.is_some())?;
-                self.named(source, Vec::new(), docks)
+                let found = nav2::read(source, self)?;
+                let mut imported = self.named(source, Vec::new(), found.docks)?;
+                let prefix = self.prefix.as_deref().unwrap_or("");
+                let tasks = found.tasks.into_iter();
+                imported.tasks = tasks
+                    .map(|(name, task)| (format!("{prefix}{name}"), task))
+                    .collect();
+                imported.remarks = found.remarks;
+                Ok(imported)
             }
             Format::Posegate => {
                 self.convention()?;
                 self.refuse("size", self.size.is_some())?;
                 self.refuse("family", self.family.is_some())?;
                 self.refuse("tolerance", self.tolerance.is_some())?;
-                let (mut tags, goals) = own::read(source)?;
+                let (mut tags, goals, has_tasks) = own::read(source)?;
                 if !goals.is_empty() {
                     self.flat()?;
                 }
@@ -233,7 +318,12 @@ impl Import {
                         *pose = world.then(&Frame::of_pose(*pose)).pose();
                     }
                 }
-                self.named(source, tags, goals)
+                let mut imported = self.named(source, tags, goals)?;
+                if has_tasks {
+                    let remark = "the file's tasks are not imported: paste them into the site file";
+                    imported.remarks.push(remark.into());
+                }
+                Ok(imported)
             }
         }
     }
@@ -311,6 +401,7 @@ impl Import {
         Ok(Imported {
             tags: unique(source, tags.collect())?,
             goals: unique(source, goals.collect())?,
+            ..Imported::default()
         })
     }
 }

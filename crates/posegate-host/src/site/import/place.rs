@@ -44,6 +44,22 @@ impl Frame {
         Ok(Self { turn, at })
     }
 
+    /// Returns a frame with a position (metres) and a rotation by rows; `None` if the rows are not those of a rotation.
+    pub(super) fn of_rotation(at: [f64; 3], turn: Matrix) -> Option<Self> {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let [p, q, r] = turn;
+        let units = [p, q, r].map(|row| dot(row, row) - 1.0);
+        let angles = [dot(p, q), dot(q, r), dot(r, p)];
+        let is_small = |off: &f64| off.abs() <= 2.0 * LENGTH_SLACK;
+        let across = [
+            p[1] * q[2] - p[2] * q[1],
+            p[2] * q[0] - p[0] * q[2],
+            p[0] * q[1] - p[1] * q[0],
+        ];
+        let is_rotation = units.iter().chain(&angles).all(is_small) && dot(across, r) > 0.0;
+        is_rotation.then_some(Self { turn, at })
+    }
+
     pub(super) fn of_pose(pose: Pose3Deg) -> Self {
         Self {
             turn: rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg),

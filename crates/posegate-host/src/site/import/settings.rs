@@ -83,8 +83,9 @@ impl Import {
         if !is_there {
             return Ok(());
         }
-        let why = match self.format {
-            Format::Nav2Docks => "docks are no tags",
+        let why = match (self.format, key) {
+            (_, "dock_direction" | "frame") => "it is for docks",
+            (Format::Nav2Docks, _) => "docks are no tags",
             _ => "the file says it itself",
         };
         Err(ImportError::Setting {

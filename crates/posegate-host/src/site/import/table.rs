@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{Convention, Format, Import, ImportError, Imported};
+use super::{Convention, DockDirection, Format, Import, ImportError, Imported};
 use crate::input::{self, Limit};
 use crate::site::error::SiteError;
 use crate::site::named::NamedFile;
 use crate::site::reader::{Node, Table};
-use crate::site::{SiteTag, keys, places, poses};
+use crate::site::{Note, Remark, SiteTag, keys, places, poses};
 use posegate::shape::PoseDeg;
 
 /// Adds the tags and goals of a site's imports. Returns the files by the imports' names.
@@ -16,6 +16,7 @@ pub(in crate::site) fn imports<'a>(
     root: &Table<'a>,
     tags: &mut BTreeMap<String, SiteTag>,
     goals: &mut BTreeMap<String, PoseDeg>,
+    remarks: &mut Vec<Remark>,
 ) -> Result<BTreeMap<&'a str, NamedFile>, SiteError> {
     let mut files = BTreeMap::new();
     let Some(node) = root.optional(&keys::IMPORTS) else {
@@ -24,6 +25,10 @@ pub(in crate::site) fn imports<'a>(
     for (name, node) in node.any_table()?.named(&keys::IMPORT)? {
         let (table, imported, file) = import(&node)?;
         files.insert(name, file);
+        remarks.extend(imported.remarks.into_iter().map(|message| Remark {
+            about: ["import", name].map(str::to_owned),
+            note: Note::assumed(message),
+        }));
         join(&table, "tag", tags, imported.tags)?;
         join(&table, "goal", goals, imported.goals)?;
     }
@@ -65,6 +70,8 @@ fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, NamedFile), SiteE
         &keys::IMPORT_POSE,
         &keys::PREFIX,
         &keys::TOLERANCE,
+        &keys::DOCK_DIRECTION,
+        &keys::DOCK_FRAME,
     ])?;
     let word = table.required(&keys::FORMAT)?;
     let format = Format::named(word.text()?).ok_or_else(|| word.unknown_word(Format::NAMES))?;
@@ -95,6 +102,14 @@ fn import<'a>(node: &Node<'a>) -> Result<(Table<'a>, Imported, NamedFile), SiteE
             Some(node) => Some(places::tolerance(&node)?),
             None => None,
         },
+        dock_direction: match table.optional(&keys::DOCK_DIRECTION) {
+            Some(node) => Some(
+                DockDirection::named(node.text()?)
+                    .ok_or_else(|| node.unknown_word(DockDirection::NAMES))?,
+            ),
+            None => None,
+        },
+        frame: text(&keys::DOCK_FRAME)?,
     };
     let folder = Path::new(file.file()).parent().unwrap_or(Path::new(""));
     let path = folder.join(path);

@@ -16,8 +16,16 @@ const FIELD: &str = "{ \"length\": 16.5, \"width\": 8.1 }";
 /// Returns the tags' numbers and their poses in the field.
 pub(super) fn read(source: Source<'_>) -> Result<Vec<Placed<(u32, Frame)>>, SiteError> {
     let file = Value::root(source)?;
-    let tags = file.required("tags", FILE)?;
-    let reach = match file.optional("field", FILE)? {
+    // Since 2026 WPILib names both keys differently.
+    let tags = match file.optional("field-tags", FILE)? {
+        Some(tags) => tags,
+        None => file.required("tags", FILE)?,
+    };
+    let field = match file.optional("field-dimensions", FILE)? {
+        None => file.optional("field", FILE)?,
+        field => field,
+    };
+    let reach = match field {
         Some(field) => Some([
             field.required("length", FIELD)?.number()?,
             field.required("width", FIELD)?.number()?,

@@ -43,6 +43,17 @@ pub(super) fn tables(imported: &Imported) -> String {
         line(format_args!("x = {:?}\ny = {:?}", goal.x, goal.y));
         line(format_args!("yaw_deg = {:?}", goal.yaw_deg));
     }
+    for (name, task) in &imported.tasks {
+        line(format_args!("\n[task.{}]", key(name)));
+        line(format_args!(
+            "kind = \"work\"\ngoal = {}",
+            toml_string(name)
+        ));
+        line(format_args!(
+            "success = {{ shape = \"disc\", radius = {:?}, yaw_deg = [-180.0, 180.0] }}",
+            task.radius
+        ));
+    }
     text.trim_start().to_string()
 }
 

@@ -127,15 +127,14 @@ fx = 615.0 => distortion = { model = "fov", coefficients = [1] }\nfx = 615.0 => 
     => model` is "fov" => write it like
 fx = 615.0 => distortion = { model = "plumb_bop", coefficients = [1] }\nfx = 615.0 => "plumb_bop"
     => model` is "plumb_bop" => did you mean "plumb_bob"?
-fx = 615.0 => distortion = { model = "plumb_bob", coefficients = [1, 2, 3, 4] }\nfx = 615.0
-    => [1, 2, 3, 4] => has 4 coefficients, plumb_bob has 5 => write it like
+fx = 615.0 => distortion = { model = "plumb_bob", coefficients = [1, 2, 3] }\nfx = 615.0
+    => [1, 2, 3] => has 3 coefficients, plumb_bob has 5 => write it like
 fx = 615.0 => distortion = { model = "equidistant", coefficients = [1, nan, 3, 4] }\nfx = 615.0
     => nan => which is not a finite number => write it like
 fx = 615.0 => distortion = { model = "equidistant", coefficients = [0, 0, 0, 0] }\nfx = 615.0
     => [camera.front] => `image` is missing from `camera.front`, whose raw image differs => image_raw
-fx = 615.0 => image = "raw"\ndistortion = { model = "plumb_bob", coefficients = [-1, 0, 0, 0, 0] }\nfx = 615.0
-    => distortion = => the distortion folds at 236.7 px from the optical axis, the image reaches 400.0 px
-    => calibrate again
+fx = 615.0 => image = "raw"\ndistortion = { model = "plumb_bob", coefficients = [1, 2, 0, 0, 0, 9, 0, 0] }\nfx = 615.0
+    => [1, 2, 0, 0, 0, 9, 0, 0] => has k4, k5, k6 of rational_polynomial, which plumb_bob does not have
 fx = 615.0 => image = "rext"\nfx = 615.0 => "rext" => image` is "rext" => did you mean "rect"?
 fx = 615.0 => border_px = -1\nfx = 615.0 => -1\n => border_px` is -1 => write it like
 fx = 615.0 => border_px = 240\nfx = 615.0 => border_px => leaves nothing of an image of 640 x 480 px => smaller

@@ -2,6 +2,7 @@
 
 mod tree;
 
+use std::cell::Cell;
 use std::ops::Range;
 
 pub(super) use self::tree::Node;
@@ -21,6 +22,8 @@ pub(super) struct FormatMessages {
     pub not_finite: &'static str,
     /// Advice for a list of the wrong length.
     pub length: &'static str,
+    /// `true` to read the first one of several documents, `false` to refuse several.
+    pub reads_first: bool,
 }
 
 const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
@@ -29,6 +32,8 @@ const TABS: &str = "indent with spaces; `expand FILE` turns tabs into them";
 pub(super) struct Document<'a> {
     source: Source<'a>,
     messages: &'static FormatMessages,
+    /// Set if the first one of several documents was read.
+    has_more: Cell<bool>,
 }
 
 /// The entries of a map in the file.
@@ -62,9 +67,23 @@ impl<'a> Map<'a> {
     }
 }
 
+impl Node {
+    /// Returns `true` for a list.
+    pub(super) fn is_list(&self) -> bool {
+        matches!(&*self.value, Value::List(_))
+    }
+
+    /// Returns the entries of a map; `None` for other values.
+    pub(super) fn as_map(&self) -> Option<Map<'_>> {
+        match &*self.value {
+            Value::Map(entries) => Some(Map { entries }),
+            _ => None,
+        }
+    }
+}
+
 impl<'a> Document<'a> {
-    /// Refuses indents by tabs: the position of the text after a tab would be misleading. (The parser
-    /// ignores OpenCV's `%YAML:1.0`.)
+    /// Refuses indents by tabs: the position of the text after a tab would be misleading.
     pub(super) fn new(
         source: Source<'a>,
         messages: &'static FormatMessages,
@@ -81,7 +100,21 @@ impl<'a> Document<'a> {
             }
             start += line.len();
         }
-        Ok(Self { source, messages })
+        Ok(Self {
+            source,
+            messages,
+            has_more: Cell::new(false),
+        })
+    }
+
+    /// Returns `true` if the file has more documents than the one that was read.
+    pub(super) fn has_more(&self) -> bool {
+        self.has_more.get()
+    }
+
+    /// Returns `true` for no value, and for an empty text.
+    pub(super) fn is_empty(&self, node: &Node) -> bool {
+        node.value.is_null() || scalar(node) == Some("")
     }
 
     /// Parses the file.
@@ -232,6 +265,32 @@ impl<'a> Document<'a> {
     }
 }
 
+/// Returns the list of texts below these keys, one inside the other; errors are described in one line and name the file `name`.
+pub(crate) fn texts(text: &str, name: &str, path: &[&str]) -> Result<Vec<String>, String> {
+    const MESSAGES: FormatMessages = FormatMessages {
+        what: "the metadata of a ROS 2 bag",
+        written: "use the file as rosbag2 wrote it",
+        numbers: "use the file as rosbag2 wrote it",
+        not_finite: "use the file as rosbag2 wrote it",
+        length: "use the file as rosbag2 wrote it",
+        reads_first: true,
+    };
+    let found = || {
+        let document = Document::new(Source { file: name, text }, &MESSAGES)?;
+        let root = document.parse()?;
+        let mut node = root;
+        for key in path {
+            let inner = document.map(&node)?.get(key).cloned();
+            node = document.required(inner, node.at, key, MESSAGES.written)?;
+        }
+        let texts = document.list(&node)?.iter().map(|node| document.text(node));
+        texts
+            .map(|text| text.map(str::to_owned))
+            .collect::<Result<_, SiteError>>()
+    };
+    found().map_err(|error| error.to_string())
+}
+
 fn scalar(node: &Node) -> Option<&str> {
     match &*node.value {
         Value::Scalar { text, .. } => Some(text.trim_ascii()),
@@ -252,15 +311,24 @@ fn number(text: &str) -> Option<f64> {
 }
 
 /// Returns the whole number that a text states in YAML 1.2's core schema; `None` for other texts and for numbers outside 0 to
-/// 2^32 - 1. Refuses decimal numbers with a leading 0, which YAML 1.1 reads as octal.
+/// 2^32 - 1. A decimal number with a leading 0 is read if YAML 1.1, where it is octal, reads the same number or none.
 fn whole(text: &str) -> Option<u32> {
     let text = text.strip_prefix('+').unwrap_or(text);
     let (digits, radix) = match (text.strip_prefix("0x"), text.strip_prefix("0o")) {
         (Some(digits), _) => (digits, 16),
         (_, Some(digits)) => (digits, 8),
-        _ if text.len() > 1 && text.starts_with('0') => return None,
         _ => (text, 10),
     };
+    if radix == 10 && digits.len() > 1 && digits.starts_with('0') {
+        let octal = u32::from_str_radix(digits, 8).ok();
+        let decimal = digits
+            .parse()
+            .ok()
+            .filter(|_| digits.bytes().all(|b| b.is_ascii_digit()))?;
+        return octal
+            .is_none_or(|octal| octal == decimal)
+            .then_some(decimal);
+    }
     // `from_str_radix` accepts a sign, so it would accept a second one.
     if !digits.starts_with(|first: char| first.is_ascii_hexdigit()) {
         return None;

@@ -6,6 +6,7 @@ const MESSAGES: FormatMessages = FormatMessages {
     numbers: "write numbers plainly",
     not_finite: "measure again",
     length: "write all numbers",
+    reads_first: false,
 };
 
 fn document(text: &str) -> Document<'_> {
@@ -167,6 +168,9 @@ fn numbers_are_those_of_yaml() {
         ("4294967295", u32::MAX),
         ("0x1F", 31),
         ("0o17", 15),
+        // YAML 1.1 reads 7 too, and no number.
+        ("007", 7),
+        ("08", 8),
     ] {
         assert_eq!(whole(text), Some(value), "{text}");
     }
@@ -176,7 +180,9 @@ fn numbers_are_those_of_yaml() {
         "-0",
         "1.0",
         "1e3",
-        "007",
+        // 10, and 8 in YAML 1.1.
+        "010",
+        "0x010g",
         "4294967296",
         "0x",
         "0x+1",

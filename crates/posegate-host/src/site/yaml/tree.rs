@@ -1,5 +1,6 @@
 //! The values of a YAML text, each with its position.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::rc::Rc;
@@ -68,8 +69,21 @@ pub(super) fn parse(document: &Document<'_>) -> Result<Node, SiteError> {
         block_nesting_limit: MAX_DEPTH,
     };
     let mut tree = Tree::new(document);
-    for event in Parser::new_from_str_with_options(document.source.text, options) {
+    let text = without_directive(document.source.text);
+    for event in Parser::new_from_str_with_options(&text, options) {
         let (event, span) = event.map_err(|fault| not_read(document, &fault))?;
+        if document.messages.reads_first
+            && tree.root.is_some()
+            && matches!(event, Event::DocumentStart(..))
+        {
+            let rest = text.get(bytes(span).end..).unwrap_or_default();
+            document.has_more.set(
+                !rest
+                    .trim_matches(['-', '.', ' ', '\t', '\r', '\n'])
+                    .is_empty(),
+            );
+            break;
+        }
         tree.take(event, bytes(span))?;
     }
     Ok(match tree.root {
@@ -79,6 +93,19 @@ pub(super) fn parse(document: &Document<'_>) -> Result<Node, SiteError> {
             value: Rc::new(Value::Map(Vec::new())),
         },
     })
+}
+
+/// Returns the text with the directive of its first line as a comment: OpenCV writes `%YAML:1.0`, which is none, and old versions no `---`
+/// after it.
+fn without_directive(text: &str) -> Cow<'_, str> {
+    let bare = text.trim_start_matches('\u{feff}');
+    match bare.strip_prefix("%YAML") {
+        Some(rest) => {
+            let mark = text.get(..text.len() - bare.len()).unwrap_or_default();
+            Cow::Owned(format!("{mark}#YAML{rest}"))
+        }
+        None => Cow::Borrowed(text),
+    }
 }
 
 fn bytes(span: Span) -> Range<usize> {

@@ -9,7 +9,7 @@ proptest! {
     fn random_messages_never_panic(order in 0u8..=1, body in prop::collection::vec(0u8..4, 0..900)) {
         let bytes = [&[0, order, 0, 0], &body[..]].concat();
         for kind in Kind::ALL {
-            let message = decoded(kind, &bytes);
+            let message = decoded(kind, Encoding::Cdr, &bytes);
             if let Ok(Message { content: Content::Detections(found), .. }) = message {
                 prop_assert!(found.len() * 168 <= body.len());
             }
@@ -45,21 +45,16 @@ fn pose_bytes(big: bool) -> Vec<u8> {
 #[test]
 fn big_and_little_endian_messages_are_read() {
     for big in [false, true] {
-        let message = decoded(Kind::Pose, &pose_bytes(big)).unwrap();
+        let message = decoded(Kind::Pose, Encoding::Cdr, &pose_bytes(big)).unwrap();
         assert_eq!(
             (message.stamp_ns, message.frame.as_str()),
             (7_500_000_000, "map")
         );
-        let Content::Pose {
-            position,
-            orientation,
-            covariance,
-        } = message.content
-        else {
+        let Content::Pose { pose, covariance } = message.content else {
             panic!("a pose");
         };
-        assert_eq!(position, [1.0, -2.0, 0.0]);
-        assert_eq!(orientation, [0.0, 0.0, 0.6, 0.8]);
+        assert_eq!(pose.position, [1.0, -2.0, 0.0]);
+        assert_eq!(pose.orientation, [0.0, 0.0, 0.6, 0.8]);
         assert_eq!(covariance, None);
     }
 }
@@ -68,7 +63,7 @@ fn big_and_little_endian_messages_are_read() {
 fn invalid_bytes_are_errors() {
     let good = pose_bytes(false);
     let padded: Vec<u8> = good.iter().copied().chain([0; 3]).collect();
-    assert!(decoded(Kind::Pose, &padded).is_ok());
+    assert!(decoded(Kind::Pose, Encoding::Cdr, &padded).is_ok());
     let longer: Vec<u8> = good.iter().copied().chain([0; 4]).collect();
     for (bytes, words) in [
         (&longer[..], "4 bytes are left over"),
@@ -76,11 +71,11 @@ fn invalid_bytes_are_errors() {
         (&[0, 3, 0, 0, 0][..], "not plain CDR"),
         (&[0, 1][..], "2 bytes"),
     ] {
-        let error = decoded(Kind::Pose, bytes).err().unwrap();
+        let error = decoded(Kind::Pose, Encoding::Cdr, bytes).err().unwrap();
         assert!(error.contains(words), "{error}");
     }
     // The bytes of another type under this name.
-    assert!(decoded(Kind::PoseWithCovariance, &good).is_err());
+    assert!(decoded(Kind::PoseWithCovariance, Encoding::Cdr, &good).is_err());
 }
 
 /// A detection array written by hand: stamp, frame, count, then for each detection its family, four numbers of 32 bits and
@@ -106,7 +101,7 @@ fn detections_are_read_and_their_count_is_bounded_by_the_bytes() {
             bytes.extend(f64::from(value).to_le_bytes());
         }
     }
-    let message = decoded(Kind::Detections, &bytes).unwrap();
+    let message = decoded(Kind::Detections, Encoding::Cdr, &bytes).unwrap();
     let Content::Detections(found) = message.content else {
         panic!("detections");
     };
@@ -117,10 +112,13 @@ fn detections_are_read_and_their_count_is_bounded_by_the_bytes() {
         [[2.0, 3.0], [4.0, 5.0], [6.0, 7.0], [8.0, 9.0]]
     );
     for cut in 4..bytes.len() {
-        assert!(decoded(Kind::Detections, &bytes[..cut]).is_err(), "{cut}");
+        assert!(
+            decoded(Kind::Detections, Encoding::Cdr, &bytes[..cut]).is_err(),
+            "{cut}"
+        );
     }
     bytes[20..24].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(decoded(Kind::Detections, &bytes).is_err());
+    assert!(decoded(Kind::Detections, Encoding::Cdr, &bytes).is_err());
 }
 
 #[test]
@@ -131,8 +129,8 @@ fn kinds_are_recognized_by_name_and_definition() {
     let poses =
         "std_msgs/Header header\ngeometry_msgs/Pose pose\n===========\nMSG: std_msgs/Header\n";
     let rest = "===========\nMSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n===========\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n===========\nMSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n";
-    assert!(Kind::Pose.has_fields_of(&format!("{poses}{time}{rest}")));
-    assert!(Kind::Pose.has_fields_of(""));
+    assert!(Kind::Pose.has_fields_of(Encoding::Cdr, &format!("{poses}{time}{rest}")));
+    assert!(Kind::Pose.has_fields_of(Encoding::Cdr, ""));
     let other = rest.replacen("float64 z", "float32 z", 1);
-    assert!(!Kind::Pose.has_fields_of(&format!("{poses}{time}{other}")));
+    assert!(!Kind::Pose.has_fields_of(Encoding::Cdr, &format!("{poses}{time}{other}")));
 }

@@ -108,7 +108,7 @@ fn errors_in_docks_point_at_the_fault() {
         ", 1.5] => ] => [1.0, 2.0] => docks.home.pose has 2 numbers => there is no z",
         ", 1.5] => , 0.0, 1.5] => [1.0 => docks.home.pose has 4 numbers => metres, metres, radians",
         "[1.0, 2.0, 1.5] => \"1 2 0\" => \"1 => found `\"1 2 0\"` => write",
-        "frame: map => frame: odom => odom => the dock `home` is in the frame `odom` => the `pose` of the frame `odom`",
+        "frame: map => frame: odom => odom => the dock `home` is in the frame `odom`, another one in `map` => --frame NAME",
         "type: \"charger\",  => - => {frame => `docks.home.type` is missing => docks:",
         "    pose: [-3.5, 0.25, -3.0]\\n => - => type: conveyor => `docks.dock-3.pose` is missing => docks:",
         "docks: => dock: => ^ => the file has no `docks` => dock_database",
@@ -138,7 +138,7 @@ fn errors_in_tables_point_at_the_fault() {
     let rows = [
         "size = 0.2 => size = 0 => 0\\npose => `tag.wall.size` is 0 => size = 0.30",
         "yaw_deg = 90.0 => yaw = 1.57 => yaw = => unknown key `yaw` => in degrees",
-        "[goal.home] => [task.home] => task => unknown key `task` => remove it",
+        "[goal.home] => [chain.home] => chain => unknown key `chain` => remove it",
         "[goal.home] => [goal.\"\"] => \"\" => is empty => choose",
         "id = 5 => id = seven => seven => not valid TOML => quotes",
         "x = 1.0 => x = nan => nan => not a finite number => x = ",

@@ -1,3 +1,6 @@
+use super::super::intake::MOST_NAMED;
+use super::super::message::Kind;
+use super::super::{ReaderDiagnostics, Role, Wanted};
 use super::*;
 use crate::log::mcap::{Head, Writer};
 use proptest::prelude::*;
@@ -86,9 +89,9 @@ fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
         topic: "/pose".into(),
         role: Role::Estimates(0),
     };
-    let mut bag = Bag::new(bytes, "a.mcap", &[wanted]);
+    let (mut bag, mut intake) = (McapFile::new(bytes, "a.mcap"), Intake::new(&[wanted]));
     let mut seconds = Vec::new();
-    while let Some(item) = bag.next().unwrap() {
+    while let Some(item) = bag.next(&mut intake).unwrap() {
         let Item::Estimate(sample) = item else {
             panic!("an estimate");
         };
@@ -98,8 +101,8 @@ fn read(bytes: &[u8]) -> (Vec<f64>, ReaderDiagnostics) {
     // `read_to_end` doubles its buffer.
     assert!(bag.body.capacity() <= 2 * bytes.len() + 64);
     assert!(bag.records.capacity() <= LARGEST);
-    assert!(bag.notes.kept <= MOST_NAMED);
-    (seconds, bag.diagnostics().clone())
+    assert!(intake.kept() <= MOST_NAMED);
+    (seconds, intake.diagnostics)
 }
 
 const COMPRESSIONS: [&str; 3] = ["", "zstd", "lz4"];

@@ -1,0 +1,221 @@
+//! Calibrations as programs write them.
+
+use crate::run::{Case, Ended};
+use serde_json::Value;
+
+fn check(calibration: &str, arguments: &str) -> Ended {
+    let site = "[camera.front]\ncalibration = \"c.yaml\"\nimage = \"raw\"\nmount = { x = 0.2, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n";
+    let case = Case::new(&[
+        ("site.toml", site.as_bytes()),
+        ("c.yaml", calibration.as_bytes()),
+    ]);
+    case.run(&format!("check site.toml {arguments}"))
+}
+
+/// Returns the codes of the warnings.
+fn codes(calibration: &str) -> Vec<String> {
+    let checked = check(calibration, "--json").json(0);
+    let warnings = checked["warnings"].as_array().expect("warnings");
+    warnings
+        .iter()
+        .map(|warning| warning["code"].as_str().expect("a code").into())
+        .collect()
+}
+
+fn is_read(calibration: &str) {
+    assert_eq!(codes(calibration), Vec::<String>::new(), "{calibration}");
+}
+
+fn refused(calibration: &str, words: &[&str]) {
+    check(calibration, "").is_refused_with(words);
+}
+
+const MATRIX: &str =
+    "camera_matrix: {rows: 3, cols: 3, data: [520.5, 0, 322, 0, 521, 238.5, 0, 0, 1]}\n";
+
+/// A calibration with a line for the model and coefficients.
+fn ros(model: &str, coefficients: &[f64]) -> String {
+    format!(
+        "image_width: 640\nimage_height: 480\n{MATRIX}{model}distortion_coefficients: {{rows: 1, cols: {}, data: {coefficients:?}}}\n",
+        coefficients.len()
+    )
+}
+
+#[test]
+fn directive_without_dashes_is_a_comment() {
+    let chain = "cam0:\n  T_imu_cam: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  intrinsics: [458.0, 457.0, 367.0, 248.0]\n  resolution: [752, 480]\n";
+    for start in [
+        "%YAML:1.0\n",
+        "%YAML:1.0\n---\n",
+        "%YAML:1.0 # made by hand\n\n",
+        "\u{feff}%YAML:1.0\n",
+        "%YAML 1.2\n---\n",
+        "",
+    ] {
+        is_read(&format!("{start}{chain}"));
+    }
+    // The line of a fault is that of the file.
+    refused(
+        &format!("%YAML:1.0\n{}", chain.replace("458.0", "x")),
+        &["c.yaml:7:16"],
+    );
+}
+
+#[test]
+fn old_key_of_the_model_is_read() {
+    is_read(&ros(
+        "camera_model: plumb_bob\n",
+        &[0.1, -0.2, 0.001, 0.002, 0.0],
+    ));
+    is_read(&ros(
+        "camera_model: rational_polynomial\n",
+        &[0.1, 0.2, 0.0, 0.0, 0.01, 0.3, 0.1, 0.02],
+    ));
+    refused(
+        &ros("camera_model: mei\n", &[0.1, -0.2, 0.001, 0.002, 0.0]),
+        &["`mei` is not known"],
+    );
+}
+
+#[test]
+fn echoes_of_camera_info_are_read() {
+    let ros2 = "header:\n  stamp:\n    sec: 12\n    nanosec: 5\n  frame_id: optical\nheight: 360\nwidth: 640\ndistortion_model: plumb_bob\nd:\n- 0.05\n- -0.1\n- 0.0\n- 0.0\n- 0.0\nk: [500.0, 0.0, 320.0, 0.0, 500.0, 180.0, 0.0, 0.0, 1.0]\nr: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\np: [500.0, 0.0, 320.0, 0.0, 0.0, 500.0, 180.0, 0.0, 0.0, 0.0, 1.0, 0.0]\nbinning_x: 0\nbinning_y: 0\nroi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: false\n";
+    is_read(ros2);
+    is_read(&format!("{ros2}---\n"));
+    assert_eq!(
+        codes(&format!("{ros2}---\n{ros2}---\nheader:\n  st")),
+        ["assumed"]
+    );
+    let ros1 = ros2
+        .replace("\nd:", "\nD:")
+        .replace("\nk:", "\nK:")
+        .replace("\nr:", "\nR:")
+        .replace("\np:", "\nP:");
+    is_read(&ros1);
+    let gazebo = ros2
+        .replace("plumb_bob", "''")
+        .replace("d:\n- 0.05\n- -0.1\n- 0.0\n- 0.0\n- 0.0\n", "d: []\n");
+    is_read(&gazebo);
+    refused(&ros2.replace("k: [500.0", "k: [0.0"), &["k[0], fx, is 0"]);
+    // The site's keys are not needed: half of the sensor, every second pixel.
+    let halved = ros2
+        .replace("binning_x: 0", "binning_x: 2")
+        .replace("binning_y: 0", "binning_y: 2");
+    is_read(&halved);
+}
+
+#[test]
+fn zero_tails_of_coefficients_are_read() {
+    let rational = [0.1, 0.2, 0.0, 0.0, 0.01, 0.3, 0.1, 0.02];
+    let with = |own: &[f64], count: usize| {
+        let mut all = own.to_vec();
+        all.resize(count, 0.0);
+        all
+    };
+    for (model, own, counts) in [
+        ("rational_polynomial", &rational[..], &[8, 12, 14][..]),
+        ("rational_polynomial", &rational[..4], &[4, 5]),
+        ("plumb_bob", &[0.1, -0.2, 0.001, 0.002], &[4, 5, 8, 12, 14]),
+        ("equidistant", &[0.1, -0.02, 0.001, 0.002], &[4, 5, 8]),
+    ] {
+        for count in counts {
+            is_read(&ros(
+                &format!("distortion_model: {model}\n"),
+                &with(own, *count),
+            ));
+        }
+    }
+    let mut prism = with(&rational, 12);
+    prism[9] = 0.01;
+    refused(
+        &ros("distortion_model: rational_polynomial\n", &prism),
+        &["c.yaml:5", "thin prism (s1 to s4)"],
+    );
+    let mut tilted = with(&rational, 14);
+    tilted[13] = 0.01;
+    refused(
+        &ros("distortion_model: rational_polynomial\n", &tilted),
+        &["tilted sensor"],
+    );
+    refused(
+        &ros("distortion_model: plumb_bob\n", &rational),
+        &["k4, k5, k6"],
+    );
+    refused(
+        &ros("distortion_model: plumb_bob\n", &[0.1, 0.2]),
+        &["has 2 numbers, plumb_bob has 5"],
+    );
+    for count in [4, 5, 8] {
+        assert_eq!(codes(&ros("", &with(&rational[..4], count))), ["assumed"]);
+    }
+}
+
+#[test]
+fn files_of_opencv_vins_tagslam_and_photonvision_are_read() {
+    let opencv = "%YAML:1.0\n---\ncalibration_time: \"Tue\"\nimage_width: 640\nimage_height: 480\nflags: 0\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 6.0e+02, 0., 3.2e+02, 0., 6.0e+02, 2.4e+02, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 1.0e-01, -2.0e-01, 0., 0., 0. ]\navg_reprojection_error: 0.4\n";
+    assert_eq!(codes(opencv), ["assumed"]);
+    assert_eq!(
+        codes(&opencv.replace("error: 0.4", "error: 3.5")),
+        ["assumed", "calibration_rms"]
+    );
+    is_read(
+        &opencv
+            .replace("flags: 0", "fisheye_model: 1")
+            .replace("1.0e-01, -2.0e-01, 0., 0., 0.", "0.1, -0.02, 0., 0."),
+    );
+    let vins = "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n   k1: -0.29\n   k2: 0.08\n   p1: 0.0001\n   p2: 0.00002\nprojection_parameters:\n   fx: 461.0\n   fy: 460.0\n   cx: 363.0\n   cy: 248.0\n";
+    is_read(vins);
+    is_read(
+        "%YAML:1.0\n\nmodel_type: KANNALA_BRANDT\ncamera_name: c\nimage_width: 800\nimage_height: 600\nprojection_parameters:\n  k2: -0.01\n  k3: 0.02\n  k4: -0.003\n  k5: 0.001\n  mu: 300.0\n  mv: 300.0\n  u0: 400.0\n  v0: 300.0\n",
+    );
+    refused(&vins.replace("PINHOLE", "MEI"), &["`MEI` is not supported"]);
+    is_read(
+        "cam0:\n  camera_model: pinhole\n  intrinsics: [700.0, 700.0, 640.0, 360.0]\n  distortion_model: plumb_bob\n  distortion_coeffs: [0.01, -0.02, 0.0, 0.0, 0.001]\n  resolution: [1280, 720]\n  tagtopic: /tags\n",
+    );
+    let photon = r#"{"resolution":{"width":1280.0,"height":800.0},"cameraIntrinsics":{"rows":3,"cols":3,"type":6,"data":[900.0,0.0,640.0,0.0,900.0,400.0,0.0,0.0,1.0]},"distCoeffs":{"rows":1,"cols":8,"type":6,"data":[0.05,-0.1,0.0,0.0,0.0,0.0,0.0,0.01]},"calobjectWarp":[],"observations":[]}"#;
+    is_read(photon);
+    refused(
+        &photon.replace("1280.0,\"h", "1280.5,\"h"),
+        &["`resolution.width` is 1280.5"],
+    );
+    refused(
+        &photon.replace("distCoeffs", "dist"),
+        &["`distCoeffs` is missing"],
+    );
+}
+
+#[test]
+fn unlikely_numbers_are_warnings_with_the_number() {
+    let moved = ros("distortion_model: plumb_bob\n", &[0.0; 5])
+        .replace("640", "1280")
+        .replace("480", "960");
+    let checked = check(&moved, "--json").json(0);
+    let warning = &checked["warnings"][0];
+    assert_eq!(warning["code"], "axis_off_centre", "{checked}");
+    let message = warning["message"].as_str().expect("a message");
+    assert!(
+        message.contains("242 px from the middle") && message.contains("25 % of the height"),
+        "{message}"
+    );
+    assert!(warning["line"].is_u64());
+    // At 14 % nothing is said.
+    is_read(&ros("distortion_model: plumb_bob\n", &[0.0; 5]).replace("322", "231"));
+    let folded = ros("distortion_model: plumb_bob\n", &[-0.5, 0.0, 0.0, 0.0, 0.0]);
+    let checked = check(&folded, "--json").json(0);
+    let warning = checked["warnings"][0].clone();
+    assert_eq!(warning["code"], "lens_folds", "{checked}");
+    let border = border_of(&warning);
+    // 1 - 1.5 r^2 = 0 at r = 0.8165, where the radius of the image is 0.8165 (1 - 0.333) 520.5 = 283 px: the corners at 400 px are beyond.
+    assert!((60.0..100.0).contains(&border), "{warning}");
+}
+
+fn border_of(warning: &Value) -> f64 {
+    let message = warning["message"].as_str().expect("a message");
+    assert!(message.contains("folds at 283."), "{message}");
+    let words: Vec<&str> = message.split_whitespace().collect();
+    let at = words
+        .iter()
+        .position(|word| *word == "border")
+        .expect("a border");
+    words[at + 2].parse().expect("pixels")
+}
