@@ -59,12 +59,29 @@ pub const CORES: [Core; 6] = [
     },
 ];
 
+/// The targets of the cores.
+pub const TARGETS: [&str; CORES.len()] = {
+    let mut targets = [""; CORES.len()];
+    let mut at = 0;
+    while at < CORES.len() {
+        targets[at] = CORES[at].target;
+        at += 1;
+    }
+    targets
+};
+
 /// The sets of parts for which there is an archive: a name, and the features.
 pub const PARTS: [(&str, &str); 3] = [
     ("boxes", ""),
     ("turning", "headings,unions"),
     ("all", "cells,headings,sight,unions"),
 ];
+
+/// The levels of optimization for which there is an archive.
+pub const LEVELS: [&str; 2] = ["3", "s"];
+/// The set of parts and the level of the archive that a user takes who does not choose.
+pub const USUAL: &str = "all-3";
+pub const FILE: &str = "libposegate_c.a";
 
 impl Core {
     /// Returns the core that a user names.
@@ -81,6 +98,17 @@ impl Core {
         let command = format!("{prefix}-{name}");
         need::command(&command, package)?;
         Ok(cmd(&command))
+    }
+
+    /// Returns the bytes of code, constants and initial values of a program.
+    pub fn flash(&self, elf: &Path) -> Result<u64> {
+        let sizes = self.tool("size")?.arg(elf).read()?;
+        let line = sizes.lines().nth(1).unwrap_or_default();
+        let mut numbers = line.split_whitespace().map(str::parse::<u64>);
+        match (numbers.next(), numbers.next()) {
+            (Some(Ok(text)), Some(Ok(data))) => Ok(text + data),
+            _ => Err(format!("no sizes in: {sizes}").into()),
+        }
     }
 }
 
@@ -106,12 +134,11 @@ pub fn words(core: &Core, features: &str, level: &str) -> Vec<String> {
 
 /// Returns what cargo builds below a target folder.
 pub fn built(core: &Core, target_folder: &Path) -> PathBuf {
-    target_folder
-        .join(core.target)
-        .join("firmware/libposegate_c.a")
+    target_folder.join(core.target).join("firmware").join(FILE)
 }
 
-/// Makes one object of an archive of cargo, without debug information, in which only the functions of the header are global.
+/// Makes one object of an archive of cargo, without debug information, in which only the functions of the header are global. It needs
+/// no other library.
 pub fn localize(core: &Core, from: &Path, to: &Path) -> Result {
     let symbols = core
         .tool("nm")?
@@ -138,6 +165,10 @@ pub fn localize(core: &Core, from: &Path, to: &Path) -> Result {
         .words("--remove-section=.llvmbc --remove-section=.llvmcmd --remove-section=.ARM.exidx* --remove-section=.rel.ARM.exidx*")
         .args([&one, &alone])
         .run()?;
+    let undefined = core.tool("nm")?.arg("-u").arg(&alone).read()?;
+    if !undefined.trim().is_empty() {
+        return Err(format!("the archive for {} needs {undefined}", core.name).into());
+    }
     files::remove(to)?;
     core.tool("ar")?.words("rcsD").args([to, &alone]).run()?;
     for part in [&one, &alone] {

@@ -334,6 +334,12 @@ const JOBS: &[Job] = &[
         jobs::package::package,
     ),
     job(
+        "packages",
+        "",
+        "the release for C as CMake, pkg-config, Zephyr, PlatformIO, Arduino and CMSIS-Pack read it; a gate by the first two",
+        jobs::packages::packages,
+    ),
+    job(
         "dist",
         "[FOLDER [BUILDS]]",
         "the files of a release: built twice with equal bytes, installed into empty roots, and run there",

@@ -1,10 +1,11 @@
 //! `dist`: the files of a release, built, installed into empty roots by the README's commands, and run there.
 
-mod archives;
+pub mod archives;
 mod build;
-mod install;
+pub mod install;
 mod sbom;
 
+use crate::archive::TARGETS;
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch, target_folder};
 use crate::need;
@@ -78,10 +79,12 @@ pub fn dist(given: &Arguments) -> Result {
 /// Installs what the job needs.
 fn tools() -> Result {
     need::targets(&[build::STATIC])?;
-    need::targets(&build::CORES)?;
+    need::targets(&TARGETS)?;
     need::qemu()?;
     for (command, package) in [
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf"),
+        ("qemu-system-riscv32", "qemu-system-misc"),
         ("make", "make"),
         ("dpkg-deb", "dpkg"),
         ("python3", "python3"),
@@ -143,7 +146,7 @@ fn compare(first: &Path, second: &Path, report: &mut Report) -> Result {
 }
 
 /// Returns the version, which all manifests must have.
-fn version() -> Result<String> {
+pub fn version() -> Result<String> {
     let of = |path: &str| -> Result<String> {
         let text = files::read(path)?;
         let line = text

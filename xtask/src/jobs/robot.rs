@@ -3,8 +3,8 @@
 use crate::archive::{self, Core};
 use crate::arguments::Arguments;
 use crate::files::{self, Scratch};
-use crate::jobs::flash;
 use crate::jobs::test::build_suite;
+use crate::jobs::{flash, own_library};
 use crate::need;
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd, program_at};
@@ -106,17 +106,6 @@ impl Board {
             .arg(elf)
             .limit(600))
     }
-
-    /// Returns the bytes of code, constants and initial values of a program.
-    fn flash(&self, elf: &Path) -> Result<u64> {
-        let sizes = self.core()?.tool("size")?.arg(elf).read()?;
-        let line = sizes.lines().nth(1).unwrap_or_default();
-        let mut numbers = line.split_whitespace().map(str::parse::<u64>);
-        match (numbers.next(), numbers.next()) {
-            (Some(Ok(text)), Some(Ok(data))) => Ok(text + data),
-            _ => Err(format!("no sizes in: {sizes}").into()),
-        }
-    }
 }
 
 /// Builds the program for each core with the archive as released, runs it, and prints what it costs. The tables of the program must be
@@ -127,6 +116,10 @@ pub fn robot(_: &Arguments) -> Result {
     for board in &BOARDS {
         of_board(board, "turning", "3", &mut report)?;
     }
+    // The largest archive, on the core of which most robots are made.
+    let core = BOARDS[0].core()?;
+    let archive = archive::build(core, features("all")?, "3")?;
+    own_library::check(core, &archive, &mut report)?;
     report.finish()
 }
 
@@ -148,7 +141,7 @@ pub fn of_board(
     let output = board.emulate(&elf)?.read()?;
     let mut figures = vec![(
         "flash over an empty loop".to_owned(),
-        board.flash(&elf)? - board.flash(&empty)?,
+        board.core()?.flash(&elf)? - board.core()?.flash(&empty)?,
     )];
     for line in output.lines() {
         let figure: Value =

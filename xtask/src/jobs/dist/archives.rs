@@ -1,6 +1,7 @@
 //! Packs what was built: archives and a package for Debian. Names, times, owners and modes are the same for everybody.
 
 use super::build::{Built, Sources};
+use crate::archive;
 use crate::files::{self, Scratch};
 use crate::shell::{Result, cmd, program_at, say};
 use std::path::{Path, PathBuf};
@@ -13,11 +14,24 @@ const FOR_ROS: [&str; 3] = [
     "integrations/ros2/permit_listener.py",
 ];
 /// What a firmware in C begins with: files of the repository, and folders that end in `/`.
-const FOR_C: [&str; 4] = [
+const FOR_C: [&str; 5] = [
     "include/posegate.h",
     "examples/c/",
     "examples/sites/dock.toml",
     "examples/tables/",
+    PACKAGES,
+];
+/// What build systems read: it lies at the top of the release, with the version instead of `@VERSION@`.
+const PACKAGES: &str = "integrations/c/";
+/// Where Arduino looks for an archive: the core, and the folder below `src` that its boards name. Boards with `softfp`, such as those
+/// with a Cortex-M7, pass floats as those without a floating-point unit do.
+const FOR_ARDUINO: [(&str, &str); 6] = [
+    ("thumbv6m-none-eabi", "cortex-m0plus"),
+    ("thumbv7m-none-eabi", "cortex-m3"),
+    ("thumbv7em-none-eabi", "cortex-m4"),
+    ("thumbv7em-none-eabihf", "cortex-m4/fpv4-sp-d16-hard"),
+    ("thumbv7em-none-eabi", "cortex-m7"),
+    ("thumbv8m.main-none-eabihf", "cortex-m33/fpv5-sp-d16-hard"),
 ];
 /// What of `examples/c/` needs the repository.
 const NOT_FOR_C: [&str; 4] = [
@@ -48,33 +62,59 @@ pub fn programs(sources: &Sources, built: &Built, folder: &Path) -> Result {
     tar(sources, &scratch, &name, folder)
 }
 
-/// Packs the header, the archives and the examples in C.
+/// Packs the header, the archives, the examples in C, and what build systems read.
 pub fn c(sources: &Sources, archives: &[(String, PathBuf)], folder: &Path) -> Result {
     say("archive for C");
     let scratch = Scratch::new()?;
     let name = format!("posegate-c-{}", sources.version);
     let top = scratch.join(&name);
+    lay_out_c(&sources.folder, &sources.version, archives, &top)?;
+    modes(&top, &[])?;
+    tar(sources, &scratch, &name, folder)
+}
+
+/// Writes the folder of the release for C, with archives that are named `TARGET/PARTS-LEVEL`.
+pub fn lay_out_c(
+    repository: &Path,
+    version: &str,
+    archives: &[(String, PathBuf)],
+    top: &Path,
+) -> Result {
     let listed = cmd("git ls-files -z --").args(FOR_C).read()?;
     let mut count = 0;
     for file in listed.split_terminator('\0') {
-        if NOT_FOR_C.iter().any(|end| file.ends_with(end)) {
-            continue;
+        let from = repository.join(file);
+        if let Some(file) = file.strip_prefix(PACKAGES) {
+            let to = top.join(file);
+            files::make_folder(to.parent().unwrap_or(top))?;
+            files::write(to, files::read(from)?.replace("@VERSION@", version))?;
+        } else if !NOT_FOR_C.iter().any(|end| file.ends_with(end)) {
+            put(&from, &top.join(file))?;
         }
-        put(&sources.folder.join(file), &top.join(file))?;
         count += 1;
     }
-    if count < 12 {
+    if count < 24 {
         return Err(format!("{count} files for C").into());
     }
-    for (core, archive) in archives {
-        put(archive, &top.join("lib").join(core).join("libposegate_c.a"))?;
+    let header = repository.join("include/posegate.h");
+    put(&header, &top.join("src/posegate.h"))?;
+    for (name, archive) in archives {
+        put(archive, &top.join("lib").join(name).join(archive::FILE))?;
+        let Some((target, set)) = name.split_once('/') else {
+            return Err(format!("no set of parts in the name {name}").into());
+        };
+        if set == archive::USUAL {
+            put(archive, &top.join("lib").join(target).join(archive::FILE))?;
+            for (_, folder) in FOR_ARDUINO.iter().filter(|(own, _)| *own == target) {
+                put(archive, &top.join("src").join(folder).join(archive::FILE))?;
+            }
+        }
     }
     for licence in LICENCES {
-        put(&sources.folder.join(licence), &top.join(licence))?;
+        put(&repository.join(licence), &top.join(licence))?;
     }
-    files::write(top.join("README.md"), include_str!("readme_c.md"))?;
-    modes(&top, &[])?;
-    tar(sources, &scratch, &name, folder)
+    let readme = include_str!("readme_c.md").replace("@VERSION@", version);
+    files::write(top.join("README.md"), readme)
 }
 
 /// Makes the package for Debian and its relatives. The programs are static, so it depends on nothing.

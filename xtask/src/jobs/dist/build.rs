@@ -1,5 +1,6 @@
 //! Builds what a release contains: the same bytes in every folder.
 
+use crate::archive;
 use crate::files;
 use crate::need;
 use crate::shell::{Cmd, Result, cmd, say};
@@ -7,14 +8,6 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// The cores for which there is an archive for C.
-pub const CORES: [&str; 4] = [
-    "thumbv6m-none-eabi",
-    "thumbv7m-none-eabi",
-    "thumbv7em-none-eabihf",
-    "thumbv8m.main-none-eabihf",
-];
 
 /// The target of the static programs.
 pub const STATIC: &str = "x86_64-unknown-linux-musl";
@@ -88,11 +81,12 @@ impl Sources {
             .env("SOURCE_DATE_EPOCH", &self.epoch))
     }
 
+    /// Returns the crates that cargo compiles by a command of these words.
     fn cargo(&self, words: &str) -> Result<BTreeSet<Crate>> {
         let lines = self
             .reproducible(Path::new("cargo"))?
-            .words("build --locked --message-format json-render-diagnostics")
             .words(words)
+            .words("--locked --message-format json-render-diagnostics")
             .read()?;
         lines
             .lines()
@@ -162,13 +156,13 @@ pub fn programs(sources: &Sources) -> Result<Built> {
         (
             "posegate",
             sources.cargo(&format!(
-                "--release --target {STATIC} -p posegate-cli --bin posegate"
+                "build --release --target {STATIC} -p posegate-cli --bin posegate"
             ))?,
         ),
         (
             "posegate-node",
             sources.cargo(&format!(
-                "--release --target {STATIC} {node} --bin posegate-node"
+                "build --release --target {STATIC} {node} --bin posegate-node"
             ))?,
         ),
     ];
@@ -183,23 +177,23 @@ pub fn programs(sources: &Sources) -> Result<Built> {
     Ok(Built { files, crates })
 }
 
-/// Builds the archive for C, for each core.
+/// Builds the archives for C: for each core, set of parts and level.
 pub fn archives(sources: &Sources) -> Result<Built> {
     say("archives for C");
     let mut all = BTreeSet::new();
     let mut files = Vec::new();
-    for core in CORES {
-        all.append(
-            &mut sources.cargo(&format!("-p posegate-c --profile firmware --target {core}"))?,
-        );
-        let archive = sources.target.join(core).join("firmware/libposegate_c.a");
-        let small = archive.with_file_name("small.a");
-        // Without what a linker in C has no use for: debug information of Rust's own libraries, and bitcode.
-        cmd("arm-none-eabi-objcopy -D --strip-debug --remove-section=.llvmbc --remove-section=.llvmcmd")
-            .arg(archive)
-            .arg(&small)
-            .run()?;
-        files.push((core.to_owned(), small));
+    for core in &archive::CORES {
+        for (parts, features) in archive::PARTS {
+            for level in archive::LEVELS {
+                let words = archive::words(core, features, level).join(" ");
+                all.append(&mut sources.cargo(&words)?);
+                let name = format!("{}/{parts}-{level}", core.target);
+                let folder = sources.target.join("localized").join(&name);
+                let localized = folder.join(archive::FILE);
+                archive::localize(core, &archive::built(core, &sources.target), &localized)?;
+                files.push((name, localized));
+            }
+        }
     }
     names_no_machine(sources, &files)?;
     Ok(Built {

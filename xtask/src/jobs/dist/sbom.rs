@@ -2,8 +2,8 @@
 //! needs. `cargo metadata` describes the packages; `cargo tree` lists which of them a file has, since the former also lists optional
 //! packages that are not used.
 
-use super::build::CORES;
 use super::build::{Crate, STATIC, Sources, WHEEL};
+use crate::archive::TARGETS;
 use crate::files;
 use crate::need;
 use crate::report::Report;
@@ -27,7 +27,7 @@ const ARTIFACTS: [(&str, &str, &str, &[&str]); 4] = [
         "posegate-python",
         &[WHEEL],
     ),
-    ("posegate-c", "Cargo.toml", "posegate-c", &CORES),
+    ("posegate-c", "Cargo.toml", "posegate-c", &TARGETS),
 ];
 /// Validates a file by the schema of CycloneDX, and prints the number of its components.
 const VALIDATE: &str = "import json, sys

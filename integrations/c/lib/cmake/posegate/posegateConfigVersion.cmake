@@ -1,0 +1,9 @@
+# Before 1.0 a minor version may change the binary interface.
+set(PACKAGE_VERSION "@VERSION@")
+string(REGEX MATCH "^[0-9]+[.][0-9]+" _posegate_minor "${PACKAGE_VERSION}")
+if("${PACKAGE_FIND_VERSION}." MATCHES "^${_posegate_minor}[.]" AND NOT PACKAGE_VERSION VERSION_LESS PACKAGE_FIND_VERSION)
+  set(PACKAGE_VERSION_COMPATIBLE TRUE)
+endif()
+if(PACKAGE_VERSION VERSION_EQUAL PACKAGE_FIND_VERSION)
+  set(PACKAGE_VERSION_EXACT TRUE)
+endif()
