@@ -21,7 +21,10 @@ pub const LINES: [(&str, &str); 35] = [
     ("contains", "contains {site} --task dock --poses {poses}"),
     ("table build", "table build {site} --task dock -o {output}"),
     ("table info", "table info {table}"),
-    ("table cost", "table cost {table} --core cortex-m4f --tracker"),
+    (
+        "table cost",
+        "table cost {table} --core cortex-m4f --tracker",
+    ),
     ("table verify", "table verify {table} {site}"),
     (
         "table export",
