@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 35] = [
+pub const LINES: [(&str, &str); 36] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
