@@ -8,6 +8,7 @@
 //! [docking_gate]: #pages-and-examples
 //! [controller]: #pages-and-examples
 //! [for-c]: #pages-and-examples
+//! [updating]: #pages-and-examples
 //! [for-ros]: #pages-and-examples
 //! [for-python]: #pages-and-examples
 //! [for-sites]: #pages-and-examples
