@@ -2,7 +2,7 @@
 //! the most expensive set so far.
 
 use posegate::report::PoseEstimate;
-use posegate::set::{Estimate, PoseSet, RadiusSquared, Trust, Uncertainty};
+use posegate::set::{Estimate, PoseSet, RadiusSquared, Uncertainty};
 
 /// Range of the estimates about a table's goal, to either side, and largest deviations: m, m, rad.
 #[derive(Clone, Copy)]
@@ -65,11 +65,29 @@ impl Search {
 
     /// Returns the set of the genes.
     fn set(&self, radius: RadiusSquared) -> Option<PoseSet> {
-        self.belief().pose_set(radius, Trust::FULL).ok()
+        // As the measured functions do, not through a report, so that they are compiled as a firmware has them.
+        match self.genes() {
+            (at, Uncertainty::Gaussian(covariance)) => {
+                PoseSet::gaussian(at, covariance, radius).ok()
+            }
+            (
+                at,
+                Uncertainty::Bounded {
+                    translation_m,
+                    yaw_rad,
+                },
+            ) => PoseSet::bounded(at, translation_m, yaw_rad).ok(),
+        }
     }
 
-    /// Returns the estimate of the genes.
+    /// Returns the estimate of the genes, as a report has it.
     pub fn belief(&self) -> PoseEstimate {
+        let (estimate, spread) = self.genes();
+        PoseEstimate::new(estimate, spread)
+    }
+
+    /// Returns the estimate and the spread of the genes.
+    fn genes(&self) -> (Estimate, Uncertainty) {
         let [x, y, yaw, a, b, c, xy, x_yaw, y_yaw, kind] = self.genes;
         let at = |gene: f64, range: f64| (2.0 * gene - 1.0) * range;
         let Bounds { range, largest } = self.bounds;
@@ -88,7 +106,7 @@ impl Search {
                 translation_m: 3.0 * dx,
                 yaw_rad: 2.0 * dyaw,
             };
-            return PoseEstimate::new(estimate, wide);
+            return (estimate, wide);
         }
         let [xy, x_yaw, y_yaw] = [xy, x_yaw, y_yaw].map(|gene| at(gene, 0.9));
         let (xy, x_yaw, y_yaw) = (xy * dx * dy, x_yaw * dx * dyaw, y_yaw * dy * dyaw);
@@ -97,7 +115,7 @@ impl Search {
             [xy, dy * dy, y_yaw],
             [x_yaw, y_yaw, dyaw * dyaw],
         ];
-        PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance))
+        (estimate, Uncertainty::Gaussian(covariance))
     }
 
     /// Returns the last set, enlarged as far as it stays inside: bisects a range of factors ten times.
