@@ -1459,7 +1459,7 @@ typedef struct posegate_instruction {
      */
     uint32_t stop;
     /**
-     * Of a look: the tag's number. `POSEGATE_NO_TAG` if there is none, or several.
+     * Of a look: the tag's number. `POSEGATE_NO_TAG` if the step has no tag, or several.
      */
     uint32_t tag;
     /**
@@ -2273,8 +2273,8 @@ posegate_status posegate_tracker_tracked(struct posegate_tracker *tracker,
 
 /**
  * Evaluates the newest fix, carried to the newest odometry, at the controller's time `now_ms`: the step of a control cycle between two
- * fixes. Without a report for now, the time advances as in `posegate_gate_tick`, so a permit ends by itself; the step's `reason` is then
- * why there is none, and `posegate_gate_inhibit` with it ends a permit at once.
+ * fixes. Without a report for now, the time advances as in `posegate_gate_tick`, so a permit ends by itself; the step's `reason` then says why
+ * the report is missing, and `posegate_gate_inhibit` with it ends a permit at once.
  *
  * Errors: those of `posegate_gate_tick`. Without an initialised tracker, the gate closes as at a report of an unknown source.
  *

@@ -262,11 +262,12 @@ impl<'a> Gate<'a> {
     }
 
     /// Latches a fault that was found elsewhere, by the interlock or by a check of the code. The first fault remains
-    /// the reported one.
+    /// the reported one; it replaces the reason why a gate has no table, which ends with a change of the table.
     #[cfg_attr(small_code, inline(never))]
     pub fn fault(&mut self, reason: Reason) {
-        if !matches!(DecodedState::of(self.state), Ok(DecodedState::Latched(_))) {
-            self.state = DecodedState::Latched(reason).word();
+        match DecodedState::of(self.state) {
+            Ok(DecodedState::Latched(first)) if self.table.err() != Some(first) => {}
+            _ => self.state = DecodedState::Latched(reason).word(),
         }
     }
 

@@ -64,7 +64,7 @@ pub struct posegate_instruction {
     pub kind: u32,
     /// If inhibited: a `posegate_stop`; else 0.
     pub stop: u32,
-    /// Of a look: the tag's number. `POSEGATE_NO_TAG` if there is none, or several.
+    /// Of a look: the tag's number. `POSEGATE_NO_TAG` if the step has no tag, or several.
     pub tag: u32,
     /// Of a look or work: the task's name, zero-terminated; else empty.
     pub task: [c_char; 36],

@@ -313,8 +313,8 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
 }
 
 /// Evaluates the newest fix, carried to the newest odometry, at the controller's time `now_ms`: the step of a control cycle between two
-/// fixes. Without a report for now, the time advances as in `posegate_gate_tick`, so a permit ends by itself; the step's `reason` is then
-/// why there is none, and `posegate_gate_inhibit` with it ends a permit at once.
+/// fixes. Without a report for now, the time advances as in `posegate_gate_tick`, so a permit ends by itself; the step's `reason` then says why
+/// the report is missing, and `posegate_gate_inhibit` with it ends a permit at once.
 ///
 /// Errors: those of `posegate_gate_tick`. Without an initialised tracker, the gate closes as at a report of an unknown source.
 ///

@@ -36,7 +36,7 @@ pub enum Command {
         after_help = "Example:\n  posegate table export dock.posegate --format c -o dock_table.h"
     )]
     Export(Export),
-    /// Tells the flash, the stack and the instructions that a gate in C takes with a table
+    /// Shows the flash, the stack and the instructions that a gate in C takes with a table
     #[command(
         after_help = "Example:\n  posegate table cost dock.posegate --tracker --core cortex-m4f"
     )]

@@ -34,6 +34,20 @@ fn a_changed_gate_is_closed_and_opens_with_its_own_task() {
     assert_eq!(healed.state(), State::Inhibited(Reason::Silent));
 }
 
+/// A gate without a table is latched for that. A fault that is found then must not be lost with the reason of the table.
+#[test]
+fn a_fault_of_a_gate_without_a_table_outlives_a_change() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let given = settings(&table, 1);
+    for bytes in [b"".as_slice(), DOCK] {
+        let mut refused = Gate::new(bytes, &given, 900).unwrap();
+        refused.fault(Reason::InterlockFault);
+        refused.fault(Reason::MemoryDamaged);
+        let changed = change(&refused, SEE_T7, &given);
+        assert_eq!(changed.state(), State::Latched(Reason::InterlockFault));
+    }
+}
+
 #[test]
 fn a_latched_fault_outlives_a_change() {
     let table = Table::parse(SEE_T7).unwrap();

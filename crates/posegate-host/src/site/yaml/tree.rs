@@ -95,7 +95,7 @@ pub(super) fn parse(document: &Document<'_>) -> Result<Node, SiteError> {
     })
 }
 
-/// Returns the text with the directive of its first line as a comment: OpenCV writes `%YAML:1.0`, which is none, and old versions no `---`
+/// Returns the text with the directive of its first line as a comment: OpenCV writes `%YAML:1.0`, which YAML does not know, and old versions write no `---`
 /// after it.
 fn without_directive(text: &str) -> Cow<'_, str> {
     let bare = text.trim_start_matches('\u{feff}');
