@@ -151,19 +151,6 @@ void print(const char *text)
     (void)semihosting(WRITE, address(block));
 }
 
-void print_number(uint32_t number)
-{
-    char digits[11];
-    size_t at = sizeof digits - 1U;
-    digits[at] = '\0';
-    do {
-        at--;
-        digits[at] = (char)('0' + (char)(number % 10U));
-        number /= 10U;
-    } while (number != 0U);
-    print(&digits[at]);
-}
-
 void stop(bool good)
 {
     for (;;) {

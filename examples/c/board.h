@@ -33,7 +33,20 @@ const char *core_name(void);
 
 /* Print text and numbers on the console of the emulator. */
 void print(const char *text);
-void print_number(uint32_t number);
+
+static inline void print_number(uint32_t number)
+{
+    char digits[11];
+    size_t at = sizeof digits - 1U;
+    digits[at] = '\0';
+    do {
+        at--;
+        digits[at] = (char)('0' + (char)(number % 10U));
+        number /= 10U;
+    } while (number != 0U);
+    print(&digits[at]);
+}
+
 /* Ends the emulation. */
 void stop(bool good);
 

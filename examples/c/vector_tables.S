@@ -1,15 +1,5 @@
-/* The additional data of vectors.c, included as in tables.S. */
-    .macro flash name, file
-    .section .rodata.\name, "a"
-    .global \name
-    .global \name\()_length
-    .balign 4
-\name\()_length:
-    .word 0f - \name
-\name:
-    .incbin "\file"
-0:
-    .endm
+/* The additional data of vectors.c. */
+    .include "examples/c/in_flash.inc"
 
     flash table_see_t7_grid, "examples/tables/see-t7-grid.posegate"
     flash table_whole_circle, "tests/data/whole-circle.posegate"

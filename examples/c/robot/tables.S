@@ -1,15 +1,5 @@
-/* The tables of the three tasks, each in its own section. */
-    .macro flash name, file
-    .section .rodata.\name, "a"
-    .global \name
-    .global \name\()_length
-    .balign 4
-\name\()_length:
-    .word 0f - \name
-\name:
-    .incbin "\file"
-0:
-    .endm
+/* The tables of the three tasks. */
+    .include "examples/c/in_flash.inc"
 
     flash table_dock, "examples/c/robot/dock.posegate"
     flash table_see_t7, "examples/c/robot/see-t7.posegate"

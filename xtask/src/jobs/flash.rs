@@ -20,13 +20,13 @@ const PARTS: [(&str, &str); 6] = [
     ("all parts", ALL_PARTS),
 ];
 /// The functions that a gate in C calls, and those that a gate with a tracker calls in addition.
-const GATE: [&str; 4] = [
+pub const GATE: [&str; 4] = [
     "posegate_gate_init",
     "posegate_gate_step",
     "posegate_gate_tick",
     "posegate_permission_is_permit",
 ];
-const TRACKER: [&str; 4] = [
+pub const TRACKER: [&str; 4] = [
     "posegate_tracker_init",
     "posegate_tracker_odometry",
     "posegate_tracker_fix",

@@ -2,6 +2,7 @@
 
 use crate::archive::{self, Core};
 use crate::arguments::Arguments;
+use crate::board::{self, Level};
 use crate::files::{self, Scratch};
 use crate::jobs::test::build_suite;
 use crate::jobs::{flash, own_library};
@@ -165,19 +166,7 @@ const FIGURES: &str = "crates/posegate-host/src/controller_cost/figures.txt";
 const COLUMNS: &str = "# What a gate in C takes, made by POSEGATE_BLESS=1 ./ci.sh costs. Flash and stack in bytes, calls in instructions of examples/c/robot.
 # core level parts flash_of_gate flash_of_tracker stack_of_init stack_of_step stack_of_tracked init odometry fix late_fix step change
 ";
-const GATE: [&str; 5] = [
-    "posegate_gate_init",
-    "posegate_gate_change_table",
-    "posegate_gate_step",
-    "posegate_gate_tick",
-    "posegate_permission_is_permit",
-];
-const TRACKER: [&str; 4] = [
-    "posegate_tracker_init",
-    "posegate_tracker_odometry",
-    "posegate_tracker_fix",
-    "posegate_gate_step_tracked",
-];
+const CHANGE: &str = "posegate_gate_change_table";
 
 /// Measures what a gate in C takes on each core, at both levels of optimization, with each set of parts, and compares it with the figures
 /// from which `posegate table cost` and the documents take theirs. A figure may differ by 2 %, as by another compiler of C.
@@ -209,6 +198,7 @@ pub fn costs(_: &Arguments) -> Result {
             wrong += 1;
         }
     }
+    bounds_hold_for_small_code(&mut report)?;
     report.at_most(
         "rows of figures that differ from what is measured",
         wrong,
@@ -216,6 +206,41 @@ pub fn costs(_: &Arguments) -> Result {
         0,
     );
     report.finish()
+}
+
+/// Searches for the dearest evaluations with small code, and compares each with the bound of its table. `posegate table cost` scales the
+/// bounds of the second evaluation, which are those of a Cortex-M4F, to other cores.
+fn bounds_hold_for_small_code(report: &mut Report) -> Result {
+    const SEARCH: &str = "count_instructions";
+    for (target, machine) in board::CORES {
+        let elf = board::build(Level::Small, target, SEARCH)?;
+        let search = board::emulate(machine, &elf, 600).words("-icount shift=6");
+        let (mut found, mut beyond, mut compared) = (0, 0, 0);
+        // The goals of the search are those of fast code: only its figures count.
+        for line in search.quiet()?.text.lines() {
+            let Ok(figure) = serde_json::from_str::<Value>(line) else {
+                continue;
+            };
+            let (name, value) = (&figure["name"], figure["value"].as_u64().unwrap_or(0));
+            let name = name.as_str().unwrap_or_default();
+            if name.contains("most expensive") && !name.contains("run,") {
+                found = value;
+            } else if name.contains("bound by the table") {
+                let is_second = name.contains("second opinion");
+                let times = if is_second && target == "thumbv6m-none-eabi" {
+                    4
+                } else {
+                    1
+                };
+                beyond += u64::from(found == 0 || found > times * value);
+                compared += 1;
+            }
+        }
+        let name = format!("bounds of a table that are too low for small code, {target}");
+        report.at_most(&name, beyond, "bounds", 0);
+        report.at_least(&format!("{name}: compared"), compared, "bounds", 10);
+    }
+    Ok(())
 }
 
 /// Returns a row of figures after its names.
@@ -249,32 +274,27 @@ fn costs_of(
             .join(" ");
     }
     let archive = archive::build(board.core()?, features(parts)?, level)?;
-    let gate = flash::of(&archive, &GATE)?;
-    let both: Vec<&str> = GATE.into_iter().chain(TRACKER).collect();
-    let tracker = flash::of(&archive, &both)? - gate;
+    let gate: Vec<&str> = flash::GATE.into_iter().chain([CHANGE]).collect();
+    let both: Vec<&str> = gate.iter().copied().chain(flash::TRACKER).collect();
+    let flash_of_gate = flash::of(&archive, &gate)?;
+    let flash_of_tracker = flash::of(&archive, &both)? - flash_of_gate;
     let folder = Scratch::new()?;
     let elf = folder.join("all.elf");
     flash::link(&archive, &both, "", &elf)?;
-    let program = Program::of(
-        &board
-            .core()?
-            .tool("objdump")?
-            .words("-d --no-show-raw-insn")
-            .arg(&elf)
-            .read()?,
-    );
+    let objdump = board.core()?.tool("objdump")?;
+    let program = Program::of(&objdump.words("-d --no-show-raw-insn").arg(&elf).read()?);
     let deepest = |names: &[&str]| -> Result<u64> {
         names
             .iter()
             .try_fold(0, |most, name| Ok(program.deepest(name)?.max(most)))
     };
-    let stacks = [
-        deepest(&GATE[..2])?,
-        deepest(&GATE[2..])?,
-        deepest(&TRACKER)?,
-    ];
-    let [init, step, tracked] = stacks;
-    Ok(format!("{gate} {tracker} {init} {step} {tracked} {calls}"))
+    let [start, cycle @ ..] = &flash::GATE;
+    let init = deepest(&[start, CHANGE])?;
+    let step = deepest(cycle)?;
+    let tracked = deepest(&flash::TRACKER)?;
+    Ok(format!(
+        "{flash_of_gate} {flash_of_tracker} {init} {step} {tracked} {calls}"
+    ))
 }
 
 /// Returns the features of a set of parts.
