@@ -35,7 +35,7 @@
 //! | `firmware` | nothing for users: the project's own Cortex-M examples |
 //!
 //! Without `std` this is the core for a motion controller: `no_std`, no heap, no float on the decision path. Without one of the features that
-//! are on by default firmware is smaller, and the gate denies more, never less (`./ci.sh flash`).
+//! are on by default firmware is smaller, and the gate denies more, never less (`./ci.sh costs`).
 //!
 //! Related packages: `posegate-host` (site files, plans, placement of tags, learning, replay), `posegate-cli` (the program
 //! `posegate`) and `posegate-c` (the C boundary, `include/posegate.h`).

@@ -1,6 +1,6 @@
 use super::*;
 use crate::report::FrameId;
-use crate::set::{Estimate, PoseSet};
+use crate::set::{CrossTerms, Estimate, Inflation, PoseSet, SplitWeight};
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
@@ -504,4 +504,52 @@ fn a_bounded_fix_is_carried_as_a_cylinder() {
         .belief
         .pose_set(RadiusSquared::from_q16(743_499).unwrap(), Trust::FULL);
     assert!(set.map(|set: PoseSet| set.grown(tracked.beside)).is_ok());
+}
+
+/// The trust in the source is applied to a fix, of either kind, when it is carried.
+#[test]
+fn a_fix_is_carried_with_the_trust_in_its_source() {
+    let covariance = [[4e-4, 1e-4, 0.0], [1e-4, 9e-4, 0.0], [0.0, 0.0, 1e-4]];
+    let bounded = Uncertainty::Bounded {
+        translation_m: 0.05,
+        yaw_rad: 0.02,
+    };
+    let carried = |trust: Trust, spread: Uncertainty| {
+        let given = TrackerSettings {
+            trust,
+            ..settings(OdometryErrors::NONE)
+        };
+        let mut tracker = Tracker::<8>::new(given).unwrap();
+        let stands = Increment::of(0.0, 0.0, 0.0, [0, 0]).unwrap();
+        tracker.odometry(stands).unwrap();
+        let mut report = fix([0.0; 3], covariance, 0);
+        report.belief.spread = Some(spread);
+        tracker.fix(&report).unwrap();
+        tracker.tracked(0).unwrap()
+    };
+    let given = Uncertainty::Gaussian(covariance);
+    let inflated = Trust {
+        inflation: Inflation::new(4.0).unwrap(),
+        ..Trust::FULL
+    };
+    let found = covariance_of(&carried(inflated, given));
+    for (row, known) in found.iter().zip(&covariance) {
+        for (entry, known) in row.iter().zip(known) {
+            assert!((entry - 4.0 * known).abs() < 1e-6, "{found:?}");
+        }
+    }
+    // Without the cross terms the set is wider than the given covariance on each axis.
+    let unknown = Trust {
+        cross_terms: CrossTerms::YawUnknown(SplitWeight::HALF),
+        ..Trust::FULL
+    };
+    let found = covariance_of(&carried(unknown, given));
+    assert!(
+        (0..3).all(|k| found[k][k] > 1.9 * covariance[k][k]),
+        "{found:?}"
+    );
+    let [plain, wide] = [Trust::FULL, inflated].map(|trust| carried(trust, bounded).beside);
+    // Twice the lengths have four times the covariance; a movement of a millisecond is in both.
+    assert!(wide.translation_um() > plain.translation_um() + 49_000);
+    assert!(wide.yaw_q24() > plain.yaw_q24() + 52_000);
 }

@@ -280,12 +280,6 @@ const JOBS: &[Job] = &[
         jobs::budgets::counts,
     ),
     job(
-        "flash",
-        "",
-        "bytes of flash of a complete gate in C, by part, core and level of optimization, and of a decision",
-        jobs::flash::flash,
-    ),
-    job(
         "parts",
         "",
         "a gate without some of its parts denies more and never less",

@@ -801,6 +801,17 @@ fn a_changed_gate_is_a_new_one_with_the_other_table() {
     // The settings are those of another task.
     assert_eq!(change(gate, DOCK, of(SEE_T7), 6005), posegate_status::Ok);
     assert!(!is_permit(step(gate, 601), 6010));
+    // A latched fault outlives every change.
+    // SAFETY: a valid pointer.
+    let status = unsafe { posegate_gate_fault(fresh, Reason::InterlockFault as u32) };
+    assert_eq!(status, posegate_status::Ok);
+    for bytes in [SEE_T7, DOCK] {
+        assert_eq!(change(fresh, bytes, of(bytes), 6005), posegate_status::Ok);
+        let (status, denied) = step(fresh, 601);
+        assert_eq!(status, posegate_status::Ok);
+        assert_eq!(denied.state.kind, posegate_state_kind::Latched as u32);
+        assert_eq!(denied.state.reason, Reason::InterlockFault as u32);
+    }
     // After an error nothing is left that could permit.
     assert_eq!(
         change(gate, DOCK, core::ptr::null(), 6015),

@@ -150,13 +150,21 @@ mod tests {
     const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
     const SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
     const GRID: &[u8] = include_bytes!("../../../examples/tables/see-t7-grid.posegate");
-    const CORES: [Core; 3] = [Core::CortexM4F, Core::CortexM0Plus, Core::Rv32Imc];
+    const U_DOCK: &[u8] = include_bytes!("../../../examples/c/robot/dock.posegate");
+    const CORNER: &[u8] = include_bytes!("../../../tests/data/corner.posegate");
+    const CORES: [Core; 3] = Core::ALL;
 
     #[test]
     fn every_core_level_and_part_has_figures() {
         for core in CORES {
             for level in [Level::Fast, Level::Small] {
-                for (bytes, parts) in [(DOCK, "boxes"), (SEE_T7, "all"), (GRID, "all")] {
+                for (bytes, parts) in [
+                    (DOCK, "boxes"),
+                    (U_DOCK, "turning"),
+                    (CORNER, "turning"),
+                    (SEE_T7, "all"),
+                    (GRID, "all"),
+                ] {
                     let table = Table::parse(bytes).unwrap();
                     let cost = cost(&table, core, level, true);
                     assert_eq!(cost.parts, parts);
@@ -176,15 +184,20 @@ mod tests {
         }
     }
 
-    /// The first screen of the README has the figures.
-    #[test]
-    fn readme_has_the_figures() {
-        let readme = include_str!("../../../README.md");
-        let kilobytes = |bytes: u64| (bytes + 500) / 1000;
-        let grouped = |number: u64| match number {
+    fn grouped(number: u64) -> String {
+        match number {
             0..1000 => number.to_string(),
             _ => format!("{},{:03}", number / 1000, number % 1000),
-        };
+        }
+    }
+
+    /// The first screen of the README and the pages have the figures.
+    #[test]
+    fn pages_have_the_figures() {
+        let readme = include_str!("../../../README.md");
+        let measured = include_str!("../../../docs/measured.md");
+        let for_c = include_str!("../../../docs/for-c.md");
+        let kilobytes = |bytes: u64| (bytes + 500) / 1000;
         for (core, name) in CORES
             .into_iter()
             .zip(["Cortex-M4F", "Cortex-M0+", "RV32IMC"])
@@ -207,6 +220,38 @@ mod tests {
                 cycle as f64 * 2.0 / 64_000.0,
             );
             assert!(readme.contains(&row), "{row}");
+            for (level, named) in [(Level::Small, "\"s\""), (Level::Fast, "3")] {
+                let [boxes, turning, all] =
+                    ["boxes", "turning", "all"].map(|parts| Figures::of(core, level, parts));
+                let row = format!(
+                    "| {name}, {named} | {} | {} | {} | {} bytes |",
+                    grouped(boxes.flash_of_gate),
+                    grouped(turning.flash_of_gate),
+                    grouped(all.flash_of_gate),
+                    grouped(boxes.flash_of_tracker),
+                );
+                assert!(measured.contains(&row), "{row}");
+            }
+        }
+        for (parts, named) in [
+            ("boxes", "none: facets of boxes"),
+            (
+                "turning",
+                "`headings,unions`: footprints, visibility sets, sets of several pieces",
+            ),
+            ("all", "all: grids and tables of sight besides"),
+        ] {
+            let both = |of: fn(&Figures) -> u64| {
+                let [small, fast] = [Level::Small, Level::Fast]
+                    .map(|level| grouped(of(&Figures::of(Core::CortexM4F, level, parts))));
+                format!("{small}; {fast} bytes")
+            };
+            let [gate, tracker] = [
+                both(|own| own.flash_of_gate),
+                both(|own| own.flash_of_tracker),
+            ];
+            let row = format!("| {named} | {gate} | {tracker} |");
+            assert!(for_c.contains(&row), "{row}");
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::arguments::Arguments;
 use crate::board::{self, CORES, Level};
 use crate::files::{Scratch, release};
-use crate::jobs::flash::smallest_and_largest;
+use crate::jobs::robot::costs_of_small_code;
 use crate::jobs::test::accuracy;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
@@ -39,7 +39,6 @@ pub fn budgets(given: &Arguments) -> Result {
 pub fn counts(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
-    let none = Arguments::new(Vec::new(), ".".into(), "counts", "")?;
     let mut report = Report::default();
     let built = board::build_all(Level::Fast, &CORES.map(|(target, _)| target), &COUNTS)?;
     for (target, machine) in CORES {
@@ -50,7 +49,7 @@ pub fn counts(_: &Arguments) -> Result {
     // The goals are those of 60 sets a row, which 600 gives.
     let sets = Arguments::new(vec!["600".into()], ".".into(), "accuracy", "[SETS]")?;
     for (name, ended) in [
-        ("flash", smallest_and_largest(&none)),
+        ("costs", costs_of_small_code()),
         ("accuracy", accuracy(&sets)),
     ] {
         if let Err(error) = ended {
