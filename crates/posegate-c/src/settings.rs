@@ -108,9 +108,8 @@ pub struct posegate_settings {
     pub maximum_age_ms: u32,
     /// The longest time from the `now_ms` of one step or tick until the output has followed the answer of the next
     /// one, in milliseconds: at least 1, and less than `maximum_age_ms`. It is the sum of the longest period of
-    /// the control cycle, the longest duration of a step and the delay of the output. A step on the table of a box takes about 5,200
-    /// instructions on a Cortex-M4F and 12,000 on a Cortex-M0+, one on another table up to the bound of `posegate table info` and, for the second
-    /// evaluation, 3,700 and 10,200 with facets, 31,300 and 79,300 with cells.
+    /// the control cycle, the longest duration of a step and the delay of the output. `posegate table cost` states the
+    /// instructions of a step, or of a cycle with a tracker, for your table and core.
     /// If a later cycle finds the gate open, the gate closes: `POSEGATE_REASON_CYCLE_LATE`.
     pub response_ms: u32,
     /// The longest time between two reports of the sources, in milliseconds: from 1 to 2^31 - 1. Settings with which reports at this

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 /// Checks a site file: everything is validated, nothing is built
 ///
 /// Ends with the warnings of `posegate doctor`: likely mistakes in tags, candidates, cameras and tasks, with the line of
-/// the file. If the site has a `[controller]`, they name each task whose table may take more cycles for a decision than
+/// the file. If the site has a `[controller]`, they name each task on whose table a step of the gate may take more cycles than
 /// the controller has. Warnings do not change the exit code.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  posegate check site.toml")]

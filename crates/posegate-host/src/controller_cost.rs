@@ -191,12 +191,13 @@ mod tests {
         }
     }
 
-    /// The first screen of the README and the pages have the figures.
+    /// The first screen of the README, the header and the pages have the figures.
     #[test]
     fn pages_have_the_figures() {
         let readme = include_str!("../../../README.md");
         let measured = include_str!("../../../docs/measured.md");
         let for_c = include_str!("../../../docs/for-c.md");
+        let header = include_str!("../../../include/posegate.h");
         let kilobytes = |bytes: u64| (bytes + 500) / 1000;
         for (core, name) in CORES
             .into_iter()
@@ -220,6 +221,14 @@ mod tests {
                 cycle as f64 * 2.0 / 64_000.0,
             );
             assert!(readme.contains(&row), "{row}");
+            let row = format!(
+                " *   {name}: flash {} (boxes, -Os) to {} (all shapes, -O3), stack {} B, {} instructions\n",
+                flash(Level::Small, "boxes"),
+                flash(Level::Fast, "turning"),
+                grouped(fast.stack_of_step.max(fast.stack_of_tracked)),
+                grouped(cycle),
+            );
+            assert!(header.contains(&row), "{row}");
             for (level, named) in [(Level::Small, "\"s\""), (Level::Fast, "3")] {
                 let [boxes, turning, all] =
                     ["boxes", "turning", "all"].map(|parts| Figures::of(core, level, parts));

@@ -1,15 +1,16 @@
-//! Checks that the controller has enough time for a decision on each task's table.
+//! Checks that the controller has enough time for a step of the gate on each task's table.
 
 use super::Warning;
 use super::warning::warn;
+use crate::controller_cost::{self, Level};
 use crate::site::{Core, Site};
 use posegate::bake::{self, BakeError, BakeInput};
 use posegate::table::Table;
 
-/// Returns a warning for each task whose table may take more cycles for a decision than the site's controller has; no
-/// warning if the site has no controller. Bakes each table, without the proof.
+/// Returns a warning for each task on whose table a step of a gate in C may take more cycles than the site's controller has, both evaluations and the
+/// checks of the gate included ([`controller_cost`]); no warning if the site has no controller. Bakes each table, without the proof.
 ///
-/// The proof may omit pieces of a table, which makes decisions cheaper: the bound here is that of the complete table.
+/// The proof may omit pieces of a table, which makes a step cheaper: the bound here is that of the complete table.
 ///
 /// # Errors
 /// The name of the first task whose table cannot be baked, and the error.
@@ -37,7 +38,8 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
         let Ok(table) = Table::parse(&bytes) else {
             continue;
         };
-        let cycles = controller.cycles(&table.worst_case());
+        let step = controller_cost::cost(&table, controller.core, Level::Fast, false).with_fix;
+        let cycles = controller.cycles(step);
         let core = match controller.core {
             Core::CortexM4F => "Cortex-M4F",
             Core::CortexM0Plus => "Cortex-M0+",
@@ -60,7 +62,7 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
                 "decision_too_long",
                 ["task", name],
                 format!(
-                    "a decision on its table may take {cycles:.0} cycles of a {core}; the controller has {} for it",
+                    "a step of the gate on its table may take {cycles:.0} cycles of a {core}; the controller has {} for it",
                     controller.cycles_per_decision
                 ),
                 &advice.join("; or "),

@@ -3,7 +3,6 @@
 use super::error::SiteError;
 use super::keys;
 use super::reader::Node;
-use posegate::table::WorstCase;
 
 /// A processor core for which the cost of a decision is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,12 +30,12 @@ impl Core {
     }
 }
 
-/// The cycles that the motion controller can spend on a decision.
+/// The cycles that the motion controller can spend on a step of the gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller {
     /// The core.
     pub core: Core,
-    /// The processor cycles of one control cycle that a decision may take.
+    /// The processor cycles of one control cycle that a step of the gate may take.
     pub cycles_per_decision: u32,
     /// The cycles of an instruction on average, wait states of the flash included: at least 1.
     /// [`Self::DEFAULT_CYCLES_PER_INSTRUCTION`] if the file does not state them.
@@ -47,17 +46,11 @@ impl Controller {
     /// The cycles of an instruction if a site file gives none.
     pub const DEFAULT_CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
-    /// Returns an upper bound on the cycles of one decision on a table, by [`Self::cycles_per_instruction`].
+    /// Returns the cycles of some instructions.
     #[must_use]
-    pub fn cycles(&self, worst: &WorstCase) -> f64 {
-        let instructions = match self.core {
-            Core::CortexM4F => worst.instructions_m4f(),
-            Core::CortexM0Plus => worst.instructions_m0_plus(),
-            // A step takes a third more than on a Cortex-M4F (`./ci.sh costs`).
-            Core::Rv32Imc => worst.instructions_m4f().saturating_mul(2),
-        };
+    pub fn cycles(&self, instructions: u64) -> f64 {
         let each = self.cycles_per_instruction;
-        f64::from(instructions) * each.unwrap_or(Self::DEFAULT_CYCLES_PER_INSTRUCTION)
+        instructions as f64 * each.unwrap_or(Self::DEFAULT_CYCLES_PER_INSTRUCTION)
     }
 }
 
