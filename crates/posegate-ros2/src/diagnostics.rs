@@ -3,7 +3,7 @@
 use crate::clock::Now;
 use crate::message::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, Time, WARN};
 use crate::peers::{Peers, delivery_words};
-use crate::permission::array;
+use crate::permission::{NAME, array};
 use crate::permit_gate::Answer;
 use crate::settings::{Delivery, NodeSettings};
 use posegate::gate::Reason;
@@ -105,6 +105,13 @@ pub fn diagnostics(
         others.filter_map(|(name, received)| Some(received?.status(name, answer.now, None))),
     );
     status.extend(more);
+    // Robots share this topic: the name of each status begins with the robot's.
+    let robot = settings.robot.trim_start_matches('/');
+    for status in &mut status {
+        if let Some(of) = status.name.strip_prefix(NAME) {
+            status.name = format!("{robot}{of}");
+        }
+    }
     array(answer.now, status)
 }
 

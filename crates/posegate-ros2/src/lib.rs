@@ -19,6 +19,7 @@ pub mod parameters;
 pub mod peers;
 pub mod permission;
 pub mod permit_gate;
+pub mod permit_watch;
 pub mod run;
 pub mod serial;
 pub mod settings;

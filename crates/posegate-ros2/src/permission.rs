@@ -2,8 +2,8 @@
 //!
 //! A `Bool` that a publisher leaves behind looks like a new one. Therefore consumers use this message, a
 //! `diagnostic_msgs/msg/DiagnosticArray` with one status. It permits only if all of its parts agree: zeroed or
-//! default messages deny. `docs/for-ros.md` has the rules that a consumer must follow;
-//! `integrations/ros2/permit_listener.py` is such a program.
+//! default messages deny. `docs/for-ros.md` has the rules that a consumer must follow; [`crate::permit_watch`] and
+//! `integrations/ros2/permit_listener.py` are consumers.
 
 use crate::clock::Now;
 use crate::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, OK, WARN};
@@ -16,7 +16,7 @@ use std::hash::{BuildHasher, Hasher};
 /// The name of the status.
 pub const NAME: &str = "posegate";
 /// The version of the message's rules.
-pub const FORMAT: &str = "1";
+pub const FORMAT: &str = "2";
 /// The message of a permit. All other messages deny.
 pub const PERMIT: &str = "permit";
 /// The message of a denial.
@@ -51,6 +51,8 @@ impl Heartbeat {
         let mut values = vec![
             KeyValue::new("format", FORMAT),
             KeyValue::new("task", settings.task()),
+            KeyValue::new("robot", &settings.robot),
+            KeyValue::new("table", settings.table()),
             KeyValue::new("site", settings.site()),
             KeyValue::new("run", &self.run),
             KeyValue::new("sequence", self.sequence),

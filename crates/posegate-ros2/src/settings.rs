@@ -39,6 +39,9 @@ pub struct Serial {
 pub struct NodeSettings {
     task: String,
     task_digest: [u8; 32],
+    table_digest: [u8; 32],
+    /// The name of the robot in the permit: the node's full name, unless a parameter states another.
+    pub robot: String,
     /// `true` if the digest of the site file was given, `false` if it was taken from the table.
     pub site_is_checked: bool,
     sources: [Source; 1],
@@ -243,6 +246,8 @@ impl NodeSettings {
         let settings = Self {
             task,
             task_digest: digest,
+            table_digest: table.digest(),
+            robot: reader.text("robot", &arguments.names.full_node())?,
             site_is_checked: site_is_checked || site.is_some(),
             sources: [source],
             frame,
@@ -340,6 +345,12 @@ impl NodeSettings {
     #[must_use]
     pub fn task(&self) -> &str {
         &self.task
+    }
+
+    /// Returns the SHA-256 of the table's bytes, in hexadecimal digits.
+    #[must_use]
+    pub fn table(&self) -> String {
+        hex(&self.table_digest)
     }
 
     /// Returns the task digest, in hexadecimal digits.

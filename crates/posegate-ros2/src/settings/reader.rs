@@ -13,7 +13,7 @@ use posegate_host::site::Site;
 use std::path::Path;
 
 /// Every parameter.
-const NAMES: [&str; 45] = [
+const NAMES: [&str; 46] = [
     "camera",
     "camera_info_reliability",
     "corner_sigma_px",
@@ -51,6 +51,7 @@ const NAMES: [&str; 45] = [
     "pose_reliability",
     "report_period_ms",
     "restart",
+    "robot",
     "site_digest",
     "stands_still",
     "task",
@@ -63,13 +64,14 @@ const NAMES: [&str; 45] = [
 
 /// The parameters of a node with a controller. All others are settings of the gate or of odometry, which such a node
 /// does not have.
-const WITH_CONTROLLER: [&str; 10] = [
+const WITH_CONTROLLER: [&str; 11] = [
     "cycle_ms",
     "frame_id",
     "heartbeat_ms",
     "link_timeout_ms",
     "pose_durability",
     "pose_reliability",
+    "robot",
     "site_digest",
     "task",
     "task_digest",
