@@ -1,6 +1,6 @@
 //! Posegate as a ROS 2 node: poses with covariance in, a fail-safe permit out.
 //!
-//! [`tags::Tags`] computes poses from detections of tags. [`permit_gate::PermitGate`] is the gate of the core behind
+//! [`poses::Poses`] converts messages with a pose, and [`tags::Tags`] computes poses from detections of tags. [`permit_gate::PermitGate`] is the gate of the core behind
 //! ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate on a controller instead. [`run::Runner`] is
 //! the node. The program `posegate-node` parses a command line ([`arguments::Command`]) and runs it.
 //! `docs/for-ros.md` describes the topics, and what a consumer of the permit must do.
@@ -20,6 +20,8 @@ pub mod peers;
 pub mod permission;
 pub mod permit_gate;
 pub mod permit_watch;
+pub mod poses;
+pub mod received;
 pub mod run;
 pub mod serial;
 pub mod settings;

@@ -54,7 +54,7 @@ fn start() -> Result<(), Box<dyn Error>> {
         let mut runner = Runner::join(environment, names, bridge, &settings)?;
         eprintln!(
             "posegate-node: {node} passes {} to the controller on {}, which decides on the task `{task}`, in domain {domain}",
-            names.pose,
+            names.of_poses(settings.poses.kind),
             serial.path.display()
         );
         runner.run(&stop)?;
@@ -65,8 +65,8 @@ fn start() -> Result<(), Box<dyn Error>> {
         eprintln!(
             "posegate-node: {node} decides on the task `{task}` by {}, in domain {domain}",
             match settings.detector {
-                None => &names.pose,
-                Some(_) => &names.detections,
+                None => names.of_poses(settings.poses.kind),
+                Some(_) => names.detections.as_str(),
             }
         );
         runner.run(&stop)?;

@@ -1,10 +1,12 @@
 //! The names of the node, its topics and its services, with remapping.
 
+use crate::poses::PoseType;
+
 /// The name of the node if no rule changes it.
 const NODE: &str = "posegate";
 
-/// The names in use, each absolute. Names are relative by default: `__ns:=/robot1` moves them all but `/diagnostics`,
-/// `/tf` and `/tf_static`, which robots share by convention.
+/// The names in use, each absolute. Names are relative by default: `__ns:=/robot1` moves them all but `/diagnostics`
+/// and `/tf`, which are absolute by convention.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
     /// The namespace, `/` or `/robot1`.
@@ -13,6 +15,8 @@ pub struct Names {
     pub node: String,
     /// Subscribed: the poses, of the type of the parameter `pose_type`.
     pub pose: String,
+    /// Subscribed instead of `pose` if poses come from transforms: `tf2_msgs/msg/TFMessage`.
+    pub tf: String,
     /// Subscribed if odometry is used: `nav_msgs/msg/Odometry`.
     pub odom: String,
     /// Subscribed if detections are used: `apriltag_msgs/msg/AprilTagDetectionArray`.
@@ -85,6 +89,7 @@ impl Names {
             namespace: first(["__ns"; 2], "/"),
             node: first(["__node", "__name"], NODE),
             pose: "amcl_pose".into(),
+            tf: "/tf".into(),
             odom: "odom".into(),
             detections: "detections".into(),
             camera_info: "camera_info".into(),
@@ -110,7 +115,8 @@ impl Names {
         };
         split.retain(|(of, from, ..)| {
             let is_ours = of.is_none_or(|of| of == NODE || of == node);
-            is_ours && !["__ns", "__node", "__name"].contains(from)
+            // Launch files move both topics of transforms at every node.
+            is_ours && !["__ns", "__node", "__name", "/tf_static"].contains(from)
         });
         let mut unused = vec![true; split.len()];
         let mut defaults = Vec::new();
@@ -144,9 +150,10 @@ impl Names {
     }
 
     /// Returns the names of all topics and services.
-    fn all(&mut self) -> [&mut String; 10] {
+    fn all(&mut self) -> [&mut String; 11] {
         [
             &mut self.pose,
+            &mut self.tf,
             &mut self.odom,
             &mut self.detections,
             &mut self.camera_info,
@@ -157,6 +164,15 @@ impl Names {
             &mut self.reset,
             &mut self.explain,
         ]
+    }
+
+    /// Returns the topic of poses of a type.
+    #[must_use]
+    pub fn of_poses(&self, kind: PoseType) -> &str {
+        match kind {
+            PoseType::Transforms => &self.tf,
+            _ => &self.pose,
+        }
     }
 
     /// Returns the name of the node with its namespace.
@@ -199,7 +215,7 @@ mod tests {
         assert_eq!(moved.full_node(), "/robot1/posegate");
         for name in moved.all() {
             assert!(
-                name.starts_with("/robot1/") || name == "/diagnostics",
+                name.starts_with("/robot1/") || ["/diagnostics", "/tf"].contains(&name.as_str()),
                 "{name}"
             );
         }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::arguments::Command;
-use crate::message::{Header, Pose as RosPose, TwistWithCovariance};
+use crate::message::{Header, Pose as RosPose, PoseWithCovarianceStamped, TwistWithCovariance};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
 const START: i128 = 1_800_000_000_000_000_000;
@@ -28,7 +28,7 @@ fn origin(number: i64) -> Origin {
     }
 }
 
-fn pose_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
+fn message_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
     let mut covariance = [0.0; 36];
     (covariance[0], covariance[7], covariance[35]) = (1e-4, 1e-4, 1e-5);
     PoseWithCovarianceStamped {
@@ -46,8 +46,17 @@ fn pose_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
     }
 }
 
+fn pose_at(ms: u32, x: f64, frame: &str) -> PoseReport {
+    let message = message_at(ms, x, frame);
+    PoseReport {
+        stamp: message.header.stamp,
+        frame: message.header.frame_id,
+        pose: Ok(estimate(&message.pose)),
+    }
+}
+
 fn odometry_at(ms: u32, x: f64) -> Odometry {
-    let pose = pose_at(ms, x, "odom");
+    let pose = message_at(ms, x, "odom");
     Odometry {
         header: pose.header,
         child_frame_id: "base_link".into(),
@@ -104,7 +113,7 @@ fn pose_without_a_time_is_not_carried() {
     for nanosec in [0, u32::MAX] {
         let mut node = opened(&settings, &gate);
         let mut message = pose_at(now, 0.0, "map");
-        message.header.stamp = Time { sec: 0, nanosec };
+        message.stamp = Time { sec: 0, nanosec };
         let answer = node.pose(at(now), &message, origin(next));
         assert!(!answer.is_open, "{nanosec}");
         // The next odometry has no fix to carry.
@@ -122,9 +131,9 @@ fn invalid_reports_close_the_gate() {
     let next = i64::from(OPENED / 100) + 1;
     let now = OPENED + 20;
     let mut no_time = pose_at(now, 0.0, "map");
-    no_time.header.stamp.nanosec = u32::MAX;
+    no_time.stamp.nanosec = u32::MAX;
     let mut lost = pose_at(now, 0.0, "map");
-    lost.header.stamp = Time::default();
+    lost.stamp = Time::default();
     for (message, number, expected) in [
         (pose_at(now, 0.3, "map"), next, Reason::OutsideTable),
         (pose_at(now, 0.07, "map"), next, Reason::NotContained),
