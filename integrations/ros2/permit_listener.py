@@ -33,7 +33,7 @@ FORMAT = "2"
 class PermitWatch:
     """The rules of the permit, without ROS. Times are integers, nanoseconds."""
 
-    def __init__(self, task, *, robot, table):
+    def __init__(self, task, robot, table):
         """`task`, `robot` and `table` are those that a permit must name. An empty robot or table is never permitted."""
         self.task = task
         self.robot = robot
@@ -123,7 +123,7 @@ class PermitWatch:
 class PermitListener:
     """Follows the permit on a node of rclpy."""
 
-    def __init__(self, node, task, *, robot, table, topic="posegate/permission"):
+    def __init__(self, node, task, robot, table, topic="posegate/permission"):
         from diagnostic_msgs.msg import DiagnosticArray
         from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 

@@ -9,6 +9,7 @@ use crate::message::{
 use crate::permission::report_values;
 use crate::permit_gate::{Answer, Origin, PermitGate};
 use crate::poses::PoseReport;
+use crate::settings::NodeSettings;
 use crate::tags::Tags;
 use posegate::gate::Reason;
 use std::time::Duration;
@@ -59,6 +60,24 @@ pub trait Decider {
 
     /// Returns the longest time to wait for a message, if it is shorter than a control cycle.
     fn patience(&self) -> Option<Duration>;
+
+    /// Returns `true` if the task is asked for by name.
+    fn takes_tasks(&self) -> bool {
+        false
+    }
+
+    /// Changes the task. The gate closes, unless it is the task that is decided on.
+    fn ask(&mut self, _: Now, _: &str) {}
+
+    /// Returns the settings of the task that is decided on; `None` if there is no task. `given` are those of the node.
+    fn chosen<'s>(&'s self, given: &'s NodeSettings) -> Option<&'s NodeSettings> {
+        Some(given)
+    }
+
+    /// Returns why there is no task to decide on.
+    fn problem(&self) -> Option<String> {
+        None
+    }
 }
 
 impl Decider for PermitGate<'_> {

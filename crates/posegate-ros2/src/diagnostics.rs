@@ -8,29 +8,32 @@ use crate::settings::NodeSettings;
 use posegate::gate::Reason;
 use posegate::report::FrameId;
 
-/// Returns the diagnostics of the node. `hint` is what keeps the gate closed besides its own reason, `refused` is the
-/// problem of the last pose, and `more` are the diagnostics of the decider.
+/// Returns the diagnostics of the node. `task` are the settings of the task that is decided on, `hint` is what keeps
+/// the gate closed besides its own reason, and `pose` has the subscription of poses with the problem of the last one;
+/// `more` are the diagnostics of other subscriptions and of the decider.
 #[must_use]
 pub fn diagnostics(
     answer: &Answer,
     settings: &NodeSettings,
+    task: Option<&NodeSettings>,
     hint: Option<&str>,
     pose: (&Received, Option<String>),
-    others: [(&str, Option<&Received>); 2],
     clock_steps: u64,
     more: Vec<DiagnosticStatus>,
 ) -> DiagnosticArray {
-    let mut status = vec![permission(answer, settings, hint, clock_steps)];
+    let mut status = vec![permission(
+        answer,
+        task.unwrap_or(settings),
+        task.is_some(),
+        hint,
+        clock_steps,
+    )];
     let input = match settings.detector {
         None => "pose",
         Some(_) => "detections",
     };
     let (pose, refused) = pose;
     status.push(pose.status(input, answer.now, refused.or_else(|| pose.stamps(settings))));
-    let others = others.into_iter();
-    status.extend(
-        others.filter_map(|(name, received)| Some(received?.status(name, answer.now, None))),
-    );
     status.extend(more);
     // Robots share this topic: the name of each status begins with the robot's.
     let robot = settings.robot.trim_start_matches('/');
@@ -56,9 +59,14 @@ pub fn wrong_frame(frame: &str, settings: &NodeSettings) -> Option<String> {
 fn permission(
     answer: &Answer,
     settings: &NodeSettings,
+    has_task: bool,
     hint: Option<&str>,
     clock_steps: u64,
 ) -> DiagnosticStatus {
+    let [task, site] = match has_task {
+        true => [settings.task().to_owned(), settings.site()],
+        false => Default::default(),
+    };
     let reason = answer.reason();
     let site_check = if settings.serial.is_some() {
         "of the table that was given; the controller does not say from which site its own is"
@@ -74,10 +82,10 @@ fn permission(
             || "permit".into(),
             |reason| format!("{}: {}", reason.name(), words(reason, hint)),
         ),
-        hardware_id: settings.task().into(),
+        hardware_id: task.clone(),
         values: vec![
-            KeyValue::new("task", settings.task()),
-            KeyValue::new("site", settings.site()),
+            KeyValue::new("task", task),
+            KeyValue::new("site", site),
             KeyValue::new("site_check", site_check),
             KeyValue::new("state", answer.state.name()),
             KeyValue::new("clock_steps", clock_steps),
@@ -85,13 +93,13 @@ fn permission(
     }
 }
 
-/// Returns the meaning of a reason and a recommended action: the hint, if there is one.
+/// Returns the hint, if there is one; else the meaning of a reason and a recommended action.
 #[must_use]
 pub fn words(reason: Reason, hint: Option<&str>) -> String {
     match hint {
         None => format!("{} {}", reason.meaning(), reason.action()),
         // The gate knows neither the topic nor its publishers, and would name the link.
-        Some(hint) => format!("{} {hint}.", reason.meaning()),
+        Some(hint) => format!("{hint}."),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::message::{
     AprilTagDetectionArray, Bool, CameraInfo, DiagnosticArray, MarkerArray, Odometry, PoseStamped,
-    PoseWithCovarianceStamped, TfMessage, TriggerRequest, TriggerResponse,
+    PoseWithCovarianceStamped, Text, TfMessage, TriggerRequest, TriggerResponse,
 };
 use crate::names::Names;
 use crate::peers::Peers;
@@ -150,6 +150,8 @@ pub struct Graph {
     pub input: Input,
     /// The odometry, if it is used.
     pub odom: Option<Subscription<Odometry>>,
+    /// The name of the task, if it is asked for.
+    pub task: Option<Subscription<Text>>,
     /// The fail-safe permit.
     pub permission: Publisher<DiagnosticArray>,
     /// The permit for display only.
@@ -168,7 +170,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins the graph.
+    /// Joins the graph. If it takes tasks, it subscribes to their names.
     ///
     /// # Errors
     /// [`GraphError`]
@@ -176,6 +178,7 @@ impl Graph {
         environment: Environment,
         names: &Names,
         settings: &NodeSettings,
+        takes_tasks: bool,
     ) -> Result<Self, GraphError> {
         let before = DdsThreads::now();
         let mut participant = DomainParticipantBuilder::new(environment.domain);
@@ -231,6 +234,14 @@ impl Graph {
             Some(_) => Some(builder.subscription(&names.odom, ODOMETRY, settings.odom_delivery)?),
             None => None,
         };
+        let latched = Delivery {
+            reliable: true,
+            transient_local: true,
+        };
+        let mut task = match takes_tasks {
+            true => Some(builder.subscription(&names.task, ["std_msgs", "String"], latched)?),
+            false => None,
+        };
         let diagnostic = ["diagnostic_msgs", "DiagnosticArray"];
         let permission =
             builder.publisher(&names.permission, diagnostic, heartbeat_qos(settings))?;
@@ -264,11 +275,15 @@ impl Graph {
         if let Some(odom) = &mut odom {
             registry.register(odom, Token(4), Interest::READABLE)?;
         }
+        if let Some(task) = &mut task {
+            registry.register(task, Token(6), Interest::READABLE)?;
+        }
         Ok(Self {
             poll,
             events,
             input,
             odom,
+            task,
             permission,
             permit,
             diagnostics,

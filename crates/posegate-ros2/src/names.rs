@@ -23,6 +23,8 @@ pub struct Names {
     pub detections: String,
     /// Subscribed if detections are used: `sensor_msgs/msg/CameraInfo`.
     pub camera_info: String,
+    /// Subscribed if the node has several tables: `std_msgs/msg/String`, the task that is asked for.
+    pub task: String,
     /// Published: `diagnostic_msgs/msg/DiagnosticArray`, the fail-safe permit.
     pub permission: String,
     /// Published: `std_msgs/msg/Bool`, for display only.
@@ -93,6 +95,7 @@ impl Names {
             odom: "odom".into(),
             detections: "detections".into(),
             camera_info: "camera_info".into(),
+            task: "posegate_task".into(),
             permission: "posegate/permission".into(),
             permit: "posegate/permit".into(),
             diagnostics: "/diagnostics".into(),
@@ -150,13 +153,14 @@ impl Names {
     }
 
     /// Returns the names of all topics and services.
-    fn all(&mut self) -> [&mut String; 11] {
+    fn all(&mut self) -> [&mut String; 12] {
         [
             &mut self.pose,
             &mut self.tf,
             &mut self.odom,
             &mut self.detections,
             &mut self.camera_info,
+            &mut self.task,
             &mut self.permission,
             &mut self.permit,
             &mut self.diagnostics,

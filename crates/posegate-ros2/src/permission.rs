@@ -40,35 +40,39 @@ impl Heartbeat {
         }
     }
 
-    /// Returns the next heartbeat, with the values of the last report.
+    /// Returns the next heartbeat, with the values of the last report. `task` are the settings of the task that is
+    /// decided on; without one the heartbeat names no table, and denies.
     pub fn next(
         &mut self,
         answer: &Answer,
         settings: &NodeSettings,
+        task: Option<&NodeSettings>,
         report: Vec<KeyValue>,
     ) -> DiagnosticArray {
         self.sequence += 1;
+        let is_open = answer.is_open && task.is_some();
+        let [name, table, site] = match task {
+            Some(task) => [task.task().to_owned(), task.table(), task.site()],
+            None => Default::default(),
+        };
         let mut values = vec![
             KeyValue::new("format", FORMAT),
-            KeyValue::new("task", settings.task()),
+            KeyValue::new("task", &name),
             KeyValue::new("robot", &settings.robot),
-            KeyValue::new("table", settings.table()),
-            KeyValue::new("site", settings.site()),
+            KeyValue::new("table", table),
+            KeyValue::new("site", site),
             KeyValue::new("run", &self.run),
             KeyValue::new("sequence", self.sequence),
-            KeyValue::new(
-                "valid_ms",
-                if answer.is_open { settings.valid_ms } else { 0 },
-            ),
+            KeyValue::new("valid_ms", if is_open { settings.valid_ms } else { 0 }),
             KeyValue::new("state", answer.state.name()),
             KeyValue::new("reason", answer.reason().map_or("", Reason::name)),
         ];
         values.extend(report);
         let status = DiagnosticStatus {
-            level: if answer.is_open { OK } else { WARN },
+            level: if is_open { OK } else { WARN },
             name: NAME.into(),
-            message: if answer.is_open { PERMIT } else { DENY }.into(),
-            hardware_id: settings.task().into(),
+            message: if is_open { PERMIT } else { DENY }.into(),
+            hardware_id: name,
             values,
         };
         array(answer.now, vec![status])

@@ -8,7 +8,9 @@ use crate::message::{AprilTagDetectionArray, CameraInfo, Odometry, PoseWithCovar
 use crate::poses::PoseReport;
 use crate::settings::NodeSettings;
 use crate::tags::{Look, Tags};
-use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
+use posegate::gate::{
+    Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict, self_test,
+};
 use posegate::pose::Pose;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
 use posegate::set::{Growth, Inflation, Uncertainty};
@@ -90,8 +92,23 @@ impl<'a> PermitGate<'a> {
         gate: &'a Settings<'a>,
         now: Now,
     ) -> Result<Self, InvalidParameter> {
+        Self::after(self_test(), table, settings, gate, now)
+    }
+
+    /// Returns a closed gate without the self-test, whose result is given: for a change of the table. A fault that
+    /// another gate has latched ([`Gate::is_sound`]) stays latched.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn after(
+        is_sound: Result<(), Reason>,
+        table: &'a [u8],
+        settings: &'a NodeSettings,
+        gate: &'a Settings<'a>,
+        now: Now,
+    ) -> Result<Self, InvalidParameter> {
         Ok(Self {
-            gate: Gate::new(table, gate, now.ms())?,
+            gate: Gate::after(is_sound, table, gate, now.ms())?,
             settings,
             poses: Order::default(),
             tags: None,

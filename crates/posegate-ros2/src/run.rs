@@ -99,7 +99,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         gate: D,
         settings: &'a NodeSettings,
     ) -> Result<Self, GraphError> {
-        let graph = Graph::join(environment, names, settings)?;
+        let graph = Graph::join(environment, names, settings, gate.takes_tasks())?;
         Ok(Self {
             pose: graph.received_poses(names, settings),
             poses: Poses::new(&settings.poses, names.of_poses(settings.poses.kind)),
@@ -127,7 +127,12 @@ impl<'a, D: Decider> Runner<'a, D> {
             "posegate-node: the threads of DDS were interrupted and have ended: joining the graph again"
         );
         let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
-        let graph = Graph::join(self.environment, self.names, self.settings)?;
+        let graph = Graph::join(
+            self.environment,
+            self.names,
+            self.settings,
+            self.gate.takes_tasks(),
+        )?;
         self.pose.peers = graph.received_poses(self.names, self.settings).peers;
         let (names, settings) = (self.names, self.settings);
         for (received, again) in [
@@ -192,12 +197,30 @@ impl<'a, D: Decider> Runner<'a, D> {
                 received.peers.note(&event);
             }
         }
+        self.take_task();
         self.take_odometry();
         self.take_camera_info();
         self.take_reports();
         let answer = self.gate.tick(Now::read());
         self.publish(&answer, Instant::now(), false);
         self.serve();
+    }
+
+    /// Takes the last name that was asked for. The denial is published before any report is evaluated for the other
+    /// task.
+    fn take_task(&mut self) {
+        let mut last = None;
+        if let Some(topic) = &self.graph.task {
+            while let Ok(Some((message, _))) = topic.take() {
+                last = Some(message.data);
+            }
+        }
+        let Some(name) = last else {
+            return;
+        };
+        self.gate.ask(Now::read(), &name);
+        let answer = self.gate.tick(Now::read());
+        self.publish(&answer, Instant::now(), true);
     }
 
     fn take_odometry(&mut self) {
@@ -285,7 +308,11 @@ impl<'a, D: Decider> Runner<'a, D> {
     /// or the hold that would open.
     fn hint(&self, answer: &Answer) -> Option<String> {
         let (pose, settings) = (&self.pose, self.settings);
-        match answer.reason()? {
+        let reason = answer.reason()?;
+        if let Some(problem) = self.gate.problem() {
+            return Some(problem);
+        }
+        match reason {
             Reason::Silent | Reason::Qualifying | Reason::Holding | Reason::SourceChanged => pose
                 .problem()
                 .or_else(|| self.refused.clone())
@@ -314,7 +341,12 @@ impl<'a, D: Decider> Runner<'a, D> {
             self.has_report = false;
             self.sent.heartbeat = Some(now);
             let report = self.gate.report();
-            let message = self.heartbeat.next(answer, self.settings, report);
+            let message = self.heartbeat.next(
+                answer,
+                self.settings,
+                self.gate.chosen(self.settings),
+                report,
+            );
             let _ = self.graph.permission.publish(message);
         }
         if has_changed
@@ -335,17 +367,23 @@ impl<'a, D: Decider> Runner<'a, D> {
             let refused = self.refused.clone();
             let refused =
                 refused.or_else(|| frame.and_then(|frame| wrong_frame(frame, self.settings)));
+            let others = [
+                ("odometry", &self.odometry),
+                ("camera info", &self.camera_info),
+            ];
+            let others = others.into_iter();
+            let others = others.filter_map(|(name, received)| {
+                Some(received.as_ref()?.status(name, answer.now, None))
+            });
+            let more = others.chain(self.gate.diagnostics(answer.now)).collect();
             let message = diagnostics(
                 answer,
                 self.settings,
+                self.gate.chosen(self.settings),
                 self.hint(answer).as_deref(),
                 (&self.pose, refused),
-                [
-                    ("odometry", self.odometry.as_ref()),
-                    ("camera info", self.camera_info.as_ref()),
-                ],
                 self.clock_steps,
-                self.gate.diagnostics(answer.now),
+                more,
             );
             let _ = self.graph.diagnostics.publish(message);
             if let Some(markers) = self.gate.markers(answer).filter(|_| self.settings.markers) {

@@ -81,6 +81,7 @@ pub fn ros2(given: &Arguments) -> Result {
     live(&jazzy, "rows").arg(&bag).json()?;
     live(&jazzy, "cyclone").json()?;
     live(&jazzy, "fleet").json()?;
+    live(&jazzy, "docks").json()?;
     live(&jazzy, "detections").json()?;
     say("a controller on a serial line");
     let firmware = board::build(Level::Fast, CORE, "interrupt_gate")?;

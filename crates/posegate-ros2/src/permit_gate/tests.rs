@@ -306,3 +306,55 @@ fn reset_closes_and_the_gate_qualifies_again() {
     assert!(!node.tick(at(3_100)).is_open);
     assert!(open_after(&mut node, 3_100));
 }
+
+/// AMCL reports every 0.6 s while the robot moves. `docs/for-ros.md` names the parameters.
+#[test]
+fn poses_of_amcl_open_with_the_documented_hold() {
+    for (more, opens) in [
+        ("", false),
+        ("-p permit_hold_ms:=700 -p maximum_age_ms:=1200", true),
+    ] {
+        let settings = settings(&format!("{STILL} {more}"));
+        let gate = settings.gate();
+        let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+        let mut opened = false;
+        for ms in (100..10_000).step_by(20) {
+            if (ms - 100) % 600 == 0 {
+                let number = i64::from(ms / 600);
+                let pose = pose_at(ms - 100, 0.0, "map");
+                let _ = node.pose(at(ms), &pose, origin(number));
+            }
+            opened |= node.tick(at(ms)).is_open;
+        }
+        assert_eq!(opened, opens, "{more}");
+    }
+}
+
+/// A pose that is refused closes with its reason, and costs no gap in the sequence.
+#[test]
+fn refused_pose_closes_with_its_reason() {
+    let settings = settings(STILL);
+    let gate = settings.gate();
+    let mut node = opened(&settings, &gate);
+    let next = i64::from(OPENED / 100) + 1;
+    let now = OPENED + 20;
+    let refused = PoseReport {
+        pose: Err(crate::poses::RefusedPose::FixedCovariance(20)),
+        ..pose_at(now, 0.0, "map")
+    };
+    let answer = node.pose(at(now), &refused, origin(next));
+    let reason = Some(Reason::CovarianceUnknown);
+    assert_eq!((answer.is_open, answer.reason()), (false, reason));
+    let mut opened = false;
+    for k in 1..=12 {
+        let ms = now + 100 * k;
+        let answer = node.pose(
+            at(ms),
+            &pose_at(ms, 0.0, "map"),
+            origin(next + i64::from(k)),
+        );
+        assert_ne!(answer.reason(), Some(Reason::SequenceGap));
+        opened |= answer.is_open;
+    }
+    assert!(opened);
+}

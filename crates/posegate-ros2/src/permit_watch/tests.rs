@@ -54,7 +54,7 @@ fn set(message: &mut DiagnosticArray, key: &str, value: &str) {
 /// A heartbeat that permits the robot 0 at the time 0, and a watch of it.
 fn good() -> (DiagnosticArray, PermitWatch) {
     let settings = settings(TABLES[0], 0);
-    let message = Heartbeat::new().next(&answer(0, true), &settings, Vec::new());
+    let message = Heartbeat::new().next(&answer(0, true), &settings, Some(&settings), Vec::new());
     (message, watch(&settings))
 }
 
@@ -89,7 +89,12 @@ fn permit_of_another_robot_is_never_obeyed() {
             let mut run = String::new();
             for ms in 0..2_300_i128 {
                 if ms % 50 == 0 {
-                    let message = heartbeat.next(&answer(ms, false), &own_settings, Vec::new());
+                    let message = heartbeat.next(
+                        &answer(ms, false),
+                        &own_settings,
+                        Some(&own_settings),
+                        Vec::new(),
+                    );
                     run = message.status[0].value("run").unwrap().to_owned();
                     if chance() >= 30 {
                         watch.heartbeat(&message, now(ms + 1), ms * MS);
@@ -99,7 +104,8 @@ fn permit_of_another_robot_is_never_obeyed() {
                     if (ms + 17 + 16 * k as i128) % 50 != 0 {
                         continue;
                     }
-                    let mut message = heartbeat.next(&answer(ms, true), settings, Vec::new());
+                    let mut message =
+                        heartbeat.next(&answer(ms, true), settings, Some(settings), Vec::new());
                     own_watch.heartbeat(&message, now(ms + 1), ms * MS);
                     if is_confused(3) {
                         set(&mut message, "run", &run);
@@ -125,7 +131,7 @@ fn two_runs_that_alternate_deny() {
     let mut watch = watch(&settings);
     let [mut one, mut two] = [Heartbeat::new(), Heartbeat::new()];
     watch.heartbeat(
-        &one.next(&answer(0, true), &settings, Vec::new()),
+        &one.next(&answer(0, true), &settings, Some(&settings), Vec::new()),
         now(0),
         0,
     );
@@ -136,7 +142,7 @@ fn two_runs_that_alternate_deny() {
         } else {
             &mut two
         };
-        let message = heartbeat.next(&answer(ms, true), &settings, Vec::new());
+        let message = heartbeat.next(&answer(ms, true), &settings, Some(&settings), Vec::new());
         watch.heartbeat(&message, now(ms), ms * MS);
         // The last change of the run is at 1950 ms.
         assert_eq!(

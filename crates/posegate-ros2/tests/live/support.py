@@ -72,9 +72,9 @@ def end_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def start(*parameters, options=(), ros=()):
-    """Starts the node on the dock of the examples."""
-    words = [NODE, str(TABLE), *options, "--ros-args"]
+def start(*parameters, options=(), ros=(), table=TABLE):
+    """Starts the node, on the dock of the examples by default."""
+    words = [NODE, str(table), *options, "--ros-args"]
     for parameter in parameters:
         words += ["-p", parameter]
     process = subprocess.Popen([*words, *ros], stderr=subprocess.DEVNULL, preexec_fn=end_with_parent)
