@@ -13,10 +13,11 @@ def generate_launch_description():
     return LaunchDescription(
         [
             DeclareLaunchArgument("table", description="table of the task, made by `posegate table build`"),
+            DeclareLaunchArgument("namespace", default_value="/", description="namespace of the robot, such as /robot1"),
             DeclareLaunchArgument("params", description="parameter file, such as posegate.yaml next to this file"),
             DeclareLaunchArgument("task_digest", description="task digest of the table (`posegate table info` prints it)"),
-            DeclareLaunchArgument("pose", default_value="/amcl_pose", description="topic of the pose with covariance"),
-            DeclareLaunchArgument("odom", default_value="/odom", description="topic of the odometry"),
+            DeclareLaunchArgument("pose", default_value="amcl_pose", description="topic of the pose with covariance"),
+            DeclareLaunchArgument("odom", default_value="odom", description="topic of the odometry"),
             ExecuteProcess(
                 cmd=[
                     "posegate-node",
@@ -26,6 +27,8 @@ def generate_launch_description():
                     "--ros-args",
                     "--params-file",
                     LaunchConfiguration("params"),
+                    "-r",
+                    ["__ns:=", LaunchConfiguration("namespace")],
                     "-r",
                     ["pose:=", LaunchConfiguration("pose")],
                     "-r",

@@ -8,9 +8,10 @@ use std::path::PathBuf;
 pub const USAGE: &str = "\
 Decide whether a robot is localized well enough for a task, as a ROS 2 node
 
-Usage: posegate-node TABLE [--task-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
+Usage: posegate-node TABLE|FOLDER [--task-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
 
   TABLE                the table of the task, made by `posegate table build`
+  FOLDER               a built site (`posegate site merge`): the task is asked for by name on the topic posegate_task
   --task-digest HEX    the task digest that the table must have (`posegate table info` prints it); also as --site-digest, its older name
   --site FILE          the site file; the table must be of its task: its tags and cameras, for the parameter use_detections
   --serial DEV         the serial line of a controller whose gate decides: poses are passed to it, and the permit is the controller's;
@@ -21,6 +22,7 @@ Usage: posegate-node TABLE [--task-digest HEX] [--site FILE] [--serial DEV [--ba
 Examples:
   posegate-node dock.posegate --ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -r pose:=/amcl_pose
   posegate-node dock.posegate --site site.toml --ros-args -p use_detections:=true -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0
+  posegate-node built --ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -r __ns:=/robot1
   posegate-node dock.posegate --serial /dev/ttyUSB0 --ros-args -r pose:=/amcl_pose
 
 The parameters, the topics and what a consumer of the permit must do: docs/for-ros.md.";
@@ -39,7 +41,7 @@ pub enum Command {
 /// The arguments of a run.
 #[derive(Debug)]
 pub struct Arguments {
-    /// The file of the table.
+    /// The file of the table, or the folder of a built site.
     pub table: PathBuf,
     /// The task digest, as given.
     pub task_digest: Option<String>,
@@ -63,7 +65,7 @@ pub enum ArgumentError {
     NoTable,
     /// More than one file is given.
     #[error(
-        "two tables are given, `{0}` and `{1}`: a node has one task; start a node for each table"
+        "two tables are given, `{0}` and `{1}`: give one, or the folder of a built site (`posegate site merge`)"
     )]
     TwoTables(String, String),
     /// The option does not exist.

@@ -7,10 +7,11 @@ use crate::diagnostics::explanation;
 use crate::link::{Link, SOURCE};
 use crate::message::{
     AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, MarkerArray, OK,
-    Odometry, PoseWithCovarianceStamped, Time,
+    Odometry, Time,
 };
 use crate::permission::{DENY, PERMIT};
-use crate::permit_gate::{Answer, Order, Origin, estimate};
+use crate::permit_gate::{Answer, Order, Origin};
+use crate::poses::PoseReport;
 use crate::serial::{Port, SerialError};
 use crate::settings::Serial;
 use posegate::gate::{Reason, State};
@@ -153,30 +154,32 @@ impl Bridge {
 }
 
 impl Decider for Bridge {
-    fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer {
+    fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
         self.listen();
         let (sequence, has_changed) = self.order.next(origin);
         if has_changed {
             // The next number is then not the one that the controller expects.
             self.gaps = self.gaps.wrapping_add(1);
         }
-        self.frame = Some(message.header.frame_id.clone());
+        self.frame = Some(message.frame.clone());
         let moment = Instant::now();
         let clock_ms = self.link.clock_ms(moment).filter(|_| self.is_heard(moment));
         // A stamp that is not on this machine's clock has no age. The age is read after the controller's clock: a
         // pause in between makes the estimate older, never younger.
         let aged = Now::read();
-        let stamp_ms = aged.stamp_ms(message.header.stamp).zip(clock_ms);
+        let stamp_ms = aged.stamp_ms(message.stamp).zip(clock_ms);
         let sequence = self.first.wrapping_add(self.gaps).wrapping_add(sequence);
         // A report that is not passed on is missing in the sequence, which closes the gate.
-        let is_passed = stamp_ms.is_some_and(|(stamp_ms, clock_ms)| {
+        let belief = message.pose.as_ref().ok().copied();
+        let known = stamp_ms.zip(belief);
+        let is_passed = known.is_some_and(|((stamp_ms, clock_ms), belief)| {
             let age_ms = aged.ms().wrapping_sub(stamp_ms);
             let report = Report {
                 source: SOURCE,
-                frame: FrameId::of(&message.header.frame_id),
+                frame: FrameId::of(&message.frame),
                 sequence,
                 stamp_ms: clock_ms.wrapping_sub(age_ms),
-                belief: estimate(&message.pose),
+                belief,
             };
             self.port.write(&encode(&report_body(&report)), moment)
         });
@@ -186,7 +189,7 @@ impl Decider for Bridge {
             if self.sent.len() == SENT {
                 self.sent.pop_front();
             }
-            self.sent.push_back((sequence, message.header.stamp));
+            self.sent.push_back((sequence, message.stamp));
         } else {
             self.dropped += 1;
         }
@@ -299,11 +302,11 @@ impl Decider for Bridge {
         }]
     }
 
-    fn explain(&self, answer: &Answer) -> String {
+    fn explain(&self, answer: &Answer, hint: Option<&str>) -> String {
         let verdict = self.outcome.and_then(|(outcome, _)| outcome.verdict.err());
         match (answer.is_open, self.problem(Instant::now())) {
             (false, Some(problem)) => format!("deny: {problem}."),
-            _ => explanation(answer, verdict),
+            _ => explanation(answer, verdict, hint),
         }
     }
 

@@ -64,11 +64,16 @@ impl Now {
         is_near.then_some(ns.div_euclid(1_000_000) as u32)
     }
 
+    /// Returns the age of a stamp, nanoseconds; negative for a stamp in the future.
+    #[must_use]
+    pub const fn age_ns(self, stamp: Time) -> i128 {
+        self.ns - (stamp.sec as i128 * 1_000_000_000 + stamp.nanosec as i128)
+    }
+
     /// Returns the age of a stamp, seconds; negative for a stamp in the future.
     #[must_use]
     pub fn age_s(self, stamp: Time) -> f64 {
-        let ns = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
-        (self.ns - ns) as f64 * 1e-9
+        self.age_ns(stamp) as f64 * 1e-9
     }
 }
 

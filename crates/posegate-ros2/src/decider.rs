@@ -5,18 +5,19 @@ use crate::diagnostics::explanation;
 use crate::markers::markers;
 use crate::message::{
     AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, MarkerArray, Odometry,
-    PoseWithCovarianceStamped,
 };
 use crate::permission::report_values;
 use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::poses::PoseReport;
+use crate::settings::NodeSettings;
 use crate::tags::Tags;
 use posegate::gate::Reason;
 use std::time::Duration;
 
 /// Decides from ROS messages.
 pub trait Decider {
-    /// Processes a pose with its covariance.
-    fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer;
+    /// Processes a pose.
+    fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer;
 
     /// Processes the detections of an image.
     fn detections(&mut self, now: Now, message: &AprilTagDetectionArray, origin: Origin) -> Answer;
@@ -51,18 +52,36 @@ pub trait Decider {
     /// Returns additional diagnostics.
     fn diagnostics(&self, now: Now) -> Vec<DiagnosticStatus>;
 
-    /// Returns the reason of the answer and a recommended action, as text.
-    fn explain(&self, answer: &Answer) -> String;
+    /// Returns the reason of the answer and a recommended action, as text. `hint` is an action that the node knows.
+    fn explain(&self, answer: &Answer, hint: Option<&str>) -> String;
 
     /// Returns the markers of the last report.
     fn markers(&self, answer: &Answer) -> Option<MarkerArray>;
 
     /// Returns the longest time to wait for a message, if it is shorter than a control cycle.
     fn patience(&self) -> Option<Duration>;
+
+    /// Returns `true` if the task is asked for by name.
+    fn takes_tasks(&self) -> bool {
+        false
+    }
+
+    /// Changes the task. The gate closes, unless it is the task that is decided on.
+    fn ask(&mut self, _: Now, _: &str) {}
+
+    /// Returns the settings of the task that is decided on; `None` if there is no task. `given` are those of the node.
+    fn chosen<'s>(&'s self, given: &'s NodeSettings) -> Option<&'s NodeSettings> {
+        Some(given)
+    }
+
+    /// Returns why there is no task to decide on.
+    fn problem(&self) -> Option<String> {
+        None
+    }
 }
 
 impl Decider for PermitGate<'_> {
-    fn pose(&mut self, now: Now, message: &PoseWithCovarianceStamped, origin: Origin) -> Answer {
+    fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
         Self::pose(self, now, message, origin)
     }
 
@@ -114,8 +133,9 @@ impl Decider for PermitGate<'_> {
         self.tags().map(Tags::status).into_iter().collect()
     }
 
-    fn explain(&self, answer: &Answer) -> String {
-        let words = explanation(answer, self.last().and_then(|last| last.step.err()));
+    fn explain(&self, answer: &Answer, hint: Option<&str>) -> String {
+        let last = self.last().and_then(|last| last.step.err());
+        let words = explanation(answer, last, hint);
         match self.tags().and_then(Tags::problem) {
             Some(problem) if !answer.is_open => format!("{words} Detections: {problem}."),
             _ => words,

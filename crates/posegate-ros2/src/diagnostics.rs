@@ -1,114 +1,72 @@
-//! The content of `/diagnostics`: the permission, and each subscription.
+//! The content of `/diagnostics`: the permission, and each subscription; reasons in words.
 
-use crate::clock::Now;
-use crate::message::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, Time, WARN};
-use crate::peers::{Peers, delivery_words};
-use crate::permission::array;
+use crate::message::{DiagnosticArray, DiagnosticStatus, KeyValue, OK, WARN};
+use crate::permission::{NAME, array};
 use crate::permit_gate::Answer;
-use crate::settings::{Delivery, NodeSettings};
+use crate::received::Received;
+use crate::settings::NodeSettings;
 use posegate::gate::Reason;
 use posegate::report::FrameId;
 
-/// The counts of a subscription.
-#[derive(Clone, Debug)]
-pub struct Received {
-    /// The name of the topic.
-    pub topic: String,
-    /// The parameters that set its quality of service, with values, as text.
-    pub parameters: &'static str,
-    /// The quality of service of the subscription.
-    pub delivery: Delivery,
-    /// The publishers of the topic.
-    pub peers: Peers,
-    /// Messages that were decoded.
-    pub messages: u64,
-    /// Messages that could not be decoded.
-    pub unreadable: u64,
-    /// The stamp of the last message.
-    pub last: Option<Time>,
-}
-
-impl Received {
-    /// Returns the counts of a new subscription.
-    #[must_use]
-    pub const fn new(
-        topic: String,
-        parameters: &'static str,
-        delivery: Delivery,
-        peers: Peers,
-    ) -> Self {
-        Self {
-            topic,
-            parameters,
-            delivery,
-            peers,
-            messages: 0,
-            unreadable: 0,
-            last: None,
-        }
-    }
-
-    fn status(&self, name: &str, now: Now, wrong_frame: Option<String>) -> DiagnosticStatus {
-        let problem = self.peers.problem(&self.topic, self.parameters);
-        let unreadable = (self.unreadable > 0).then(|| {
-            format!(
-                "{} messages of {} could not be read: another message type, or damaged on the way",
-                self.unreadable, self.topic
-            )
-        });
-        let problem = problem.or(wrong_frame).or(unreadable);
-        let age = self.last.map(|stamp| format!("{:.3}", now.age_s(stamp)));
-        DiagnosticStatus {
-            level: if problem.is_some() { ERROR } else { OK },
-            name: format!("posegate: {name}"),
-            message: problem.unwrap_or_else(|| "messages can arrive".into()),
-            hardware_id: String::new(),
-            values: vec![
-                KeyValue::new("topic", &self.topic),
-                KeyValue::new("requested", delivery_words(self.delivery)),
-                KeyValue::new("publishers", self.peers.matched()),
-                KeyValue::new("messages", self.messages),
-                KeyValue::new("unreadable", self.unreadable),
-                KeyValue::new("age_s", age.unwrap_or_default()),
-            ],
-        }
-    }
-}
-
-/// Returns the diagnostics of the node: `frame` is that of the last pose, and `more` are those of the decider.
+/// Returns the diagnostics of the node. `task` are the settings of the task that is decided on, `hint` is what keeps
+/// the gate closed besides its own reason, and `pose` has the subscription of poses with the problem of the last one;
+/// `more` are the diagnostics of other subscriptions and of the decider.
 #[must_use]
 pub fn diagnostics(
     answer: &Answer,
     settings: &NodeSettings,
-    frame: Option<&str>,
-    pose: &Received,
-    others: [(&str, Option<&Received>); 2],
+    task: Option<&NodeSettings>,
+    hint: Option<&str>,
+    pose: (&Received, Option<String>),
     clock_steps: u64,
     more: Vec<DiagnosticStatus>,
 ) -> DiagnosticArray {
-    let mut status = vec![permission(answer, settings, clock_steps)];
-    let wrong_frame = frame.and_then(|frame| {
-        (FrameId::of(frame) != FrameId::of(&settings.frame)).then(|| {
-            format!(
-                "poses are in the frame `{frame}`, expected `{}`: set frame_id only if that is the world frame of the site",
-                settings.frame
-            )
-        })
-    });
+    let mut status = vec![permission(
+        answer,
+        task.unwrap_or(settings),
+        task.is_some(),
+        hint,
+        clock_steps,
+    )];
     let input = match settings.detector {
         None => "pose",
         Some(_) => "detections",
     };
-    status.push(pose.status(input, answer.now, wrong_frame));
-    let others = others.into_iter();
-    status.extend(
-        others.filter_map(|(name, received)| Some(received?.status(name, answer.now, None))),
-    );
+    let (pose, refused) = pose;
+    status.push(pose.status(input, answer.now, refused.or_else(|| pose.stamps(settings))));
     status.extend(more);
+    // Robots share this topic: the name of each status begins with the robot's.
+    let robot = settings.robot.trim_start_matches('/');
+    for status in &mut status {
+        if let Some(of) = status.name.strip_prefix(NAME) {
+            status.name = format!("{robot}{of}");
+        }
+    }
     array(answer.now, status)
 }
 
-fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> DiagnosticStatus {
+/// Returns the problem of poses in a frame that is not the site's.
+#[must_use]
+pub fn wrong_frame(frame: &str, settings: &NodeSettings) -> Option<String> {
+    (FrameId::of(frame) != FrameId::of(&settings.frame)).then(|| {
+        format!(
+            "poses are in the frame `{frame}`, expected `{}`: set frame_id only if that is the world frame of the site",
+            settings.frame
+        )
+    })
+}
+
+fn permission(
+    answer: &Answer,
+    settings: &NodeSettings,
+    has_task: bool,
+    hint: Option<&str>,
+    clock_steps: u64,
+) -> DiagnosticStatus {
+    let [task, site] = match has_task {
+        true => [settings.task().to_owned(), settings.site()],
+        false => Default::default(),
+    };
     let reason = answer.reason();
     let site_check = if settings.serial.is_some() {
         "of the table that was given; the controller does not say from which site its own is"
@@ -122,12 +80,12 @@ fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> Dia
         name: "posegate: permission".into(),
         message: reason.map_or_else(
             || "permit".into(),
-            |reason| format!("{}: {}", reason.name(), words(reason)),
+            |reason| format!("{}: {}", reason.name(), words(reason, hint)),
         ),
-        hardware_id: settings.task().into(),
+        hardware_id: task.clone(),
         values: vec![
-            KeyValue::new("task", settings.task()),
-            KeyValue::new("site", settings.site()),
+            KeyValue::new("task", task),
+            KeyValue::new("site", site),
             KeyValue::new("site_check", site_check),
             KeyValue::new("state", answer.state.name()),
             KeyValue::new("clock_steps", clock_steps),
@@ -135,24 +93,32 @@ fn permission(answer: &Answer, settings: &NodeSettings, clock_steps: u64) -> Dia
     }
 }
 
-/// Returns the meaning of a reason and a recommended action.
+/// Returns the hint, if there is one; else the meaning of a reason and a recommended action.
 #[must_use]
-pub fn words(reason: Reason) -> String {
-    format!("{} {}", reason.meaning(), reason.action())
+pub fn words(reason: Reason, hint: Option<&str>) -> String {
+    match hint {
+        None => format!("{} {}", reason.meaning(), reason.action()),
+        // The gate knows neither the topic nor its publishers, and would name the link.
+        Some(hint) => format!("{hint}."),
+    }
 }
 
 /// Returns the answer of the service `explain`: the state of the gate, the reason of the last denial, and a
 /// recommended action.
 #[must_use]
-pub fn explanation(answer: &Answer, last: Option<Reason>) -> String {
+pub fn explanation(answer: &Answer, last: Option<Reason>, hint: Option<&str>) -> String {
     let now = match answer.reason() {
         None => "permit".to_owned(),
-        Some(reason) => format!("deny, {}: {}", reason.name(), words(reason)),
+        Some(reason) => format!("deny, {}: {}", reason.name(), words(reason, hint)),
     };
     // While permits are counted, the last report has the reason why a permit does not count.
     match last {
         Some(reason) if Some(reason) != answer.reason() => {
-            format!("{now} Last report: {}: {}", reason.name(), words(reason))
+            format!(
+                "{now} Last report: {}: {}",
+                reason.name(),
+                words(reason, None)
+            )
         }
         _ => now,
     }

@@ -1,12 +1,13 @@
 //! The node in the ROS graph: its subscriptions, publishers and services on DDS.
 
-use crate::diagnostics::Received;
 use crate::message::{
-    AprilTagDetectionArray, Bool, CameraInfo, DiagnosticArray, MarkerArray, Odometry,
-    PoseWithCovarianceStamped, TriggerRequest, TriggerResponse,
+    AprilTagDetectionArray, Bool, CameraInfo, DiagnosticArray, MarkerArray, Odometry, PoseStamped,
+    PoseWithCovarianceStamped, Text, TfMessage, TriggerRequest, TriggerResponse,
 };
 use crate::names::Names;
 use crate::peers::Peers;
+use crate::poses::PoseType;
+use crate::received::Received;
 use crate::settings::{Delivery, NodeSettings};
 use ros2_client::error::CreateError;
 use ros2_client::qos::{Durability, History, Liveliness, WhenFull};
@@ -110,8 +111,14 @@ impl Environment {
 
 /// The source of poses.
 pub enum Input {
-    /// A topic of poses.
+    /// Poses with covariance.
     Poses(Subscription<PoseWithCovarianceStamped>),
+    /// Poses of odometry's type.
+    Odometry(Subscription<Odometry>),
+    /// Poses without covariance.
+    Plain(Subscription<PoseStamped>),
+    /// Transforms.
+    Transforms(Subscription<TfMessage>),
     /// Detections, and the camera info.
     Detections(
         Subscription<AprilTagDetectionArray>,
@@ -119,9 +126,19 @@ pub enum Input {
     ),
 }
 
-const POSE: [&str; 2] = ["geometry_msgs", "PoseWithCovarianceStamped"];
+const ODOMETRY: [&str; 2] = ["nav_msgs", "Odometry"];
 const DETECTIONS: [&str; 2] = ["apriltag_msgs", "AprilTagDetectionArray"];
 const CAMERA_INFO: [&str; 2] = ["sensor_msgs", "CameraInfo"];
+
+/// Returns the package and the name of a type of poses.
+const fn type_of(kind: PoseType) -> [&'static str; 2] {
+    match kind {
+        PoseType::WithCovariance => ["geometry_msgs", "PoseWithCovarianceStamped"],
+        PoseType::Odometry => ODOMETRY,
+        PoseType::Pose => ["geometry_msgs", "PoseStamped"],
+        PoseType::Transforms => ["tf2_msgs", "TFMessage"],
+    }
+}
 
 /// The node in the graph.
 pub struct Graph {
@@ -133,6 +150,8 @@ pub struct Graph {
     pub input: Input,
     /// The odometry, if it is used.
     pub odom: Option<Subscription<Odometry>>,
+    /// The name of the task, if it is asked for.
+    pub task: Option<Subscription<Text>>,
     /// The fail-safe permit.
     pub permission: Publisher<DiagnosticArray>,
     /// The permit for display only.
@@ -151,7 +170,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins the graph.
+    /// Joins the graph. If it takes tasks, it subscribes to their names.
     ///
     /// # Errors
     /// [`GraphError`]
@@ -159,6 +178,7 @@ impl Graph {
         environment: Environment,
         names: &Names,
         settings: &NodeSettings,
+        takes_tasks: bool,
     ) -> Result<Self, GraphError> {
         let before = DdsThreads::now();
         let mut participant = DomainParticipantBuilder::new(environment.domain);
@@ -181,7 +201,21 @@ impl Graph {
         };
         let mut input = match settings.detector {
             None => {
-                Input::Poses(builder.subscription(&names.pose, POSE, settings.pose_delivery)?)
+                let kind = settings.poses.kind;
+                let (name, delivery) = (names.of_poses(kind), settings.pose_delivery);
+                let of = type_of(kind);
+                match kind {
+                    PoseType::WithCovariance => {
+                        Input::Poses(builder.subscription(name, of, delivery)?)
+                    }
+                    PoseType::Odometry => {
+                        Input::Odometry(builder.subscription(name, of, delivery)?)
+                    }
+                    PoseType::Pose => Input::Plain(builder.subscription(name, of, delivery)?),
+                    PoseType::Transforms => {
+                        Input::Transforms(builder.subscription(name, of, delivery)?)
+                    }
+                }
             }
             Some(_) => Input::Detections(
                 builder.subscription(
@@ -197,12 +231,16 @@ impl Graph {
             ),
         };
         let mut odom = match settings.tracker {
-            Some(_) => Some(builder.subscription(
-                &names.odom,
-                ["nav_msgs", "Odometry"],
-                settings.odom_delivery,
-            )?),
+            Some(_) => Some(builder.subscription(&names.odom, ODOMETRY, settings.odom_delivery)?),
             None => None,
+        };
+        let latched = Delivery {
+            reliable: true,
+            transient_local: true,
+        };
+        let mut task = match takes_tasks {
+            true => Some(builder.subscription(&names.task, ["std_msgs", "String"], latched)?),
+            false => None,
         };
         let diagnostic = ["diagnostic_msgs", "DiagnosticArray"];
         let permission =
@@ -223,6 +261,9 @@ impl Graph {
         let registry = poll.registry();
         match &mut input {
             Input::Poses(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
+            Input::Odometry(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
+            Input::Plain(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
+            Input::Transforms(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
             Input::Detections(detections, camera_info) => {
                 registry.register(detections, Token(0), Interest::READABLE)?;
                 registry.register(camera_info.as_mut(), Token(5), Interest::READABLE)?;
@@ -234,11 +275,15 @@ impl Graph {
         if let Some(odom) = &mut odom {
             registry.register(odom, Token(4), Interest::READABLE)?;
         }
+        if let Some(task) = &mut task {
+            registry.register(task, Token(6), Interest::READABLE)?;
+        }
         Ok(Self {
             poll,
             events,
             input,
             odom,
+            task,
             permission,
             permit,
             diagnostics,
@@ -262,8 +307,11 @@ impl Graph {
     /// Returns the counts of a new subscription to poses or detections.
     #[must_use]
     pub fn received_poses(&self, names: &Names, settings: &NodeSettings) -> Received {
-        let pose = match &self.input {
-            Input::Poses(pose) => pose,
+        let guid = match &self.input {
+            Input::Poses(pose) => pose.guid(),
+            Input::Odometry(pose) => pose.guid(),
+            Input::Plain(pose) => pose.guid(),
+            Input::Transforms(pose) => pose.guid(),
             Input::Detections(detections, _) => {
                 return Received::new(
                     names.detections.clone(),
@@ -273,14 +321,15 @@ impl Graph {
                 );
             }
         };
-        let peers = Peers::new(&names.pose, POSE, pose.guid());
+        let kind = settings.poses.kind;
+        let topic = names.of_poses(kind);
+        let peers = Peers::new(topic, type_of(kind), guid);
+        let peers = match kind {
+            PoseType::Transforms => peers.shared(),
+            _ => peers,
+        };
         let parameters = "pose_reliability to best_effort, or pose_durability to volatile";
-        Received::new(
-            names.pose.clone(),
-            parameters,
-            settings.pose_delivery,
-            peers,
-        )
+        Received::new(topic.into(), parameters, settings.pose_delivery, peers)
     }
 
     /// Returns the counts of a new subscription to the camera info; `None` if it is not used.
@@ -301,7 +350,7 @@ impl Graph {
     #[must_use]
     pub fn received_odometry(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
         let guid = self.odom.as_ref()?.guid();
-        let peers = Peers::new(&names.odom, ["nav_msgs", "Odometry"], guid);
+        let peers = Peers::new(&names.odom, ODOMETRY, guid);
         let parameters = "odom_reliability to best_effort, or odom_durability to volatile";
         Some(Received::new(
             names.odom.clone(),

@@ -15,6 +15,23 @@ pub struct Time {
     pub nanosec: u32,
 }
 
+impl Time {
+    /// Returns nanoseconds since 1970.
+    #[must_use]
+    pub const fn ns(self) -> i64 {
+        self.sec as i64 * 1_000_000_000 + self.nanosec as i64
+    }
+
+    /// Returns the time of nanoseconds since 1970 that [`Time::ns`] returned.
+    #[must_use]
+    pub const fn from_ns(ns: i64) -> Self {
+        Self {
+            sec: ns.div_euclid(1_000_000_000) as i32,
+            nanosec: ns.rem_euclid(1_000_000_000) as u32,
+        }
+    }
+}
+
 /// `std_msgs/msg/Header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
@@ -50,6 +67,42 @@ pub struct PoseWithCovarianceStamped {
     pub header: Header,
     /// The pose and its covariance in that frame.
     pub pose: PoseWithCovariance,
+}
+
+/// `geometry_msgs/msg/PoseStamped`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseStamped {
+    /// Time and frame.
+    pub header: Header,
+    /// The pose in that frame.
+    pub pose: Pose,
+}
+
+/// `geometry_msgs/msg/TransformStamped`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TransformStamped {
+    /// Time, and the frame of the pose.
+    pub header: Header,
+    /// The frame whose pose it is.
+    pub child_frame_id: String,
+    /// x, y, z, metres.
+    pub translation: [f64; 3],
+    /// x, y, z, w.
+    pub rotation: [f64; 4],
+}
+
+/// `tf2_msgs/msg/TFMessage`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TfMessage {
+    /// The transforms.
+    pub transforms: Vec<TransformStamped>,
+}
+
+/// `std_msgs/msg/String`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Text {
+    /// The text.
+    pub data: String,
 }
 
 /// `geometry_msgs/msg/TwistWithCovariance`.

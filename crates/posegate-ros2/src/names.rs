@@ -1,20 +1,30 @@
 //! The names of the node, its topics and its services, with remapping.
 
-/// The names in use, each absolute.
+use crate::poses::PoseType;
+
+/// The name of the node if no rule changes it.
+const NODE: &str = "posegate";
+
+/// The names in use, each absolute. Names are relative by default: `__ns:=/robot1` moves them all but `/diagnostics`
+/// and `/tf`, which are absolute by convention.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
     /// The namespace, `/` or `/robot1`.
     pub namespace: String,
     /// The name of the node without its namespace.
     pub node: String,
-    /// Subscribed: `geometry_msgs/msg/PoseWithCovarianceStamped`.
+    /// Subscribed: the poses, of the type of the parameter `pose_type`.
     pub pose: String,
+    /// Subscribed instead of `pose` if poses come from transforms: `tf2_msgs/msg/TFMessage`.
+    pub tf: String,
     /// Subscribed if odometry is used: `nav_msgs/msg/Odometry`.
     pub odom: String,
     /// Subscribed if detections are used: `apriltag_msgs/msg/AprilTagDetectionArray`.
     pub detections: String,
     /// Subscribed if detections are used: `sensor_msgs/msg/CameraInfo`.
     pub camera_info: String,
+    /// Subscribed if the node has several tables: `std_msgs/msg/String`, the task that is asked for.
+    pub task: String,
     /// Published: `diagnostic_msgs/msg/DiagnosticArray`, the fail-safe permit.
     pub permission: String,
     /// Published: `std_msgs/msg/Bool`, for display only.
@@ -37,9 +47,14 @@ pub enum NameError {
     NotARule(String),
     /// The rule is for a name that the node does not have.
     #[error(
-        "the remapping `{0}` changes no name of this node: expected one of pose, odom, detections, camera_info, /posegate/permission, /posegate/permit, /diagnostics, /posegate/markers, /posegate/reset, /posegate/explain, __node, __ns"
+        "the remapping `{rule}` changes no name of this node: expected pose, __node, __ns or one of its names, which are {names}"
     )]
-    NoSuchName(String),
+    NoSuchName {
+        /// The rule.
+        rule: String,
+        /// The names of the node in its namespace, before remapping.
+        names: String,
+    },
     /// The text is not a ROS name.
     #[error(
         "`{0}` is not a name of ROS: expected letters, digits and underscores between single slashes, and no digit after a slash"
@@ -48,96 +63,120 @@ pub enum NameError {
 }
 
 impl Names {
-    /// Returns the default names, changed by rules `FROM:=TO`.
+    /// Returns the default names, changed by rules `FROM:=TO` as ROS applies them: `FROM` and `TO` without a leading
+    /// slash are in the namespace, and the first rule that matches a name counts. `NODE:FROM:=TO` is for the node of
+    /// that name alone.
     ///
     /// # Errors
     /// [`NameError`]. A rule that changes nothing is refused, because it is most likely misspelt.
     pub fn new(rules: &[String]) -> Result<Self, NameError> {
-        let mut names = Self {
-            namespace: "/".into(),
-            node: "posegate".into(),
-            pose: "/amcl_pose".into(),
-            odom: "odom".into(),
-            detections: "detections".into(),
-            camera_info: "camera_info".into(),
-            permission: "/posegate/permission".into(),
-            permit: "/posegate/permit".into(),
-            diagnostics: "/diagnostics".into(),
-            markers: "/posegate/markers".into(),
-            reset: "/posegate/reset".into(),
-            explain: "/posegate/explain".into(),
-        };
         let mut split = Vec::new();
         for rule in rules {
             let (from, to) = rule
                 .split_once(":=")
                 .ok_or_else(|| NameError::NotARule(rule.clone()))?;
-            // `node:name:=other` is for one node of a process, and this process has one.
-            let from = from.rsplit(':').next().unwrap_or(from);
-            match from {
-                "__ns" => names.namespace = to.to_owned(),
-                "__node" | "__name" => names.node = to.to_owned(),
-                _ => split.push((from, to, rule)),
+            let (node, from) = from
+                .rsplit_once(':')
+                .map_or((None, from), |(node, from)| (Some(node), from));
+            split.push((node, from, to, rule));
+        }
+        let first = |names: [&str; 2], default: &str| {
+            let is_first = |(node, from, ..): &&(Option<&str>, &str, &str, &String)| {
+                node.is_none_or(|node| node == NODE) && names.contains(from)
+            };
+            let rule = split.iter().find(is_first);
+            rule.map_or(default.to_owned(), |(.., to, _)| (*to).to_owned())
+        };
+        let mut names = Self {
+            namespace: first(["__ns"; 2], "/"),
+            node: first(["__node", "__name"], NODE),
+            pose: "amcl_pose".into(),
+            tf: "/tf".into(),
+            odom: "odom".into(),
+            detections: "detections".into(),
+            camera_info: "camera_info".into(),
+            task: "posegate_task".into(),
+            permission: "posegate/permission".into(),
+            permit: "posegate/permit".into(),
+            diagnostics: "/diagnostics".into(),
+            markers: "posegate/markers".into(),
+            reset: "posegate/reset".into(),
+            explain: "posegate/explain".into(),
+        };
+        if !(names.namespace == "/" || is_path(&names.namespace)) {
+            return Err(NameError::Invalid(names.namespace));
+        }
+        if !is_token(&names.node) {
+            return Err(NameError::Invalid(names.node));
+        }
+        let (full_node, node) = (names.full_node(), names.node.clone());
+        let base = names.namespace.trim_end_matches('/').to_owned();
+        let absolute = |name: &str| match name.strip_prefix("~/") {
+            Some(rest) => format!("{full_node}/{rest}"),
+            None if name.starts_with('/') => name.to_owned(),
+            None => format!("{base}/{name}"),
+        };
+        split.retain(|(of, from, ..)| {
+            let is_ours = of.is_none_or(|of| of == NODE || of == node);
+            // Launch files move both topics of transforms at every node.
+            is_ours && !["__ns", "__node", "__name", "/tf_static"].contains(from)
+        });
+        let mut unused = vec![true; split.len()];
+        let mut defaults = Vec::new();
+        for name in names.all() {
+            let default = absolute(name);
+            let short = match default.rsplit_once('/') {
+                Some((_, "amcl_pose")) => absolute("pose"),
+                Some((_, short)) => absolute(short),
+                None => default.clone(),
+            };
+            let mut found = None;
+            for ((_, from, to, _), unused) in split.iter().zip(&mut unused) {
+                if [&default, &short].contains(&&absolute(from)) {
+                    *unused = false;
+                    found = found.or(Some(*to));
+                }
             }
+            *name = found.map_or(default.clone(), absolute);
+            if !is_path(name) {
+                return Err(NameError::Invalid(name.clone()));
+            }
+            defaults.push(default);
         }
-        for (from, to, rule) in split {
-            *names
-                .topic(from)
-                .ok_or_else(|| NameError::NoSuchName(rule.clone()))? = to.to_owned();
+        match split.iter().zip(unused).find(|(_, unused)| *unused) {
+            None => Ok(names),
+            Some(((.., rule), _)) => Err(NameError::NoSuchName {
+                rule: (*rule).clone(),
+                names: defaults.join(", "),
+            }),
         }
-        names.check()
     }
 
-    /// Returns the name that a rule changes: by its short name or its default.
-    fn topic(&mut self, from: &str) -> Option<&mut String> {
-        Some(match from {
-            "pose" | "amcl_pose" | "/amcl_pose" => &mut self.pose,
-            "odom" | "/odom" => &mut self.odom,
-            "detections" | "/detections" => &mut self.detections,
-            "camera_info" | "/camera_info" => &mut self.camera_info,
-            "permission" | "/posegate/permission" => &mut self.permission,
-            "permit" | "/posegate/permit" => &mut self.permit,
-            "diagnostics" | "/diagnostics" => &mut self.diagnostics,
-            "markers" | "/posegate/markers" => &mut self.markers,
-            "reset" | "/posegate/reset" => &mut self.reset,
-            "explain" | "/posegate/explain" => &mut self.explain,
-            _ => return None,
-        })
-    }
-
-    /// Makes every name absolute and checks it.
-    fn check(mut self) -> Result<Self, NameError> {
-        if !self.namespace.starts_with('/') || !(self.namespace == "/" || is_path(&self.namespace))
-        {
-            return Err(NameError::Invalid(self.namespace));
-        }
-        if !is_token(&self.node) {
-            return Err(NameError::Invalid(self.node));
-        }
-        let base = self.namespace.trim_end_matches('/').to_owned();
-        let private = format!("{base}/{}", self.node);
-        for name in [
+    /// Returns the names of all topics and services.
+    fn all(&mut self) -> [&mut String; 12] {
+        [
             &mut self.pose,
+            &mut self.tf,
             &mut self.odom,
             &mut self.detections,
             &mut self.camera_info,
+            &mut self.task,
             &mut self.permission,
             &mut self.permit,
             &mut self.diagnostics,
             &mut self.markers,
             &mut self.reset,
             &mut self.explain,
-        ] {
-            if let Some(rest) = name.strip_prefix("~/") {
-                *name = format!("{private}/{rest}");
-            } else if !name.starts_with('/') {
-                *name = format!("{base}/{name}");
-            }
-            if !is_path(name) {
-                return Err(NameError::Invalid(name.clone()));
-            }
+        ]
+    }
+
+    /// Returns the topic of poses of a type.
+    #[must_use]
+    pub fn of_poses(&self, kind: PoseType) -> &str {
+        match kind {
+            PoseType::Transforms => &self.tf,
+            _ => &self.pose,
         }
-        Ok(self)
     }
 
     /// Returns the name of the node with its namespace.
@@ -169,40 +208,66 @@ mod tests {
     }
 
     #[test]
-    fn names_are_remapped_and_made_absolute() {
+    fn names_are_relative_to_the_namespace() {
         let plain = names(&[]).unwrap();
         assert_eq!(
             (plain.pose.as_str(), plain.odom.as_str()),
             ("/amcl_pose", "/odom")
         );
-        assert_eq!(
-            (plain.detections.as_str(), plain.camera_info.as_str()),
-            ("/detections", "/camera_info")
-        );
+        assert_eq!(plain.permission, "/posegate/permission");
+        let mut moved = names(&["__ns:=/robot1"]).unwrap();
+        assert_eq!(moved.full_node(), "/robot1/posegate");
+        for name in moved.all() {
+            assert!(
+                name.starts_with("/robot1/") || ["/diagnostics", "/tf"].contains(&name.as_str()),
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn rules_match_with_and_without_a_leading_slash() {
         let given = names(&[
             "pose:=filter/pose",
             "__ns:=/robot1",
             "__node:=dock_gate",
-            "/posegate/permission:=~/permission",
-            "camera_info:=/front/camera_info",
+            "posegate/permission:=~/permission",
+            "/robot1/camera_info:=/front/camera_info",
+            "other:odom:=/wrong",
+            "posegate:odom:=wheels",
+            "dock_gate:permit:=/shown",
+            "odom:=/later",
+            "/diagnostics:=diagnostics",
         ]);
         let given = given.unwrap();
         assert_eq!(given.pose, "/robot1/filter/pose");
-        assert_eq!(given.odom, "/robot1/odom");
+        assert_eq!(given.odom, "/robot1/wheels");
         assert_eq!(given.detections, "/robot1/detections");
         assert_eq!(given.camera_info, "/front/camera_info");
-        assert_eq!(given.permit, "/posegate/permit");
+        assert_eq!(given.permit, "/shown");
         assert_eq!(given.permission, "/robot1/dock_gate/permission");
+        assert_eq!(given.diagnostics, "/robot1/diagnostics");
         assert_eq!(given.full_node(), "/robot1/dock_gate");
+        for from in ["pose", "amcl_pose", "/amcl_pose", "posegate:amcl_pose"] {
+            let given = names(&[&format!("{from}:=/filter/pose")]).unwrap();
+            assert_eq!(given.pose, "/filter/pose", "{from}");
+        }
     }
 
     #[test]
     fn misspelt_rules_are_refused() {
         assert!(matches!(names(&["pose=/x"]), Err(NameError::NotARule(_))));
-        assert!(matches!(
-            names(&["poses:=/x"]),
-            Err(NameError::NoSuchName(_))
-        ));
+        for rules in [
+            &["poses:=/x"][..],
+            // The name of another robot, as in ROS.
+            &["__ns:=/robot1", "/amcl_pose:=/x"],
+        ] {
+            let refused = names(rules);
+            assert!(
+                matches!(refused, Err(NameError::NoSuchName { .. })),
+                "{refused:?}"
+            );
+        }
         for bad in [
             "pose:=/a//b",
             "pose:=/1a",

@@ -12,6 +12,8 @@ pub struct Peers {
     topic: String,
     type_name: String,
     reader: Option<GUID>,
+    /// `true` for a topic that several publishers share.
+    is_shared: bool,
     matched: BTreeSet<GUID>,
     /// Publishers of the topic with another type.
     other_types: BTreeMap<GUID, String>,
@@ -28,6 +30,15 @@ impl Peers {
             type_name: format!("{package}::msg::dds_::{name}_"),
             reader: Some(reader),
             ..Self::default()
+        }
+    }
+
+    /// Allows several publishers.
+    #[must_use]
+    pub fn shared(self) -> Self {
+        Self {
+            is_shared: true,
+            ..self
         }
     }
 
@@ -94,6 +105,7 @@ impl Peers {
                 "nobody publishes {topic}: start its publisher, or remap the topic (-r); check ROS_DOMAIN_ID"
             )),
             1 => None,
+            _ if self.is_shared => None,
             many => Some(format!(
                 "{many} publishers of {topic}: the gate opens for one alone; stop the others, or remap the topic"
             )),

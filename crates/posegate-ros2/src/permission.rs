@@ -2,8 +2,8 @@
 //!
 //! A `Bool` that a publisher leaves behind looks like a new one. Therefore consumers use this message, a
 //! `diagnostic_msgs/msg/DiagnosticArray` with one status. It permits only if all of its parts agree: zeroed or
-//! default messages deny. `docs/for-ros.md` has the rules that a consumer must follow;
-//! `integrations/ros2/permit_listener.py` is such a program.
+//! default messages deny. `docs/for-ros.md` has the rules that a consumer must follow; [`crate::permit_watch`] and
+//! `integrations/ros2/permit_listener.py` are consumers.
 
 use crate::clock::Now;
 use crate::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, OK, WARN};
@@ -16,7 +16,7 @@ use std::hash::{BuildHasher, Hasher};
 /// The name of the status.
 pub const NAME: &str = "posegate";
 /// The version of the message's rules.
-pub const FORMAT: &str = "1";
+pub const FORMAT: &str = "2";
 /// The message of a permit. All other messages deny.
 pub const PERMIT: &str = "permit";
 /// The message of a denial.
@@ -40,33 +40,39 @@ impl Heartbeat {
         }
     }
 
-    /// Returns the next heartbeat, with the values of the last report.
+    /// Returns the next heartbeat, with the values of the last report. `task` are the settings of the task that is
+    /// decided on; without one the heartbeat names no table, and denies.
     pub fn next(
         &mut self,
         answer: &Answer,
         settings: &NodeSettings,
+        task: Option<&NodeSettings>,
         report: Vec<KeyValue>,
     ) -> DiagnosticArray {
         self.sequence += 1;
+        let is_open = answer.is_open && task.is_some();
+        let [name, table, site] = match task {
+            Some(task) => [task.task().to_owned(), task.table(), task.site()],
+            None => Default::default(),
+        };
         let mut values = vec![
             KeyValue::new("format", FORMAT),
-            KeyValue::new("task", settings.task()),
-            KeyValue::new("site", settings.site()),
+            KeyValue::new("task", &name),
+            KeyValue::new("robot", &settings.robot),
+            KeyValue::new("table", table),
+            KeyValue::new("site", site),
             KeyValue::new("run", &self.run),
             KeyValue::new("sequence", self.sequence),
-            KeyValue::new(
-                "valid_ms",
-                if answer.is_open { settings.valid_ms } else { 0 },
-            ),
+            KeyValue::new("valid_ms", if is_open { settings.valid_ms } else { 0 }),
             KeyValue::new("state", answer.state.name()),
             KeyValue::new("reason", answer.reason().map_or("", Reason::name)),
         ];
         values.extend(report);
         let status = DiagnosticStatus {
-            level: if answer.is_open { OK } else { WARN },
+            level: if is_open { OK } else { WARN },
             name: NAME.into(),
-            message: if answer.is_open { PERMIT } else { DENY }.into(),
-            hardware_id: settings.task().into(),
+            message: if is_open { PERMIT } else { DENY }.into(),
+            hardware_id: name,
             values,
         };
         array(answer.now, vec![status])

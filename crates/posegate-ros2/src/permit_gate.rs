@@ -4,18 +4,19 @@
 //! report for telemetry. All decisions are made by [`posegate::gate::Gate`] and [`posegate::track::Tracker`].
 
 use crate::clock::Now;
-use crate::message::{
-    AprilTagDetectionArray, CameraInfo, Odometry, PoseWithCovariance, PoseWithCovarianceStamped,
-    Time,
-};
+use crate::message::{AprilTagDetectionArray, CameraInfo, Odometry, PoseWithCovariance, Time};
+use crate::poses::PoseReport;
 use crate::settings::NodeSettings;
 use crate::tags::{Look, Tags};
-use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
+use posegate::gate::{
+    Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict, self_test,
+};
 use posegate::pose::Pose;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
 use posegate::set::{Growth, Inflation, Uncertainty};
 use posegate::task::Risk;
 use posegate::track::{Increment, Tracker, TrackerSettings};
+use posegate_host::log::remembers;
 
 /// The number of increments of the odometry that are kept for late fixes: 2.5 s at 50 Hz.
 const INCREMENTS: usize = 128;
@@ -91,8 +92,23 @@ impl<'a> PermitGate<'a> {
         gate: &'a Settings<'a>,
         now: Now,
     ) -> Result<Self, InvalidParameter> {
+        Self::after(self_test(), table, settings, gate, now)
+    }
+
+    /// Returns a closed gate without the self-test, whose result is given: for a change of the table. A fault that
+    /// another gate has latched ([`Gate::is_sound`]) stays latched.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn after(
+        is_sound: Result<(), Reason>,
+        table: &'a [u8],
+        settings: &'a NodeSettings,
+        gate: &'a Settings<'a>,
+        now: Now,
+    ) -> Result<Self, InvalidParameter> {
         Ok(Self {
-            gate: Gate::new(table, gate, now.ms())?,
+            gate: Gate::after(is_sound, table, gate, now.ms())?,
             settings,
             poses: Order::default(),
             tags: None,
@@ -145,7 +161,7 @@ impl<'a> PermitGate<'a> {
     /// Processes the detections of an image. The gate permits only if every pose that fits them is inside.
     ///
     /// Detections without information on the pose are not a report: a permit then ends when its time is over.
-    /// Detections that contradict the site are a report without a pose, which is denied.
+    /// Detections that contradict the site end a permit, with the reasons of `posegate replay`.
     pub fn detections(
         &mut self,
         now: Now,
@@ -161,13 +177,23 @@ impl<'a> PermitGate<'a> {
         if has_changed {
             let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
         }
-        let mut poses = match look {
-            Look::Poses(poses) => poses,
+        let (mut poses, is_ambiguous) = match look {
+            Look::Poses(poses, is_ambiguous) => (poses, is_ambiguous),
             Look::Nothing => {
                 self.poses.leave_out();
                 return self.tick(now);
             }
-            Look::Contradiction => Vec::new(),
+            Look::Contradiction(reason) => {
+                let (step, verdict) = self.refuse(now_ms, reason);
+                self.last = Some(LastReport {
+                    stamp: message.header.stamp,
+                    frame: self.settings.frame.clone(),
+                    estimate: NO_POSE,
+                    verdict,
+                    step: step.verdict,
+                });
+                return answer(now, step);
+            }
         };
         let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
         let report = Report {
@@ -177,11 +203,11 @@ impl<'a> PermitGate<'a> {
             stamp_ms,
             belief: poses.first().copied().unwrap_or(NO_POSE),
         };
-        let (estimate, step, verdict) = if poses.len() == 1 {
+        let (estimate, mut step, mut verdict) = if poses.len() == 1 {
             let (step, verdict) = self.take_report(now_ms, &report, has_time);
             (report.belief, step, verdict)
         } else {
-            // A single pose can be carried: not one of several, and none after a contradiction.
+            // A single pose can be carried, not one of several.
             if let Some(carried) = &mut self.carried {
                 carried.tracker.drop_fix();
                 // The gate's source has no inflation: the tracker applies it.
@@ -205,6 +231,15 @@ impl<'a> PermitGate<'a> {
             let about = poses.get(usize::from(number)).copied();
             (about.unwrap_or(report.belief), step, verdict)
         };
+        // One of the poses is outside, whichever the gate names.
+        if is_ambiguous && step.verdict.is_err_and(|reason| !remembers(reason)) {
+            let reason = Reason::TagPosesAmbiguous;
+            step = Step {
+                verdict: Err(reason),
+                ..self.gate.inhibit(now_ms, reason)
+            };
+            verdict = Verdict::deny(reason);
+        }
         self.last = Some(LastReport {
             stamp: message.header.stamp,
             frame: self.settings.frame.clone(),
@@ -215,36 +250,48 @@ impl<'a> PermitGate<'a> {
         answer(now, step)
     }
 
-    /// Processes a pose with its covariance.
-    pub fn pose(
-        &mut self,
-        now: Now,
-        message: &PoseWithCovarianceStamped,
-        origin: Origin,
-    ) -> Answer {
+    /// Processes a pose. One that is refused ends every permit with the reason of the refusal.
+    pub fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
         let now_ms = now.ms();
         let (sequence, has_changed) = self.poses.next(origin);
         if has_changed {
             // Two alternating publishers end every permit of each other.
             let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
         }
-        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
+        let (stamp_ms, has_time) = self.stamp(now, message.stamp);
         let report = Report {
             source: 0,
-            frame: FrameId::of(&message.header.frame_id),
+            frame: FrameId::of(&message.frame),
             sequence,
             stamp_ms,
-            belief: estimate(&message.pose),
+            belief: message.pose.clone().unwrap_or(NO_POSE),
         };
-        let (step, verdict) = self.take_report(now_ms, &report, has_time);
+        let (step, verdict) = match &message.pose {
+            Ok(_) => self.take_report(now_ms, &report, has_time),
+            Err(refused) => self.refuse(now_ms, refused.reason()),
+        };
         self.last = Some(LastReport {
-            stamp: message.header.stamp,
-            frame: message.header.frame_id.clone(),
+            stamp: message.stamp,
+            frame: message.frame.clone(),
             estimate: report.belief,
             verdict,
             step: step.verdict,
         });
         answer(now, step)
+    }
+
+    /// Ends a permit because of a message without a usable pose. It is left out of the sequence, and no earlier pose is
+    /// carried on.
+    fn refuse(&mut self, now_ms: u32, reason: Reason) -> (Step, Verdict) {
+        self.poses.leave_out();
+        if let Some(carried) = &mut self.carried {
+            carried.tracker.drop_fix();
+        }
+        let step = Step {
+            verdict: Err(reason),
+            ..self.gate.inhibit(now_ms, reason)
+        };
+        (step, Verdict::deny(reason))
     }
 
     /// Returns a stamp on the gate's clock, and `true` if it is a time. A stamp that is not on that clock counts as

@@ -4,15 +4,14 @@
 
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
-use crate::diagnostics::{Received, diagnostics};
+use crate::diagnostics::{diagnostics, wrong_frame};
 use crate::graph::{Environment, Graph, GraphError, Input};
-use crate::message::{
-    AprilTagDetectionArray, Bool, CameraInfo, Odometry, PoseWithCovarianceStamped, Time,
-    TriggerResponse,
-};
+use crate::message::{Bool, TriggerResponse};
 use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
+use crate::poses::{PoseReport, Poses};
+use crate::received::Received;
 use crate::settings::NodeSettings;
 use posegate::gate::Reason;
 use ros2_client::{MessageInfo, Subscription};
@@ -46,6 +45,11 @@ pub struct Runner<'a, D> {
     watch: ClockWatch,
     clock_steps: u64,
     pose: Received,
+    poses: Poses,
+    /// Why the last pose was not used.
+    refused: Option<String>,
+    /// The number of poses that transforms gave.
+    composed: i64,
     camera_info: Option<Received>,
     odometry: Option<Received>,
     was_open: bool,
@@ -61,14 +65,13 @@ struct Sent {
     slow: Option<Instant>,
 }
 
-/// Processes the messages of a topic that have arrived, at most `most`, and counts them. `take` gets `None` for a
-/// message that cannot be decoded.
+/// Processes the messages of a topic that have arrived, at most `most`, and counts those that cannot be decoded. `take`
+/// gets `None` for such a message.
 fn drain<M: DeserializeOwned + 'static>(
     topic: &Subscription<M>,
     most: usize,
     received: &mut Received,
-    stamp: fn(&M) -> Time,
-    mut take: impl FnMut(Option<(M, MessageInfo)>),
+    mut take: impl FnMut(&mut Received, Option<(M, MessageInfo)>),
 ) {
     for _ in 0..most {
         let taken = match topic.take() {
@@ -76,14 +79,8 @@ fn drain<M: DeserializeOwned + 'static>(
             Ok(taken) => taken,
             Err(_) => None,
         };
-        match &taken {
-            Some((message, _)) => {
-                received.messages += 1;
-                received.last = Some(stamp(message));
-            }
-            None => received.unreadable += 1,
-        }
-        take(taken);
+        received.unreadable += u64::from(taken.is_none());
+        take(received, taken);
     }
 }
 
@@ -102,9 +99,12 @@ impl<'a, D: Decider> Runner<'a, D> {
         gate: D,
         settings: &'a NodeSettings,
     ) -> Result<Self, GraphError> {
-        let graph = Graph::join(environment, names, settings)?;
+        let graph = Graph::join(environment, names, settings, gate.takes_tasks())?;
         Ok(Self {
             pose: graph.received_poses(names, settings),
+            poses: Poses::new(&settings.poses, names.of_poses(settings.poses.kind)),
+            refused: None,
+            composed: 0,
             camera_info: graph.received_camera_info(names, settings),
             odometry: graph.received_odometry(names, settings),
             graph,
@@ -127,7 +127,12 @@ impl<'a, D: Decider> Runner<'a, D> {
             "posegate-node: the threads of DDS were interrupted and have ended: joining the graph again"
         );
         let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
-        let graph = Graph::join(self.environment, self.names, self.settings)?;
+        let graph = Graph::join(
+            self.environment,
+            self.names,
+            self.settings,
+            self.gate.takes_tasks(),
+        )?;
         self.pose.peers = graph.received_poses(self.names, self.settings).peers;
         let (names, settings) = (self.names, self.settings);
         for (received, again) in [
@@ -192,6 +197,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                 received.peers.note(&event);
             }
         }
+        self.take_task();
         self.take_odometry();
         self.take_camera_info();
         self.take_reports();
@@ -200,12 +206,29 @@ impl<'a, D: Decider> Runner<'a, D> {
         self.serve();
     }
 
+    /// Takes the last name that was asked for. The denial is published before any report is evaluated for the other
+    /// task.
+    fn take_task(&mut self) {
+        let mut last = None;
+        if let Some(topic) = &self.graph.task {
+            while let Ok(Some((message, _))) = topic.take() {
+                last = Some(message.data);
+            }
+        }
+        let Some(name) = last else {
+            return;
+        };
+        self.gate.ask(Now::read(), &name);
+        let answer = self.gate.tick(Now::read());
+        self.publish(&answer, Instant::now(), true);
+    }
+
     fn take_odometry(&mut self) {
         if let (Some(topic), Some(received)) = (&self.graph.odom, &mut self.odometry) {
-            let stamp = |message: &Odometry| message.header.stamp;
-            drain(topic, BATCH, received, stamp, |taken| {
+            drain(topic, BATCH, received, |received, taken| {
                 let _ = match taken {
                     Some((message, info)) => {
+                        received.note(Now::read(), message.header.stamp);
                         self.gate.odometry(Now::read(), &message, origin(&info))
                     }
                     None => self.gate.odometry_lost(Now::read()),
@@ -218,8 +241,10 @@ impl<'a, D: Decider> Runner<'a, D> {
         if let (Input::Detections(_, topic), Some(received)) =
             (&self.graph.input, &mut self.camera_info)
         {
-            let stamp = |message: &CameraInfo| message.header.stamp;
-            drain(topic, BATCH, received, stamp, |taken| {
+            drain(topic, BATCH, received, |received, taken| {
+                if let Some((message, _)) = &taken {
+                    received.note(Now::read(), message.header.stamp);
+                }
                 self.gate
                     .camera_info(taken.as_ref().map(|(message, _)| message));
             });
@@ -228,27 +253,79 @@ impl<'a, D: Decider> Runner<'a, D> {
 
     /// Takes poses or detections. After one that could not be read the next has a gap before it, and is denied.
     fn take_reports(&mut self) {
-        let received = &mut self.pose;
+        let (received, poses) = (&mut self.pose, &mut self.poses);
         let (gate, has_report) = (&mut self.gate, &mut self.has_report);
+        let (refused, composed) = (&mut self.refused, &mut self.composed);
+        let mut take = |received: &mut Received, report: &PoseReport, origin: Origin| {
+            *has_report = true;
+            let now = Now::read();
+            received.note(now, report.stamp);
+            *refused = report.pose.as_ref().err().map(ToString::to_string);
+            let _ = gate.pose(now, report, origin);
+        };
         match &self.graph.input {
-            Input::Poses(topic) => {
-                let stamp = |message: &PoseWithCovarianceStamped| message.header.stamp;
-                drain(topic, BATCH, received, stamp, |taken| {
-                    if let Some((message, info)) = taken {
-                        *has_report = true;
-                        let _ = gate.pose(Now::read(), &message, origin(&info));
-                    }
-                });
-            }
-            Input::Detections(topic, _) => {
-                let stamp = |message: &AprilTagDetectionArray| message.header.stamp;
-                drain(topic, DETECTIONS, received, stamp, |taken| {
-                    if let Some((message, info)) = taken {
-                        *has_report = true;
-                        let _ = gate.detections(Now::read(), &message, origin(&info));
-                    }
-                });
-            }
+            Input::Poses(topic) => drain(topic, BATCH, received, |received, taken| {
+                if let Some((message, info)) = taken {
+                    take(received, &poses.with_covariance(&message), origin(&info));
+                }
+            }),
+            Input::Odometry(topic) => drain(topic, BATCH, received, |received, taken| {
+                if let Some((message, info)) = taken {
+                    take(received, &poses.odometry(&message), origin(&info));
+                }
+            }),
+            Input::Plain(topic) => drain(topic, BATCH, received, |received, taken| {
+                if let Some((message, info)) = taken {
+                    take(received, &poses.pose(&message), origin(&info));
+                }
+            }),
+            Input::Transforms(topic) => drain(topic, BATCH, received, |received, taken| {
+                let Some((message, info)) = taken else {
+                    return;
+                };
+                let publisher = info.publisher_gid().to_bytes16();
+                if let Some(report) = poses.transforms(&message, publisher) {
+                    // Several publishers share the topic, so their counts do not number the poses.
+                    *composed += 1;
+                    let origin = Origin {
+                        publisher: [0; 16],
+                        number: *composed,
+                    };
+                    take(received, &report, origin);
+                }
+            }),
+            Input::Detections(topic, _) => drain(topic, DETECTIONS, received, |received, taken| {
+                if let Some((message, info)) = taken {
+                    *has_report = true;
+                    received.note(Now::read(), message.header.stamp);
+                    let _ = gate.detections(Now::read(), &message, origin(&info));
+                }
+            }),
+        }
+    }
+
+    /// Returns the action that the node knows and the gate does not: the fault of the topic, of the last pose, of stamps,
+    /// or the hold that would open.
+    fn hint(&self, answer: &Answer) -> Option<String> {
+        let (pose, settings) = (&self.pose, self.settings);
+        let reason = answer.reason()?;
+        if let Some(problem) = self.gate.problem() {
+            return Some(problem);
+        }
+        match reason {
+            Reason::Silent | Reason::Qualifying | Reason::Holding | Reason::SourceChanged => pose
+                .problem()
+                .or_else(|| self.refused.clone())
+                .or_else(|| pose.stamps(settings))
+                .or_else(|| pose.hold(settings)),
+            Reason::Stale | Reason::TimeBackwards => pose.stamps(settings),
+            Reason::CovarianceZero | Reason::CovarianceUnknown => self.refused.clone(),
+            Reason::FrameMismatch => self.refused.clone().or_else(|| {
+                self.gate
+                    .frame()
+                    .and_then(|frame| wrong_frame(frame, settings))
+            }),
+            _ => None,
         }
     }
 
@@ -264,7 +341,12 @@ impl<'a, D: Decider> Runner<'a, D> {
             self.has_report = false;
             self.sent.heartbeat = Some(now);
             let report = self.gate.report();
-            let message = self.heartbeat.next(answer, self.settings, report);
+            let message = self.heartbeat.next(
+                answer,
+                self.settings,
+                self.gate.chosen(self.settings),
+                report,
+            );
             let _ = self.graph.permission.publish(message);
         }
         if has_changed
@@ -281,17 +363,27 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
         if has_changed || is_due(self.sent.slow, now, SLOW_PERIOD) {
             self.sent.slow = Some(now);
+            let frame = self.gate.frame();
+            let refused = self.refused.clone();
+            let refused =
+                refused.or_else(|| frame.and_then(|frame| wrong_frame(frame, self.settings)));
+            let others = [
+                ("odometry", &self.odometry),
+                ("camera info", &self.camera_info),
+            ];
+            let others = others.into_iter();
+            let others = others.filter_map(|(name, received)| {
+                Some(received.as_ref()?.status(name, answer.now, None))
+            });
+            let more = others.chain(self.gate.diagnostics(answer.now)).collect();
             let message = diagnostics(
                 answer,
                 self.settings,
-                self.gate.frame(),
-                &self.pose,
-                [
-                    ("odometry", self.odometry.as_ref()),
-                    ("camera info", self.camera_info.as_ref()),
-                ],
+                self.gate.chosen(self.settings),
+                self.hint(answer).as_deref(),
+                (&self.pose, refused),
                 self.clock_steps,
-                self.gate.diagnostics(answer.now),
+                more,
             );
             let _ = self.graph.diagnostics.publish(message);
             if let Some(markers) = self.gate.markers(answer).filter(|_| self.settings.markers) {
@@ -305,7 +397,7 @@ impl<'a, D: Decider> Runner<'a, D> {
             let answer = self.gate.tick(Now::read());
             let response = TriggerResponse {
                 success: true,
-                message: self.gate.explain(&answer),
+                message: self.gate.explain(&answer, self.hint(&answer).as_deref()),
             };
             let _ = self.graph.explain.send_response(id, response);
         }

@@ -2,6 +2,7 @@
 
 use self::reader::Reader;
 use crate::arguments::Arguments;
+use crate::poses::PoseSettings;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::report::FrameId;
@@ -39,11 +40,16 @@ pub struct Serial {
 pub struct NodeSettings {
     task: String,
     task_digest: [u8; 32],
+    table_digest: [u8; 32],
+    /// The name of the robot in the permit: the node's full name, unless a parameter states another.
+    pub robot: String,
     /// `true` if the digest of the site file was given, `false` if it was taken from the table.
     pub site_is_checked: bool,
     sources: [Source; 1],
     /// The required frame of poses.
     pub frame: String,
+    /// How poses are read.
+    pub poses: PoseSettings,
     /// The trust in the covariances.
     pub trust: Trust,
     /// The largest speeds of the robot.
@@ -164,6 +170,11 @@ pub enum SettingsError {
         /// The value of `use_detections` with which the parameter is allowed.
         instead: bool,
     },
+    /// Messages without a covariance need a stated bound, of both kinds.
+    #[error(
+        "`{0}` is not given: state the largest error of the poses, set_translation_m (metres) and set_yaw_deg (degrees); both are needed for poses without a covariance (pose_type pose and tf), and they replace the covariance of others"
+    )]
+    NoBound(&'static str),
     /// Times contradict each other.
     #[error("{0}")]
     Times(&'static str),
@@ -243,8 +254,11 @@ impl NodeSettings {
         let settings = Self {
             task,
             task_digest: digest,
+            table_digest: table.digest(),
+            robot: reader.text("robot", &arguments.names.full_node())?,
             site_is_checked: site_is_checked || site.is_some(),
             sources: [source],
+            poses: reader.poses(site.as_ref(), &frame, trust, &table)?,
             frame,
             trust,
             bounds,
@@ -270,7 +284,7 @@ impl NodeSettings {
             cycle_ms: reader.ms("cycle_ms", 20)?,
             heartbeat_ms: reader.ms("heartbeat_ms", 50)?,
             valid_ms: reader.ms("valid_ms", 250)?,
-            pose_delivery: reader.delivery("pose_reliability", "pose_durability", true)?,
+            pose_delivery: reader.delivery("pose_reliability", "pose_durability", false)?,
             odom_delivery: reader.delivery("odom_reliability", "odom_durability", false)?,
             detections_delivery: reader.delivery(
                 "detections_reliability",
@@ -316,6 +330,12 @@ impl NodeSettings {
         self.cycle_ms + self.valid_ms + CLOCKS_MS
     }
 
+    /// Returns the age at which a report is no longer used, milliseconds.
+    #[must_use]
+    pub const fn oldest_ms(&self) -> u32 {
+        self.maximum_age_ms.saturating_sub(self.response_ms())
+    }
+
     /// Returns the settings of the gate.
     #[must_use]
     pub fn gate(&self) -> Settings<'_> {
@@ -340,6 +360,12 @@ impl NodeSettings {
     #[must_use]
     pub fn task(&self) -> &str {
         &self.task
+    }
+
+    /// Returns the SHA-256 of the table's bytes, in hexadecimal digits.
+    #[must_use]
+    pub fn table(&self) -> String {
+        hex(&self.table_digest)
     }
 
     /// Returns the task digest, in hexadecimal digits.

@@ -6,20 +6,21 @@
 use crate::message::{
     AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, OK, WARN,
 };
+use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
 use posegate::set::{Estimate, Uncertainty};
-use posegate_host::log::corners::{Fix, MountedCamera};
+use posegate_host::log::corners::{Fix, MountedCamera, is_ambiguous};
 use posegate_host::log::detector::{self, Detector, FoundTag};
 
 /// The result of one message of detections.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Look {
-    /// The possible poses of the robot, best first: one or two.
-    Poses(Vec<PoseEstimate>),
+    /// The possible poses of the robot, best first: one or two; `true` if poses that are far apart fit.
+    Poses(Vec<PoseEstimate>, bool),
     /// No pose. An earlier pose is still valid.
     Nothing,
-    /// No pose, and the message contradicts the site: an earlier pose must not be used.
-    Contradiction,
+    /// No pose, and the message contradicts the site: an earlier pose must not be used. The reason of the denial.
+    Contradiction(Reason),
 }
 
 /// Computes poses from detections.
@@ -88,10 +89,10 @@ impl Tags {
         let (look, unused) = self.looked(message);
         self.unused = unused;
         let kind = match &look {
-            Look::Poses(poses) if poses.len() == 1 => 0,
-            Look::Poses(_) => 1,
+            Look::Poses(poses, _) if poses.len() == 1 => 0,
+            Look::Poses(..) => 1,
             Look::Nothing => 2,
-            Look::Contradiction => 3,
+            Look::Contradiction(_) => 3,
         };
         self.counts[kind] += 1;
         look
@@ -108,7 +109,7 @@ impl Tags {
             let words = format!(
                 "{detections} is in the frame `{own}`, and {camera_info} in `{camera_frame}`: they are of two cameras; remap one of them"
             );
-            return (Look::Contradiction, Some(words));
+            return (Look::Contradiction(Reason::FrameMismatch), Some(words));
         }
         let found: Vec<FoundTag> = message
             .detections
@@ -121,11 +122,14 @@ impl Tags {
             })
             .collect();
         match self.detector.look(camera, &found) {
-            Ok(fixes) => (Look::Poses(fixes.iter().map(estimate).collect()), None),
-            Err(error) if error.is_contradiction() => {
-                (Look::Contradiction, Some(error.to_string()))
+            Ok(fixes) => {
+                let poses = fixes.iter().map(estimate).collect();
+                (Look::Poses(poses, is_ambiguous(&fixes)), None)
             }
-            Err(error) => (Look::Nothing, Some(error.to_string())),
+            Err(error) => {
+                let look = error.reason().map_or(Look::Nothing, Look::Contradiction);
+                (look, Some(error.to_string()))
+            }
         }
     }
 

@@ -8,6 +8,7 @@ use posegate_ros2::message::{
     Header, Odometry, Pose, PoseWithCovariance, PoseWithCovarianceStamped, TriggerRequest,
 };
 use posegate_ros2::permit_gate::{Origin, PermitGate};
+use posegate_ros2::poses::Poses;
 use posegate_ros2::settings::NodeSettings;
 use rustdds::no_key::{DeserializerAdapter, SerializerAdapter};
 use rustdds::{CDRDeserializerAdapter, CDRSerializerAdapter, RepresentationIdentifier};
@@ -119,7 +120,8 @@ fn damaged_payloads_never_permit_wrongly() {
             publisher: [1; 16],
             number: 1,
         };
-        if node.pose(now(0), &message, origin).is_open {
+        let report = Poses::new(&settings.poses, "/amcl_pose").with_covariance(&message);
+        if node.pose(now(0), &report, origin).is_open {
             permits += 1;
             let is_right = read(&payload).is_some_and(|numbers| may_permit(&numbers));
             wrong += u64::from(!is_right);

@@ -23,8 +23,8 @@ std::optional<std::int64_t> whole(const std::string& text) {
 
 }  // namespace
 
-PermitWatch::PermitWatch(std::string task, std::string site, Clock monotonic)
-    : task_(std::move(task)), site_(std::move(site)), monotonic_(std::move(monotonic)) {}
+PermitWatch::PermitWatch(std::string task, std::string robot, std::string table, Clock monotonic)
+    : task_(std::move(task)), robot_(std::move(robot)), table_(std::move(table)), monotonic_(std::move(monotonic)) {}
 
 std::int64_t PermitWatch::steady_ns() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -68,20 +68,29 @@ std::pair<std::optional<std::string>, std::int64_t> PermitWatch::checked(const H
     const auto found = values.find(key);
     return found == values.end() ? std::optional<std::string>() : found->second;
   };
-  if (message.name != "posegate" || value("format") != "1") {
+  if (message.name != "posegate" || value("format") != "2") {
     return refused("not a heartbeat of posegate-node, or of another version");
   }
   const auto run = value("run");
   const auto sequence = whole(value("sequence").value_or(""));
-  if (!run || !sequence) {
+  if (!run || run->empty() || !sequence) {
     return refused("a heartbeat without its number");
   }
   // A late message of the same run says nothing about now.
   if (*run == run_ && *sequence <= sequence_) {
     return refused("heartbeats out of order");
   }
+  if (!run_.empty() && *run != run_) {
+    alone_ns_ = monotonic_() + kMostValidMs * kMs;
+  }
   run_ = *run;
   sequence_ = *sequence;
+  if (robot_.empty() || value("robot") != robot_) {
+    return refused("a heartbeat of the robot " + value("robot").value_or("") + ", expected " + robot_);
+  }
+  if (alone_ns_ && monotonic_() < *alone_ns_) {
+    return refused("two nodes send heartbeats, or the node was just started again: another run came within a second");
+  }
   if (message.level != 0 || message.message != "permit" || value("state") != "permitted") {
     const std::string reason = value("reason").value_or("");
     return refused(reason.empty() ? "denied" : reason);
@@ -92,8 +101,8 @@ std::pair<std::optional<std::string>, std::int64_t> PermitWatch::checked(const H
   if (value("task") != task_) {
     return refused("a permit for the task " + value("task").value_or("") + ", expected " + task_);
   }
-  if (!site_.empty() && value("site") != site_) {
-    return refused("a permit for another site file");
+  if (table_.empty() || value("table") != table_) {
+    return refused("a permit by the table " + value("table").value_or("") + ", expected " + table_);
   }
   const auto valid_ms = whole(value("valid_ms").value_or(""));
   if (!valid_ms || *valid_ms < 1 || *valid_ms > kMostValidMs) {

@@ -40,8 +40,8 @@ Heartbeat good(std::int64_t stamp_ns = kNow, int sequence = 1) {
   message.level = 0;
   message.name = "posegate";
   message.message = "permit";
-  message.values = {{"format", "1"}, {"task", "dock"},   {"site", "abc"},        {"run", "r1"}, {"sequence", std::to_string(sequence)},
-                    {"valid_ms", "250"}, {"state", "permitted"}, {"reason", ""}};
+  message.values = {{"format", "2"}, {"task", "dock"}, {"robot", "/robot1/posegate"}, {"table", "abc"}, {"run", "r1"},
+                    {"sequence", std::to_string(sequence)}, {"valid_ms", "250"}, {"state", "permitted"}, {"reason", ""}};
   return message;
 }
 
@@ -66,16 +66,16 @@ Heartbeat without(const std::string& key) {
   return message;
 }
 
-bool decides(const Heartbeat& message, std::int64_t system_ns = kNow, const std::string& site = "") {
-  PermitWatch watch("dock", site, [] { return std::int64_t{0}; });
-  watch.heartbeat(message, system_ns);
+bool decides(const Heartbeat& message, const std::string& robot = "/robot1/posegate", const std::string& table = "abc") {
+  PermitWatch watch("dock", robot, table, [] { return std::int64_t{0}; });
+  watch.heartbeat(message, kNow);
   return watch.permit().permitted;
 }
 
 void rules() {
-  require(decides(good()) && decides(good(), kNow, "abc"), "a good heartbeat does not permit");
+  require(decides(good()), "a good heartbeat does not permit");
   std::vector<Heartbeat> refused = {Heartbeat{}};
-  for (const char* key : {"format", "task", "run", "sequence", "valid_ms", "state", "reason"}) {
+  for (const char* key : {"format", "task", "robot", "table", "run", "sequence", "valid_ms", "state", "reason"}) {
     refused.push_back(without(key));
     refused.push_back(with(key, "9999999999999999999"));
     if (std::string(key) != "run") {
@@ -109,11 +109,12 @@ void rules() {
     require(!decides(message), "permitted: heartbeat " + std::to_string(count));
     ++count;
   }
-  require(!decides(good(), kNow, "def"), "another site");
-  figure("heartbeats that are refused", count, "heartbeats", 32);
+  require(!decides(good(), "/robot2/posegate") && !decides(good(), "/robot1/posegate", "def"), "another robot or table");
+  require(!decides(with("robot", ""), "") && !decides(with("table", ""), "/robot1/posegate", ""), "an empty name");
+  figure("heartbeats that are refused", count, "heartbeats", 38);
 
   std::int64_t monotonic = 5000 * kMs;
-  PermitWatch watch("dock", "", [&monotonic] { return monotonic; });
+  PermitWatch watch("dock", "/robot1/posegate", "abc", [&monotonic] { return monotonic; });
   require(!watch.permit().permitted && watch.permit().reason == "silent", "a watch that heard nothing permits");
   watch.heartbeat(good(), kNow + 100 * kMs);
   monotonic = 5149 * kMs;
@@ -126,6 +127,28 @@ void rules() {
   require(watch.permit().permitted, "no second permit");
   watch.heartbeat(good(kNow, 2), kNow);
   require(!watch.permit().permitted, "a repeated heartbeat permits");
+  // Two runs that alternate deny; one that stays permits a second after the other's last heartbeat.
+  watch.heartbeat(good(kNow, 3), kNow);
+  require(watch.permit().permitted, "no third permit");
+  long asks = 0;
+  for (int k = 1; k <= 100; ++k) {
+    monotonic += 25 * kMs;
+    Heartbeat message = good(kNow, 3 + k);
+    for (auto& pair : message.values) {
+      if (pair.first == "run" && k % 2 == 1) {
+        pair.second = "r2";
+      }
+    }
+    watch.heartbeat(message, kNow);
+    asks += watch.permit().permitted ? 0 : 1;
+  }
+  figure("asks denied while two runs alternate", asks, "asks", 100);
+  monotonic += 999 * kMs;
+  watch.heartbeat(good(kNow, 200), kNow);
+  require(!watch.permit().permitted, "a run that is alone for less than a second permits");
+  monotonic += 1 * kMs;
+  watch.heartbeat(good(kNow, 201), kNow);
+  require(watch.permit().permitted, "a run that stays alone does not permit");
 }
 
 /// A source whose permit the test sets.
@@ -206,7 +229,7 @@ void condition(BT::BehaviorTreeFactory& factory) {
   source->throws = true;
   require(ticked(source, why) == BT::NodeStatus::FAILURE && why.find("gone") != std::string::npos, "a source that throws: " + why);
   // A real watch: silence fails, a heartbeat of now succeeds, silence after it fails again.
-  auto watch = std::make_shared<PermitWatch>("dock");
+  auto watch = std::make_shared<PermitWatch>("dock", "/robot1/posegate", "abc");
   require(ticked(watch, why) == BT::NodeStatus::FAILURE, "a watch that heard nothing");
   watch->heartbeat(good(), kNow);
   require(ticked(watch, why) == BT::NodeStatus::SUCCESS, "a heartbeat of now: " + why);

@@ -80,6 +80,8 @@ pub fn ros2(given: &Arguments) -> Result {
     live(&jazzy, "failsafe").arg(runs.to_string()).json()?;
     live(&jazzy, "rows").arg(&bag).json()?;
     live(&jazzy, "cyclone").json()?;
+    live(&jazzy, "fleet").json()?;
+    live(&jazzy, "docks").json()?;
     live(&jazzy, "detections").json()?;
     say("a controller on a serial line");
     let firmware = board::build(Level::Fast, CORE, "interrupt_gate")?;

@@ -36,6 +36,7 @@
 //! ```
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use posegate::gate::Reason;
 use posegate::shape::{Camera, Mount, Pose3Deg, Tag, Tolerance};
 
 mod solutions;
@@ -115,6 +116,26 @@ impl FixError {
             Self::Misfit => "corners_do_not_fit",
         }
     }
+
+    /// Returns the gate's reason for observed tags that give no pose; `None` if no known tag was observed, which is not a report.
+    #[must_use]
+    pub const fn reason(self) -> Option<Reason> {
+        match self {
+            Self::NoTag => None,
+            Self::NotFinite => Some(Reason::TooFewCorners),
+            Self::Ambiguous => Some(Reason::TagPosesAmbiguous),
+            Self::NoPose | Self::Misfit => Some(Reason::CornersDoNotFit),
+        }
+    }
+}
+
+/// The widest valley of fits that counts as one pose, relative to its first-order covariance: that of [`locate`].
+const WIDEST: f64 = 4.0;
+
+/// Returns `true` if poses that are far apart fit: two poses, or all poses between them.
+#[must_use]
+pub fn is_ambiguous(fixes: &[Fix]) -> bool {
+    fixes.len() > 1 || fixes.iter().any(|fix| fix.grown > WIDEST)
 }
 
 /// Number of directions from which the search starts.

@@ -31,6 +31,7 @@ use super::corners::{Fix, FixError, MountedCamera, TagObservation, locate_all};
 use super::{AlikeTags, KnownTags};
 use crate::site::{Site, SiteCamera, lens_of_ros};
 use posegate::certify::{Calibration, CertifiedCamera, Image, LensError, Roi};
+use posegate::gate::Reason;
 use posegate::shape::{Camera, Intrinsics, Lens};
 use std::collections::BTreeSet;
 
@@ -216,13 +217,15 @@ pub enum LookError {
 }
 
 impl LookError {
-    /// Returns `true` if the detections contradict the site, so that an earlier pose must not be used any more.
+    /// Returns the gate's reason if the detections contradict the site, so that an earlier pose must not be used any more; `None` if
+    /// they say nothing about the pose.
     #[must_use]
-    pub const fn is_contradiction(&self) -> bool {
-        matches!(
-            self,
-            Self::Twice(_) | Self::NotInImage(_) | Self::Corners(_)
-        )
+    pub const fn reason(&self) -> Option<Reason> {
+        match self {
+            Self::Twice(_) | Self::NotInImage(_) => Some(Reason::CornersDoNotFit),
+            Self::Corners(error) => error.reason(),
+            _ => None,
+        }
     }
 }
 

@@ -33,7 +33,7 @@ use self::estimates::clock_ms_of_ns;
 
 pub use self::track::{Trajectory, TruthLookup};
 
-pub use self::verdict::{coordinates, factor, factor_text};
+pub use self::verdict::{coordinates, factor, factor_text, remembers};
 
 mod covariance;
 mod estimates;

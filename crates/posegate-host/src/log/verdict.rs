@@ -1,6 +1,7 @@
-//! Converts verdicts to metres, radians and factors.
+//! Converts verdicts to metres, radians and factors, and says which reasons are of an estimate alone.
 
 use posegate::contain::Margin;
+use posegate::gate::Reason;
 use posegate::pose::Pose;
 
 /// Returns a margin as a factor. Exact.
@@ -24,6 +25,34 @@ pub fn coordinates(pose: Pose) -> [f64; 3] {
         f64::from(pose.y_um) / 1e6,
         f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0),
     ]
+}
+
+/// Returns `true` if a reason of a gate's step may come from its memory, and not from the estimate. (Staleness is
+/// included: the gate's clock may not advance if a time is missing.)
+#[must_use]
+pub const fn remembers(reason: Reason) -> bool {
+    !matches!(
+        reason,
+        Reason::NotContained
+            | Reason::PoseSetTooLarge
+            | Reason::OutsideTable
+            | Reason::EstimateNotFinite
+            | Reason::EstimateOutOfRange
+            | Reason::CovarianceNotFinite
+            | Reason::CovarianceZero
+            | Reason::CovarianceNotSymmetric
+            | Reason::CovarianceNotPositiveDefinite
+            | Reason::CovarianceTooLarge
+            | Reason::CovarianceUnknown
+            | Reason::BoundInvalid
+            | Reason::OrientationInvalid
+            | Reason::Tilted
+            | Reason::FrameMismatch
+            | Reason::SourceUnknown
+            | Reason::TagPosesAmbiguous
+            | Reason::CornersDoNotFit
+            | Reason::TooFewCorners
+    )
 }
 
 #[cfg(test)]

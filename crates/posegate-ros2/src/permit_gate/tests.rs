@@ -1,6 +1,6 @@
 use super::*;
 use crate::arguments::Command;
-use crate::message::{Header, Pose as RosPose, TwistWithCovariance};
+use crate::message::{Header, Pose as RosPose, PoseWithCovarianceStamped, TwistWithCovariance};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
 const START: i128 = 1_800_000_000_000_000_000;
@@ -28,7 +28,7 @@ fn origin(number: i64) -> Origin {
     }
 }
 
-fn pose_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
+fn message_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
     let mut covariance = [0.0; 36];
     (covariance[0], covariance[7], covariance[35]) = (1e-4, 1e-4, 1e-5);
     PoseWithCovarianceStamped {
@@ -46,8 +46,17 @@ fn pose_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
     }
 }
 
+fn pose_at(ms: u32, x: f64, frame: &str) -> PoseReport {
+    let message = message_at(ms, x, frame);
+    PoseReport {
+        stamp: message.header.stamp,
+        frame: message.header.frame_id,
+        pose: Ok(estimate(&message.pose)),
+    }
+}
+
 fn odometry_at(ms: u32, x: f64) -> Odometry {
-    let pose = pose_at(ms, x, "odom");
+    let pose = message_at(ms, x, "odom");
     Odometry {
         header: pose.header,
         child_frame_id: "base_link".into(),
@@ -104,7 +113,7 @@ fn pose_without_a_time_is_not_carried() {
     for nanosec in [0, u32::MAX] {
         let mut node = opened(&settings, &gate);
         let mut message = pose_at(now, 0.0, "map");
-        message.header.stamp = Time { sec: 0, nanosec };
+        message.stamp = Time { sec: 0, nanosec };
         let answer = node.pose(at(now), &message, origin(next));
         assert!(!answer.is_open, "{nanosec}");
         // The next odometry has no fix to carry.
@@ -122,9 +131,9 @@ fn invalid_reports_close_the_gate() {
     let next = i64::from(OPENED / 100) + 1;
     let now = OPENED + 20;
     let mut no_time = pose_at(now, 0.0, "map");
-    no_time.header.stamp.nanosec = u32::MAX;
+    no_time.stamp.nanosec = u32::MAX;
     let mut lost = pose_at(now, 0.0, "map");
-    lost.header.stamp = Time::default();
+    lost.stamp = Time::default();
     for (message, number, expected) in [
         (pose_at(now, 0.3, "map"), next, Reason::OutsideTable),
         (pose_at(now, 0.07, "map"), next, Reason::NotContained),
@@ -296,4 +305,56 @@ fn reset_closes_and_the_gate_qualifies_again() {
     node.reset(at(3_100)).unwrap();
     assert!(!node.tick(at(3_100)).is_open);
     assert!(open_after(&mut node, 3_100));
+}
+
+/// AMCL reports every 0.6 s while the robot moves. `docs/for-ros.md` names the parameters.
+#[test]
+fn poses_of_amcl_open_with_the_documented_hold() {
+    for (more, opens) in [
+        ("", false),
+        ("-p permit_hold_ms:=700 -p maximum_age_ms:=1200", true),
+    ] {
+        let settings = settings(&format!("{STILL} {more}"));
+        let gate = settings.gate();
+        let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+        let mut opened = false;
+        for ms in (100..10_000).step_by(20) {
+            if (ms - 100) % 600 == 0 {
+                let number = i64::from(ms / 600);
+                let pose = pose_at(ms - 100, 0.0, "map");
+                let _ = node.pose(at(ms), &pose, origin(number));
+            }
+            opened |= node.tick(at(ms)).is_open;
+        }
+        assert_eq!(opened, opens, "{more}");
+    }
+}
+
+/// A pose that is refused closes with its reason, and costs no gap in the sequence.
+#[test]
+fn refused_pose_closes_with_its_reason() {
+    let settings = settings(STILL);
+    let gate = settings.gate();
+    let mut node = opened(&settings, &gate);
+    let next = i64::from(OPENED / 100) + 1;
+    let now = OPENED + 20;
+    let refused = PoseReport {
+        pose: Err(crate::poses::RefusedPose::FixedCovariance(20)),
+        ..pose_at(now, 0.0, "map")
+    };
+    let answer = node.pose(at(now), &refused, origin(next));
+    let reason = Some(Reason::CovarianceUnknown);
+    assert_eq!((answer.is_open, answer.reason()), (false, reason));
+    let mut opened = false;
+    for k in 1..=12 {
+        let ms = now + 100 * k;
+        let answer = node.pose(
+            at(ms),
+            &pose_at(ms, 0.0, "map"),
+            origin(next + i64::from(k)),
+        );
+        assert_ne!(answer.reason(), Some(Reason::SequenceGap));
+        opened |= answer.is_open;
+    }
+    assert!(opened);
 }

@@ -3,19 +3,23 @@
 use super::{Delivery, Serial, SettingsError, hex};
 use crate::arguments::Arguments;
 use crate::parameters::{Parameters, Value};
+use crate::poses::{PoseSettings, PoseType};
 use posegate::gate::task_digest;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate::table::Table;
 use posegate::track::{OdometryErrors, TrackerSettings};
 use posegate_host::log::detector::{Detector, DetectorSettings};
+use posegate_host::log::recording::{BodyFrames, FrameNames};
 use posegate_host::site::Site;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Every parameter.
-const NAMES: [&str; 45] = [
+const NAMES: [&str; 51] = [
     "camera",
     "camera_info_reliability",
+    "child_frame_id",
     "corner_sigma_px",
     "cross_terms",
     "cycle_ms",
@@ -35,6 +39,7 @@ const NAMES: [&str; 45] = [
     "maximum_age_ms",
     "maximum_fix_age_ms",
     "odom_durability",
+    "odom_frame_id",
     "odom_reliability",
     "odometry_m_per_sqrt_m",
     "odometry_m_per_sqrt_s",
@@ -49,8 +54,12 @@ const NAMES: [&str; 45] = [
     "permits_in_a_row",
     "pose_durability",
     "pose_reliability",
+    "pose_type",
     "report_period_ms",
     "restart",
+    "robot",
+    "set_translation_m",
+    "set_yaw_deg",
     "site_digest",
     "stands_still",
     "task",
@@ -63,13 +72,19 @@ const NAMES: [&str; 45] = [
 
 /// The parameters of a node with a controller. All others are settings of the gate or of odometry, which such a node
 /// does not have.
-const WITH_CONTROLLER: [&str; 10] = [
+const WITH_CONTROLLER: [&str; 16] = [
+    "child_frame_id",
     "cycle_ms",
     "frame_id",
     "heartbeat_ms",
     "link_timeout_ms",
+    "odom_frame_id",
     "pose_durability",
     "pose_reliability",
+    "pose_type",
+    "robot",
+    "set_translation_m",
+    "set_yaw_deg",
     "site_digest",
     "task",
     "task_digest",
@@ -87,7 +102,16 @@ const OF_DETECTIONS: [&str; 6] = [
 ];
 
 /// Parameters that are allowed only for poses. The covariance from corners has all its terms.
-const OF_POSES: [&str; 3] = ["cross_terms", "pose_durability", "pose_reliability"];
+const OF_POSES: [&str; 8] = [
+    "child_frame_id",
+    "cross_terms",
+    "odom_frame_id",
+    "pose_durability",
+    "pose_reliability",
+    "pose_type",
+    "set_translation_m",
+    "set_yaw_deg",
+];
 
 /// The standard deviation of a corner's coordinates, pixels. Detectors are often better; use a value measured with
 /// the robot's own camera.
@@ -325,6 +349,72 @@ impl Reader<'_> {
             radius_squared: f64::from(table.radius_squared().q16()) / 65_536.0,
         };
         Ok(Some(Detector::new(site, camera.as_deref(), settings)?))
+    }
+
+    /// Returns how poses are read.
+    pub(super) fn poses(
+        &self,
+        site: Option<&Site>,
+        frame: &str,
+        trust: Trust,
+        table: &Table<'_>,
+    ) -> Result<PoseSettings, SettingsError> {
+        const TYPES: [PoseType; 4] = [
+            PoseType::WithCovariance,
+            PoseType::Odometry,
+            PoseType::Pose,
+            PoseType::Transforms,
+        ];
+        let chosen = self.choice(
+            "pose_type",
+            ["pose_with_covariance", "odometry", "pose", "tf"],
+            "`pose_with_covariance`, `odometry`, `pose` or `tf`",
+        )?;
+        let kind = TYPES.get(chosen).copied();
+        let kind = kind.unwrap_or(PoseType::WithCovariance);
+        let bound = [
+            self.number("set_translation_m")?,
+            self.number("set_yaw_deg")?,
+        ];
+        let bound = match bound {
+            [None, None] if kind.has_covariance() => None,
+            [None, _] => return Err(SettingsError::NoBound("set_translation_m")),
+            [_, None] => return Err(SettingsError::NoBound("set_yaw_deg")),
+            [Some(translation), Some(yaw)] => {
+                if !(translation > 0.0 && translation < 268.0) {
+                    return Err(self.invalid("set_translation_m", "metres above 0 and below 268"));
+                }
+                if !(yaw > 0.0 && yaw <= 180.0) {
+                    return Err(self.invalid("set_yaw_deg", "degrees above 0, at most 180"));
+                }
+                Some([translation, yaw.to_radians()])
+            }
+        };
+        let child = match self.0.get("child_frame_id") {
+            None => None,
+            Some(_) => Some(self.text("child_frame_id", "")?),
+        };
+        let none = BTreeMap::new();
+        let body = BodyFrames::new(site.map_or(&none, |site| &site.frames))
+            .with_origin(site.map_or([0.0; 2], |site| site.map_origin))
+            .with_named(child.as_slice());
+        let is_partial = bound.is_none() && trust.cross_terms != CrossTerms::Filled;
+        let radius_squared = f64::from(table.radius_squared().q16()) / 65_536.0;
+        Ok(PoseSettings {
+            kind,
+            bound,
+            body: if is_partial {
+                body.of_partial_covariances()
+            } else {
+                body
+            },
+            names: FrameNames {
+                world: frame.to_owned(),
+                odometry: self.text("odom_frame_id", "odom")?,
+                base: child,
+            },
+            radius_squared: radius_squared * f64::from(trust.inflation.q16()) / 65_536.0,
+        })
     }
 
     /// Returns the delivery of a topic of which only the last message counts: best effort is received from every

@@ -212,7 +212,7 @@ fn second_pose_denies_although_the_first_alone_would_be_permitted() {
     with_node(LINE, |mut node| {
         for truth in [mirrored(), GOAL] {
             let found = vec![detection(7, truth)];
-            let Look::Poses(poses) = node
+            let Look::Poses(poses, true) = node
                 .gate
                 .tags()
                 .unwrap()
@@ -258,11 +258,7 @@ fn second_pose_denies_although_the_first_alone_would_be_permitted() {
                 assert!(!node.look(found.clone()).is_open);
             }
             let last = node.gate.last().unwrap();
-            assert!(
-                matches!(last.step, Err(Reason::OutsideTable | Reason::NotContained)),
-                "{:?}",
-                last.step
-            );
+            assert_eq!(last.step, Err(Reason::TagPosesAmbiguous));
             // An open gate closes at once.
             node.open();
             assert!(!node.look(found).is_open);
@@ -354,15 +350,23 @@ fn unknown_tags_are_ignored_and_contradictions_close_immediately() {
         broken.corners[1][0] = f64::NAN;
         let mut rolled = detection(8, GOAL);
         rolled.corners.rotate_left(1);
-        for (found, words) in [
-            (vec![broken], "not finite"),
-            (vec![rolled], "do not fit"),
-            (vec![detection(8, GOAL), detection(8, GOAL)], "twice"),
+        let mut outside = detection(8, GOAL);
+        outside.corners[1][0] = -9.0;
+        let misfit = Reason::CornersDoNotFit;
+        for (found, words, reason) in [
+            (vec![broken], "not finite", Reason::TooFewCorners),
+            (vec![rolled], "do not fit", misfit),
+            (vec![outside], "not in the image", misfit),
+            (
+                vec![detection(8, GOAL), detection(8, GOAL)],
+                "twice",
+                misfit,
+            ),
         ] {
             node.open();
             let answer = node.look(found);
             assert!(!answer.is_open, "{words}");
-            assert_eq!(answer.reason(), Some(Reason::EstimateNotFinite));
+            assert_eq!(answer.reason(), Some(reason), "{words}");
             assert!(node.problem().contains(words), "{}", node.problem());
         }
         // Detections of another camera.

@@ -10,7 +10,7 @@ from cyclonedds.idl.types import array, float64, sequence, uint8
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
-from support import end, figure, require, start
+from support import DIGEST, ROBOT, end, figure, require, start
 from permit_listener import PermitWatch
 
 
@@ -46,7 +46,7 @@ def main():
     participant = bare_dds.participant()
     writer = DataWriter(participant, Topic(participant, "rt/amcl_pose", PoseStamped), qos=bare_dds.qos(latched=True))
     reader = DataReader(participant, Topic(participant, "rt/posegate/permission", Array), qos=bare_dds.qos())
-    watch = PermitWatch("dock")
+    watch = PermitWatch("dock", robot=ROBOT, table=DIGEST)
 
     def drive(seconds, x, until):
         begin, due = time.monotonic(), 0.0

@@ -8,14 +8,16 @@ from permit_listener import MOST_VALID_MS, PermitWatch
 
 MS = 1_000_000
 NOW = 1_800_000_000 * 10**9
+ROBOT = "/robot1/posegate"
 
 
 def heartbeat(ros_ns=NOW, sequence=1, **changed):
     """Returns a heartbeat that permits, with changes."""
     values = {
-        "format": "1",
+        "format": "2",
         "task": "dock",
-        "site": "abc",
+        "robot": ROBOT,
+        "table": "abc",
         "run": "r1",
         "sequence": str(sequence),
         "valid_ms": "250",
@@ -33,15 +35,15 @@ def heartbeat(ros_ns=NOW, sequence=1, **changed):
     )
 
 
-def decides(message, ros_ns=NOW, site=None):
+def decides(message, robot=ROBOT, table="abc"):
     """Returns True if a new watch permits on a message."""
-    watch = PermitWatch("dock", site)
-    watch.heartbeat(message, ros_ns, 0)
+    watch = PermitWatch("dock", robot=robot, table=table)
+    watch.heartbeat(message, NOW, 0)
     return watch.permitted(0)
 
 
 def main():
-    require(decides(heartbeat()) and decides(heartbeat(), site="abc"), "a good heartbeat does not permit")
+    require(decides(heartbeat()), "a good heartbeat does not permit")
     refused = {
         "no status": SimpleNamespace(header=heartbeat().header, status=[]),
         "two": SimpleNamespace(header=heartbeat().header, status=heartbeat().status * 2),
@@ -54,10 +56,14 @@ def main():
         ("name", "other"),
         ("level", b"\x01"),
         ("message", "deny"),
-        ("format", "2"),
+        ("format", "1"),
         ("format", None),
         ("task", "park"),
         ("task", None),
+        ("robot", "/robot2/posegate"),
+        ("robot", None),
+        ("table", "def"),
+        ("table", None),
         ("run", None),
         ("sequence", None),
         ("valid_ms", "0"),
@@ -78,23 +84,31 @@ def main():
     refused["future"] = heartbeat(ros_ns=NOW + 21 * MS)
     for name, message in refused.items():
         require(not decides(message), f"permitted: {name}")
-    require(not decides(heartbeat(), site="def"), "another site")
-    figure("listener: heartbeats that are refused", len(refused) + 1, "heartbeats", 25)
+    for robot in ("", None):
+        require(not decides(heartbeat(robot=robot), robot=robot), "an empty robot")
+        require(not decides(heartbeat(table=robot), table=robot), "an empty table")
+    figure("listener: heartbeats that are refused", len(refused) + 4, "heartbeats", 32)
 
     # It ends by itself, by the stamp and by the monotonic clock, and a denial ends it at once.
-    watch = PermitWatch("dock")
+    watch = PermitWatch("dock", robot=ROBOT, table="abc")
     watch.heartbeat(heartbeat(), NOW + 100 * MS, 5_000 * MS)
     require(watch.permitted(5_149 * MS) and not watch.permitted(5_150 * MS), "the end is not 250 ms after the stamp")
     require(not watch.permitted(5_140 * MS), "a permit that has ended came back")
     watch.heartbeat(heartbeat(sequence=2), NOW, 6_000 * MS)
     require(watch.permitted(6_000 * MS), "no second permit")
-    # An older or repeated heartbeat of the same run also ends it; a new run starts again.
+    # An older or repeated heartbeat of the same run also ends it; a new run waits until it is alone for a second.
     watch.heartbeat(heartbeat(sequence=2), NOW, 6_001 * MS)
     require(not watch.permitted(6_001 * MS), "a repeated heartbeat permits")
-    watch.heartbeat(heartbeat(sequence=1, run="r2"), NOW, 6_002 * MS)
-    require(watch.permitted(6_002 * MS), "a new run does not permit")
-    watch.heartbeat(heartbeat(sequence=2, run="r2", message="deny", state="inhibited", reason="silent"), NOW, 6_003 * MS)
-    require(not watch.permitted(6_003 * MS) and watch.reason == "silent", "a denial does not end the permit")
+    for k in range(100):
+        watch.heartbeat(heartbeat(sequence=3 + k, run=f"r{k % 2 + 1}"), NOW, (6_002 + k) * MS)
+        require(k == 0 or not watch.permitted((6_002 + k) * MS), "two runs that alternate permit")
+    watch.heartbeat(heartbeat(sequence=200, run="r2"), NOW, 7_100 * MS)
+    require(not watch.permitted(7_100 * MS), "a new run permits within a second")
+    watch.heartbeat(heartbeat(sequence=201, run="r2"), NOW, 7_101 * MS)
+    require(watch.permitted(7_101 * MS), f"a new run does not permit: {watch.reason}")
+    denial = heartbeat(sequence=202, run="r2", message="deny", state="inhibited", reason="silent")
+    watch.heartbeat(denial, NOW, 7_103 * MS)
+    require(not watch.permitted(7_103 * MS) and watch.reason == "silent", "a denial does not end the permit")
     figure("listener: a permit ends by itself", 250, "ms after its stamp", 250, at_least=False)
 
 

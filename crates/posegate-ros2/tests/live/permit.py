@@ -88,7 +88,7 @@ def words_of(peer, make, name):
 
 def reports_faults_of_the_graph():
     """No publisher, two publishers, best effort, volatile: each is in the diagnostics and does not open the gate."""
-    node = start(*STILL)
+    node = start(*STILL, "pose_durability:=transient_local")
     peer = Peer(qos=None)
     peer.wait(5.0, lambda: "posegate: pose" in peer.states)
     require("nobody publishes /amcl_pose" in peer.states["posegate: pose"].message, "missing publisher")
@@ -103,6 +103,9 @@ def reports_faults_of_the_graph():
         peer.spin(1.2)
         message = peer.states["posegate: pose"].message
         require(words in message, f"{words}: {message}")
+        # Not the link is to blame.
+        answer = peer.call("/posegate/explain")
+        require(words in answer.message and "link" not in answer.message, answer.message)
         other.close()
         peer.spin(1.2)
     node.kill()
@@ -140,7 +143,24 @@ def refuses():
     figure("wrong command lines that are refused", refused, "lines", 5)
 
 
+def names_the_hold():
+    """Poses that come too rarely for the hold never open; the diagnostics and the service name the hold that would."""
+    node = start(*STILL, "permit_hold_ms:=200")
+    peer = Peer()
+    opened = peer.drive(4.0, period=0.3, until=peer.listener.permitted)
+    require(not opened, "poses that are too rare opened the gate")
+    answer = peer.call("/posegate/explain").message
+    require("with permit_hold_ms of 3" in answer and "link" not in answer, answer)
+    # Simulated time is named.
+    words = words_of(peer, lambda: pose(stamp_ns=42 * 10**9), "posegate: pose")
+    require("simulated time" in words, words)
+    node.kill()
+    peer.close()
+    figure("causes that explain names", 2, "causes", 2)
+
+
 refuses()
+names_the_hold()
 gives_and_ends()
 resets()
 reports_faults_of_the_graph()

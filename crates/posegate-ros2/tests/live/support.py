@@ -1,6 +1,7 @@
 """Shared code of the live tests: the node as a process, a peer of rclpy, results as JSON lines. Loopback only."""
 
 import ctypes
+import hashlib
 import json
 import os
 import random
@@ -14,6 +15,9 @@ ROOT = Path(__file__).resolve().parents[4]
 NODE = os.environ["POSEGATE_NODE"]
 PROGRAM = os.environ["POSEGATE"]
 TABLE = ROOT / "examples/tables/dock.posegate"
+# The robot and the table that every permit of these tests must name.
+ROBOT = "/posegate"
+DIGEST = hashlib.sha256(TABLE.read_bytes()).hexdigest()
 SITE = ROOT / "examples/sites/dock.toml"
 # A domain of its own for each test: no other program on this machine is received.
 os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(10, 100))
@@ -68,9 +72,9 @@ def end_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def start(*parameters, options=(), ros=()):
-    """Starts the node on the dock of the examples."""
-    words = [NODE, str(TABLE), *options, "--ros-args"]
+def start(*parameters, options=(), ros=(), table=TABLE):
+    """Starts the node, on the dock of the examples by default."""
+    words = [NODE, str(table), *options, "--ros-args"]
     for parameter in parameters:
         words += ["-p", parameter]
     process = subprocess.Popen([*words, *ros], stderr=subprocess.DEVNULL, preexec_fn=end_with_parent)
@@ -98,7 +102,7 @@ class Peer:
         if not rclpy.ok():
             rclpy.init()
         self.node = rclpy.create_node(name)
-        self.listener = PermitListener(self.node, "dock")
+        self.listener = PermitListener(self.node, "dock", robot=ROBOT, table=DIGEST)
         self.poses = self.node.create_publisher(PoseWithCovarianceStamped, "/amcl_pose", qos) if qos else None
         self.published = 0.0
         self.heartbeats = []

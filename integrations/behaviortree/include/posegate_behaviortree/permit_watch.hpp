@@ -15,12 +15,13 @@
 
 namespace posegate {
 
-/// The longest time for which a heartbeat is valid, whatever it states, milliseconds.
+/// The longest time for which a heartbeat is valid, whatever it states, milliseconds. After a change of the run, heartbeats of the new
+/// run alone must come for this time before one permits.
 constexpr std::int64_t kMostValidMs = 1000;
 /// A heartbeat from farther in the future shows that the clocks of the machines differ, milliseconds.
 constexpr std::int64_t kMostAheadMs = 20;
 
-/// The only status of a heartbeat (`diagnostic_msgs/msg/DiagnosticArray` on /posegate/permission), with the stamp of the header.
+/// The only status of a heartbeat (`diagnostic_msgs/msg/DiagnosticArray` on posegate/permission), with the stamp of the header.
 /// A default heartbeat denies.
 struct Heartbeat {
   /// Header: nanoseconds since 1970.
@@ -44,8 +45,9 @@ class PermitWatch : public PermitSource {
   /// Returns nanoseconds of a monotonic clock.
   using Clock = std::function<std::int64_t()>;
 
-  /// `task` is the task that a permit must name; `site` is the task digest of the table, or empty for any.
-  explicit PermitWatch(std::string task, std::string site = "", Clock monotonic = steady_ns);
+  /// A permit must name the task, the robot (the full name of the node that decides, such as `/robot1/posegate`, or its parameter `robot`)
+  /// and the table (`table_digest` of `posegate table info`). An empty robot or table is never permitted.
+  PermitWatch(std::string task, std::string robot, std::string table, Clock monotonic = steady_ns);
 
   /// Takes a heartbeat at a moment of the system's clock (not of simulated time), nanoseconds since 1970.
   void heartbeat(const Heartbeat& message, std::int64_t system_ns);
@@ -60,11 +62,14 @@ class PermitWatch : public PermitSource {
   std::pair<std::optional<std::string>, std::int64_t> checked(const Heartbeat& message, std::int64_t system_ns);
 
   const std::string task_;
-  const std::string site_;
+  const std::string robot_;
+  const std::string table_;
   const Clock monotonic_;
   std::mutex mutex_;
   std::string run_;
   std::int64_t sequence_ = 0;
+  /// Until this moment of the monotonic clock two runs may be alive.
+  std::optional<std::int64_t> alone_ns_;
   std::optional<std::int64_t> ends_ns_;
   std::string reason_ = "silent";
 };

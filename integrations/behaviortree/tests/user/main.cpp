@@ -4,6 +4,6 @@
 #include "posegate_behaviortree/pose_permitted.hpp"
 
 int main() {
-  posegate::PermitWatch watch("dock");
+  posegate::PermitWatch watch("dock", "/robot1/posegate", "abc");
   return watch.permit().permitted ? 1 : 0;
 }

@@ -71,46 +71,47 @@ fn unusable_detections_have_their_own_errors() {
             }
         }
     };
-    for (found, words, contradicts) in [
-        (vec![], "no tag is detected", false),
+    let misfit = Some(Reason::CornersDoNotFit);
+    for (found, words, reason) in [
+        (vec![], "no tag is detected", None),
         (
             vec![change(&|tag| tag.id = 8)],
             "tag 36h11 8 is not in the site, which has tag36h11 7",
-            false,
+            None,
         ),
-        (vec![change(&|tag| tag.id = -1)], "not in the site", false),
+        (vec![change(&|tag| tag.id = -1)], "not in the site", None),
         (
             vec![change(&|tag| tag.family = "tag25h9".into())],
             "tag tag25h9 7 is not in the site",
-            false,
+            None,
         ),
         (
             vec![change(&|tag| tag.hamming = 1)],
             "1 corrected bits, at most 0",
-            false,
+            None,
         ),
         (
             vec![change(&|tag| tag.hamming = -1)],
             "corrected bits",
-            false,
+            None,
         ),
-        (vec![tag(), tag()], "detected twice", true),
-        (vec![change(&moved(400.0))], "not in the image", true),
+        (vec![tag(), tag()], "detected twice", misfit),
+        (vec![change(&moved(400.0))], "not in the image", misfit),
         (
             vec![change(&|tag| tag.corners_px[3][1] = f64::NAN)],
             "not finite",
-            true,
+            Some(Reason::TooFewCorners),
         ),
         (
             vec![change(&|tag| tag.corners_px.rotate_left(1))],
             "do not fit",
-            true,
+            misfit,
         ),
     ] {
         let error = detector.look(&camera, &found).unwrap_err();
         let message = error.to_string();
         assert!(message.contains(words), "{message}");
-        assert_eq!(error.is_contradiction(), contradicts, "{message}");
+        assert_eq!(error.reason(), reason, "{message}");
     }
 }
 

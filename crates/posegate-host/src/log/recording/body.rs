@@ -3,6 +3,8 @@
 //! Entry point: [`BodyFrames`]. A frame without a known place is refused: its pose is not that of the robot.
 
 use super::transforms::{Pose, Transform};
+use posegate::report::PoseEstimate;
+use posegate::set::Uncertainty;
 use posegate::shape::{Pose3Deg, Scalar};
 use std::collections::BTreeMap;
 
@@ -169,6 +171,70 @@ impl BodyFrames {
     #[must_use]
     pub fn names(&self) -> Vec<&str> {
         self.known.keys().map(String::as_str).collect()
+    }
+}
+
+/// Returns the estimate of the base from a pose that was moved to it along a lever, metres: with the bound (translation in metres, yaw in
+/// radians) instead of its own uncertainty, if one is given, and with what the step adds to it ([`spread_of_base`]).
+pub(crate) fn of_base(
+    belief: &PoseEstimate,
+    bound: Option<[f64; 2]>,
+    lever_m: f64,
+    radius_squared: f64,
+) -> PoseEstimate {
+    let bound = bound.map(|[translation_m, yaw_rad]| Uncertainty::Bounded {
+        translation_m,
+        yaw_rad,
+    });
+    let spread = bound.or(belief.spread);
+    let spread = if lever_m > 0.0 {
+        spread.map(|spread| spread_of_base(spread, lever_m, radius_squared))
+    } else {
+        spread
+    };
+    PoseEstimate { spread, ..*belief }
+}
+
+/// Returns the uncertainty of the base from that of a frame at a distance from the base's vertical axis. `radius_squared` is that of
+/// the pose-set, with the source's inflation.
+///
+/// A bound grows by the chord of the largest turn. A covariance has the derivative of the step already; what the derivative leaves out
+/// is at most `lever yaw^2 / 2` with the largest turn of the set, and a disc of that size is added: a sum of ellipsoids lies in
+/// `(1 + k) A + (1 + 1 / k) B` for every k above 0.
+fn spread_of_base(spread: Uncertainty, lever_m: f64, radius_squared: f64) -> Uncertainty {
+    match spread {
+        Uncertainty::Bounded {
+            translation_m,
+            yaw_rad,
+        } => {
+            let turn = yaw_rad.min(core::f64::consts::PI);
+            Uncertainty::Bounded {
+                translation_m: translation_m + 2.0 * lever_m * libm::sin(0.5 * turn),
+                yaw_rad,
+            }
+        }
+        Uncertainty::Gaussian(mut rows) => {
+            let variance = rows[2][2];
+            let left_out = 0.5 * lever_m * radius_squared * variance;
+            let added = left_out * left_out / radius_squared;
+            let own = rows[0][0].min(rows[1][1]);
+            let best = libm::sqrt(added / own);
+            let share = if best > 0.0 && best.is_finite() {
+                best
+            } else {
+                1.0
+            };
+            // Without a turn, or without a valid covariance, nothing is added.
+            if added > 0.0 && added.is_finite() {
+                for entry in rows.as_flattened_mut() {
+                    *entry *= 1.0 + share;
+                }
+                for axis in [0, 1] {
+                    rows[axis][axis] += (1.0 + 1.0 / share) * added;
+                }
+            }
+            Uncertainty::Gaussian(rows)
+        }
     }
 }
 

@@ -284,7 +284,11 @@ impl Intake {
         })
     }
 
-    fn item(
+    /// Returns the item of a message: its pose is that of the robot's base, relative to the site's origin.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if it has the pose of a frame that is not known, or with too little of its covariance.
+    pub fn item(
         &mut self,
         topic: &str,
         mut message: Message,
@@ -399,7 +403,7 @@ fn shared(last: &mut Option<Arc<str>>, name: String) -> Arc<str> {
 }
 
 /// A covariance of x, y, z and the rotations about these axes.
-type Covariance = [[f64; 6]; 6];
+pub(super) type Covariance = [[f64; 6]; 6];
 
 /// Returns the pose of the base from that of a frame on the robot, its covariance by the derivative of this step, and the distance
 /// of the frame from the base's vertical axis, metres.

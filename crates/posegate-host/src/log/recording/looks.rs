@@ -2,16 +2,12 @@
 
 use super::{Detection, Exact, Sample};
 use crate::log::KnownTags;
-use crate::log::corners::{Fix, FixError, MountedCamera, TagObservation, locate_all};
+use crate::log::corners::{Fix, FixError, MountedCamera, TagObservation, is_ambiguous, locate_all};
 use posegate::gate::Reason;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// The widest valley of fits that counts as one pose, relative to its first-order covariance: that of
-/// [`locate`](crate::log::corners::locate).
-const WIDEST: f64 = 4.0;
 
 /// A camera and the tags that it may observe.
 #[derive(Clone, Debug)]
@@ -84,10 +80,7 @@ impl TagLocalizer {
             .collect();
         self.unknown += (found.len() - seen.len()) as u64;
         let found = locate_all(&self.camera, &seen, self.sigma_px, self.radius_squared);
-        let is_ambiguous = match &found {
-            Ok(fixes) => fixes.len() > 1 || fixes.iter().any(|fix| fix.grown > WIDEST),
-            Err(_) => false,
-        };
+        let is_ambiguous = found.as_ref().is_ok_and(|fixes| is_ambiguous(fixes));
         match &found {
             Ok(_) if is_ambiguous => *self.counts.entry(FixError::Ambiguous).or_default() += 1,
             Ok(_) => self.fixes += 1,
@@ -114,10 +107,7 @@ impl TagLocalizer {
                 ),
                 [] => (none, None, Some(Reason::CornersDoNotFit)),
             },
-            Err(FixError::NoTag) => return None,
-            Err(FixError::NotFinite) => (none, None, Some(Reason::TooFewCorners)),
-            Err(FixError::Ambiguous) => (none, None, Some(Reason::TagPosesAmbiguous)),
-            Err(FixError::NoPose | FixError::Misfit) => (none, None, Some(Reason::CornersDoNotFit)),
+            Err(error) => (none, None, Some(error.reason()?)),
         };
         Some(Sample {
             source,

@@ -27,6 +27,7 @@ pub use self::findings::Findings;
 pub use self::folder::{BAD_FOLDER, files_of};
 pub use self::intake::{Role, Wanted};
 pub use self::kind::{Format, format_of};
+pub use self::live::{LivePose, LivePoses, LiveTransform};
 pub use self::looks::TagLocalizer;
 pub use self::message::{Detection, Kind};
 pub use self::storage::{Bag, BagFile};
@@ -41,6 +42,7 @@ mod folder;
 mod intake;
 mod kind;
 mod layout;
+mod live;
 mod looks;
 mod mcap_file;
 mod message;
@@ -51,6 +53,7 @@ mod text;
 mod transforms;
 mod whole;
 
+pub(crate) use self::body::of_base;
 pub(crate) use self::intake::yaw_of;
 
 use super::LogError;

@@ -3,7 +3,8 @@
 //! A localization publishes the transform from the world frame to the odometry's frame (map to odom), the odometry
 //! that from its frame to the robot (odom to base_link). The pose at a time needs both. Like tf2's lookup at time 0,
 //! the composition is at the *latest common time*: the older one of the two newest stamps. If one of the transforms
-//! is no longer published, this time does not advance, so a gate gets no new estimates.
+//! is no longer published, this time does not advance, so a gate gets no new estimates. A localization without odometry publishes the
+//! transform from the world frame to the robot.
 
 use super::body::BASES;
 use std::collections::VecDeque;
@@ -201,17 +202,17 @@ impl Composer {
 
     /// Returns `true` if a transform is that of the odometry.
     pub fn is_odometry(&mut self, transform: &Transform) -> bool {
-        if !is_same(&transform.parent, &self.names.odometry) {
-            return false;
-        }
+        is_same(&transform.parent, &self.names.odometry) && self.is_base(&transform.child)
+    }
+
+    /// Returns `true` if a frame is the robot's. The first one that may be it is, if none was named.
+    fn is_base(&mut self, frame: &str) -> bool {
         if self.names.base.is_none() {
-            let found = BASES
-                .into_iter()
-                .find(|base| is_same(base, &transform.child));
+            let found = BASES.into_iter().find(|base| is_same(base, frame));
             self.names.base = found.map(Into::into);
         }
         let base = self.names.base.as_ref();
-        base.is_some_and(|base| is_same(base, &transform.child))
+        base.is_some_and(|base| is_same(base, frame))
     }
 
     /// Adds a transform. Returns the pose in the world and its time if it is newer than the one before.
@@ -222,6 +223,17 @@ impl Composer {
             && is_same(&transform.child, &self.names.odometry)
         {
             self.correction.push(transform.stamp_ns, transform.pose);
+        } else if is_same(&transform.parent, &self.names.world)
+            && self.odometry.newest_ns().is_none()
+            && self.is_base(&transform.child)
+        {
+            // A localization without odometry publishes the pose itself.
+            let (stamp_ns, pose) = (transform.stamp_ns, transform.pose);
+            let is_newer = self.given_ns.is_none_or(|given| stamp_ns > given);
+            return is_newer.then(|| {
+                self.given_ns = Some(stamp_ns);
+                (stamp_ns, pose)
+            });
         } else {
             return None;
         }

@@ -89,15 +89,15 @@ mod tally;
 mod timeline;
 
 use self::clock::{clock_of, now_ms, stamp_ms};
-use super::recording::{Findings, Sample, TruePose, yaw_of};
+use super::recording::{Findings, Sample, TruePose, of_base, yaw_of};
 use super::{Trajectory, TruthLookup};
-use crate::log::{clock_ms, factor};
+use crate::log::{clock_ms, factor, remembers};
 use posegate::contain::Margin;
 use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
 use posegate::set::InputError;
-use posegate::set::{Trust, Uncertainty};
+use posegate::set::Trust;
 use posegate::shape::SuccessSet;
 use posegate::track::{Tracker, TrackerSettings};
 use rayon::prelude::*;
@@ -304,22 +304,11 @@ impl<'a> Replay<'a> {
 
     /// Returns a pose of a sample with the uncertainty that the gate uses.
     fn spread(&self, belief: &PoseEstimate, sample: &Sample) -> PoseEstimate {
-        let mut belief = *belief;
-        if let Some([translation_m, yaw_rad]) = self.setup.bounded {
-            belief.spread = Some(Uncertainty::Bounded {
-                translation_m,
-                yaw_rad,
-            });
-        }
-        if sample.lever_m > 0.0 {
-            let trust = self.trust(sample);
-            let inflation = f64::from(trust.map_or(0, |trust| trust.inflation.q16())) / 65536.0;
-            let radius_squared = f64::from(self.judge.radius_squared().q16()) / 65536.0;
-            belief.spread = belief
-                .spread
-                .map(|spread| of_base(spread, sample.lever_m, radius_squared * inflation));
-        }
-        belief
+        let trust = self.trust(sample);
+        let inflation = f64::from(trust.map_or(0, |trust| trust.inflation.q16())) / 65536.0;
+        let radius_squared = f64::from(self.judge.radius_squared().q16()) / 65536.0;
+        let radius_squared = radius_squared * inflation;
+        of_base(belief, self.setup.bounded, sample.lever_m, radius_squared)
     }
 
     /// Returns the trust in a sample's source; `None` if the source is not known.
@@ -694,76 +683,6 @@ impl<'a> Replay<'a> {
     pub fn summary(&self) -> serde_json::Value {
         summary::summary(self)
     }
-}
-
-/// Returns the uncertainty of the base from that of a frame at a distance from the base's vertical axis. `radius_squared` is that of
-/// the pose-set, with the source's inflation.
-///
-/// A bound grows by the chord of the largest turn. A covariance has the derivative of the step already; what the derivative leaves out
-/// is at most `lever yaw^2 / 2` with the largest turn of the set, and a disc of that size is added: a sum of ellipsoids lies in
-/// `(1 + k) A + (1 + 1 / k) B` for every k above 0.
-fn of_base(spread: Uncertainty, lever_m: f64, radius_squared: f64) -> Uncertainty {
-    match spread {
-        Uncertainty::Bounded {
-            translation_m,
-            yaw_rad,
-        } => {
-            let turn = yaw_rad.min(core::f64::consts::PI);
-            Uncertainty::Bounded {
-                translation_m: translation_m + 2.0 * lever_m * libm::sin(0.5 * turn),
-                yaw_rad,
-            }
-        }
-        Uncertainty::Gaussian(mut rows) => {
-            let variance = rows[2][2];
-            let left_out = 0.5 * lever_m * radius_squared * variance;
-            let added = left_out * left_out / radius_squared;
-            let own = rows[0][0].min(rows[1][1]);
-            let best = libm::sqrt(added / own);
-            let share = if best > 0.0 && best.is_finite() {
-                best
-            } else {
-                1.0
-            };
-            // Without a turn, or without a valid covariance, nothing is added.
-            if added > 0.0 && added.is_finite() {
-                for entry in rows.as_flattened_mut() {
-                    *entry *= 1.0 + share;
-                }
-                for axis in [0, 1] {
-                    rows[axis][axis] += (1.0 + 1.0 / share) * added;
-                }
-            }
-            Uncertainty::Gaussian(rows)
-        }
-    }
-}
-
-/// Returns `true` if a reason of a gate's step may come from its memory, and not from the estimate. (Staleness is
-/// included: the gate's clock may not advance if a time is missing.)
-const fn remembers(reason: Reason) -> bool {
-    !matches!(
-        reason,
-        Reason::NotContained
-            | Reason::PoseSetTooLarge
-            | Reason::OutsideTable
-            | Reason::EstimateNotFinite
-            | Reason::EstimateOutOfRange
-            | Reason::CovarianceNotFinite
-            | Reason::CovarianceZero
-            | Reason::CovarianceNotSymmetric
-            | Reason::CovarianceNotPositiveDefinite
-            | Reason::CovarianceTooLarge
-            | Reason::CovarianceUnknown
-            | Reason::BoundInvalid
-            | Reason::OrientationInvalid
-            | Reason::Tilted
-            | Reason::FrameMismatch
-            | Reason::SourceUnknown
-            | Reason::TagPosesAmbiguous
-            | Reason::CornersDoNotFit
-            | Reason::TooFewCorners
-    )
 }
 
 /// Returns a verdict's margin.

@@ -121,3 +121,22 @@ fn invalid_numbers_stay_invalid() {
         assert!(!((size - 1.0).abs() < 0.1), "{pose:?}");
     }
 }
+
+/// A localization without odometry publishes the pose itself: each newer one counts once, and none does beside an odometry.
+#[test]
+fn transform_from_world_to_robot_is_the_pose() {
+    const DIRECT: [&str; 2] = ["map", "base_link"];
+    let mut composer = Composer::default();
+    let (time, pose) = composer
+        .add(&transform(1.0, DIRECT, [1.0, 2.0, 0.5]))
+        .unwrap();
+    assert_eq!(time, 1_000_000_000);
+    assert!(is_near(&pose, [1.0, 2.0, 0.5]), "{pose:?}");
+    assert_eq!(composer.add(&transform(1.0, DIRECT, [9.0; 3])), None);
+    assert_eq!(
+        composer.add(&transform(2.0, ["map", "camera"], [9.0; 3])),
+        None
+    );
+    composer.add(&transform(2.0, ODOMETRY, [0.0; 3]));
+    assert_eq!(composer.add(&transform(3.0, DIRECT, [9.0; 3])), None);
+}
