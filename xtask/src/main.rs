@@ -154,6 +154,12 @@ const JOBS: &[Job] = &[
         jobs::test::cases,
     ),
     job(
+        "field",
+        "DIR",
+        "files as people have them, and the right answers to each",
+        jobs::test::field,
+    ),
+    job(
         "recorded",
         "DIR",
         "recordings: replayed, learnt from, and compared with usual rules",

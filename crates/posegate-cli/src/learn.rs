@@ -10,6 +10,7 @@ use posegate_host::learn::{
 use serde_json::{Value, json};
 
 mod check;
+mod from_recording;
 mod survey;
 mod taken_with;
 
@@ -33,10 +34,10 @@ pub enum Command {
 /// independent rows. Without `run`, rows that follow each other at video rate by `t_s` are cut into runs at gaps.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0); run for rows that depend on each other, such as the frames of one approach; second_err_translation_m, second_err_yaw_rad for the other pose that fits the image, if the gate takes both. In a site file: [error_model.NAME] file = \"tags.toml\"."
+    after_help = "Example:\n  posegate learn bounds detections.csv --quantile 0.95 -o tags.toml\n  posegate predict tags.toml --at places.csv --json\n  posegate learn bounds drive.mcap --site site.toml --camera front --detections /detections --truth /mocap --quantile 0.95 -o tags.toml\n\nColumns: d_m, phi_deg, psi_deg, detected, err_translation_m, err_yaw_rad (the errors empty where detected is 0); run for rows that depend on each other, such as the frames of one approach; second_err_translation_m, second_err_yaw_rad for the other pose that fits the image, if the gate takes both. In a site file: [error_model.NAME] file = \"tags.toml\"."
 )]
 pub struct Bounds {
-    /// Views with the errors of their detections (CSV); `-` for standard input
+    /// Views with the errors of their detections (CSV), or a bag with detections and truth; `-` for standard input
     detections: Input,
     /// The share of the detections for which each bound must hold
     #[arg(long, allow_negative_numbers = true)]
@@ -52,6 +53,8 @@ pub struct Bounds {
     seed: u64,
     #[command(flatten)]
     taken_with: taken_with::Arguments,
+    #[command(flatten)]
+    recorded: from_recording::FromRecording,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -65,10 +68,10 @@ pub struct Bounds {
 /// each other and of the new one.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate learn inflation estimates.csv --epsilon 0.95 -o filter.toml\n  posegate predict filter.toml --at estimates.csv --json\n\nColumns: those of estimates, and true_x_m, true_y_m, true_yaw_rad; robot or run for estimates of several. Rows whose covariance is impossible are counted, named and left out."
+    after_help = "Example:\n  posegate learn inflation estimates.csv --epsilon 0.95 -o filter.toml\n  posegate predict filter.toml --at estimates.csv --json\n  posegate learn inflation drive.mcap --topic /amcl_pose --truth /mocap --epsilon 0.95 -o filter.toml\n\nColumns: those of estimates, and true_x_m, true_y_m, true_yaw_rad; robot or run for estimates of several. Rows whose covariance is impossible are counted, named and left out."
 )]
 pub struct Inflation {
-    /// Estimates with truth (CSV); `-` for standard input
+    /// Estimates with truth: CSV, or a bag; `-` for standard input
     estimates: Input,
     /// The probability with which a pose-set must contain the truth
     #[arg(long, allow_negative_numbers = true)]
@@ -86,6 +89,10 @@ pub struct Inflation {
     /// The column that defines the conditions; `log_det` for the covariance's size
     #[arg(long)]
     condition: Option<String>,
+    #[command(flatten)]
+    rig: from_recording::Rig,
+    #[command(flatten)]
+    recorded: from_recording::FromRecording,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -129,7 +136,8 @@ pub fn refused(error: LearnError) -> Failure {
     match &error {
         LearnError::TooFew { .. } => Failure::usage(
             error.to_string(),
-            "give more rows, or ask for a smaller share or a smaller --confidence",
+            "give more rows (of a longer recording or of more runs, if rows depend on each other), or ask for a smaller share or a smaller \
+             --confidence",
         ),
         LearnError::TooFewGroups { found, rows, .. } => Failure::usage(
             error.to_string(),
@@ -169,10 +177,20 @@ fn one_output(output: &Output, json: bool) -> Result<(), Failure> {
 
 fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
     one_output(&arguments.output, arguments.json)?;
-    let opened = files.open(&arguments.detections)?;
-    let detections =
-        Detections::draw(opened.reader, &opened.name, arguments.seed).map_err(refused)?;
-    let name = opened.name;
+    let rig = arguments.taken_with.rig();
+    let (detections, name) =
+        match from_recording::views(files, &arguments.detections, &arguments.recorded, rig)? {
+            Some((table, name)) => (
+                Detections::draw(table.as_slice(), &name, arguments.seed),
+                name,
+            ),
+            None => {
+                let opened = files.open(&arguments.detections)?;
+                let drawn = Detections::draw(opened.reader, &opened.name, arguments.seed);
+                (drawn, opened.name)
+            }
+        };
+    let detections = detections.map_err(refused)?;
     let settings = BoundsSettings {
         quantile: arguments.quantile,
         confidence: arguments.confidence,
@@ -275,7 +293,18 @@ fn print_model(model: &ErrorModel) -> Result<(), Failure> {
 
 fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
     one_output(&arguments.output, arguments.json)?;
-    let (bytes, name) = files.read(&arguments.estimates)?;
+    let from = &arguments.estimates;
+    let rig = arguments.rig.borrowed();
+    let (bytes, name) = match from_recording::estimates(
+        files,
+        from,
+        &arguments.recorded,
+        rig,
+        arguments.epsilon,
+    )? {
+        Some(table) => table,
+        None => files.read(from)?,
+    };
     let estimates =
         ScoredEstimates::read(&bytes, &name, arguments.condition.as_deref()).map_err(refused)?;
     let settings = InflationSettings {
@@ -288,9 +317,24 @@ fn inflation(arguments: &Inflation, files: &Files) -> Outcome {
         &arguments.output,
         model.write().map_err(refused)?.as_bytes(),
     )?;
-    if !estimates.timed {
+    if estimates.without_truth > 0 {
         warn(&format_args!(
-            "{name}: no column `t_s`: rows are taken to follow each other in the file's order"
+            "{name}: {} rows have no true pose and are left out",
+            estimates.without_truth
+        ));
+    }
+    if !estimates.timed {
+        let overall = model.overall();
+        let dependent = if overall.independent_rows * 2 < overall.rows {
+            format!(
+                ". They look dependent: {} rows count as {} independent ones",
+                overall.rows, overall.independent_rows
+            )
+        } else {
+            String::new()
+        };
+        warn(&format_args!(
+            "{name}: no column `t_s`: rows are taken to follow each other in the file's order{dependent}"
         ));
     }
     if let Some(first) = estimates.impossible.first() {

@@ -35,6 +35,7 @@ mod metrics;
 mod place;
 mod plan;
 mod predict;
+mod recording;
 mod replay;
 mod report;
 mod seal;

@@ -1,9 +1,7 @@
 //! `posegate replay`: runs a recording through the gate, and through the rules that are in use today.
 
 mod arguments;
-mod bag;
 mod inflation;
-mod input;
 mod odometry;
 mod outputs;
 mod words;
@@ -11,9 +9,9 @@ mod words;
 pub use self::arguments::Arguments;
 
 use self::inflation::Inflated;
-use self::input::Recorded;
 use self::outputs::Outputs;
 use self::words::{check_requested, check_topics, no_estimates, recording, sentences};
+use crate::recording::{Recorded, failure};
 use crate::site_input::{Failure, Outcome, answer, print_json, progress, site, task, warn};
 use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
@@ -36,13 +34,16 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
     let inflated = Inflated::of(arguments, files, radius.radius_squared())?;
-    let mut input = Recorded::open(arguments, files, &site, radius_squared, &inflated)?;
+    let reading = arguments.reading(&site);
+    let mut input = Recorded::open(&reading, files, radius_squared, |text, name| {
+        inflated.reads(text, name);
+    })?;
     let odometry = odometry::odometry(arguments, files, &site)?;
     let trust = arguments.trust(inflated.factors.inflation);
     // A fix that is carried along an odometry has the trust applied already.
     let carried = odometry.is_some();
     let mut source = Source::new(
-        &arguments.frame,
+        &arguments.recorded.frame,
         1.0,
         CrossTerms::Filled,
         arguments.motion()?,
@@ -52,7 +53,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         source.trust = trust;
         source.aging = inflated.factors.aging;
     }
-    let sources = vec![source; arguments.topic.len().max(1)];
+    let sources = vec![source; arguments.recorded.topic.len().max(1)];
     let task_digest = digest(arguments, &site, chosen);
     let settings = settings(arguments, task_digest, &sources);
     let setup = ReplayConfig {
@@ -60,7 +61,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         settings: &settings,
         success: &chosen.success,
         bounded: arguments.bounded(),
-        world: &arguments.frame,
+        world: &arguments.recorded.frame,
         clock: arguments.clock(input.clock),
         thresholds: arguments.thresholds(),
         examined: !arguments.fast,
@@ -88,7 +89,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     played.map_err(play_failure)?;
     let diagnostics = input.recording.diagnostics();
     let [permits, estimates] = replay.permits();
-    if !arguments.topic.is_empty() {
+    if !arguments.recorded.topic.is_empty() {
         check_topics(arguments, diagnostics)?;
     }
     if estimates == 0 {
@@ -101,7 +102,15 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             input.name
         ));
     }
-    let summary = summary(arguments, &input, &inflated, &replay);
+    let mut summary = summary(arguments, &input, &inflated, &replay);
+    if let Some([rows, left_out]) = outputs.table() {
+        summary["csv"] = json!({"rows": rows, "left_out": left_out});
+        if left_out > 0 {
+            warn(&format_args!(
+                "{left_out} of {estimates} estimates are not in the table: in another frame, without a covariance, or two poses fit"
+            ));
+        }
+    }
     outputs.finish(&summary)?;
     if let Some(output) = &arguments.output {
         let title = format!(
@@ -126,7 +135,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
 
 /// Returns how many of the results that are files go to standard output.
 fn results_on_stdout(arguments: &Arguments) -> usize {
-    let outputs = [&arguments.rows, &arguments.output].into_iter().flatten();
+    let outputs = [&arguments.rows, &arguments.csv, &arguments.output]
+        .into_iter()
+        .flatten();
     outputs.filter(|output| output.is_standard()).count()
 }
 
@@ -256,7 +267,7 @@ fn table(
 
 fn play_failure(error: PlayError<Failure>) -> Failure {
     match error {
-        PlayError::Recording(error) => bag::failure(error),
+        PlayError::Recording(error) => failure(error),
         PlayError::NoCamera => Failure::usage(
             "detections need a camera: the site has none, or several".into(),
             "name it: --camera front",

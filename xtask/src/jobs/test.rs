@@ -172,6 +172,14 @@ pub fn cases(given: &Arguments) -> Result {
         .run()
 }
 
+/// Compares with the right answers to files as people have them, and runs the tests of these kinds on own inputs.
+pub fn field(given: &Arguments) -> Result {
+    let folder = given.folder(0, "the folder of the files as people have them")?;
+    suite("--test field -- --include-ignored --nocapture")
+        .env("POSEGATE_FIELD", folder)
+        .run()
+}
+
 /// Tries hostile files: single-bit flips of a bag, and mutants of good files of every format, each in a separate process. Fails at
 /// an abort, a panic, another exit code than 0 to 3, more than 512 MiB or more than 20 s of processor time. With POSEGATE_RECORDED,
 /// the folder of the recordings, the flips are of its bag of Nav2; without, of a synthetic one.

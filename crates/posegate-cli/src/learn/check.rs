@@ -1,7 +1,7 @@
 //! `posegate learn check`: tests whether a learnt model still holds on new data.
 
-use super::{refused, warn_of_cut_runs};
-use crate::site_input::{Failure, Outcome, answer, print, print_json};
+use super::{from_recording, refused, warn_of_cut_runs};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
 use posegate_host::files::{Files, Input};
 use posegate_host::learn::{
     BoundCheck, Change, CheckReport, CheckSettings, Detections, Model, RegionCheck, check_bounds,
@@ -22,11 +22,15 @@ use serde_json::{Value, json};
 pub struct Check {
     /// The model that `posegate learn bounds` wrote
     model: Input,
-    /// New views with the errors of their detections (CSV); `-` for standard input
+    /// New views with the errors of their detections: CSV, or a bag; `-` for standard input
     detections: Input,
     /// The probability with which a model that holds is never contradicted
     #[arg(long, default_value_t = CheckSettings::default().confidence, allow_negative_numbers = true)]
     confidence: f64,
+    #[command(flatten)]
+    rig: from_recording::Rig,
+    #[command(flatten)]
+    recorded: from_recording::FromRecording,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -40,15 +44,28 @@ pub fn run(arguments: &Check, files: &Files) -> Outcome {
             "give a model that `posegate learn bounds` wrote; learn the factors of a filter again with `posegate learn inflation`",
         ));
     };
-    let (bytes, name) = files.read(&arguments.detections)?;
+    let from = &arguments.detections;
+    let rig = arguments.rig.borrowed();
+    let (bytes, name) = match from_recording::views(files, from, &arguments.recorded, rig)? {
+        Some(table) => table,
+        None => files.read(from)?,
+    };
     let detections = Detections::read(&bytes, &name).map_err(refused)?;
     warn_of_cut_runs(&detections.runs, &name);
+    let is_same = model.is_of(&detections.sha256);
+    if is_same {
+        warn(&format_args!(
+            "{name}: the model was learnt from these data, so the check says nothing: give data that were recorded later"
+        ));
+    }
     let settings = CheckSettings {
         confidence: arguments.confidence,
     };
     let found = check_bounds(&model, &detections, &settings).map_err(refused)?;
     if arguments.json {
-        print_json(&report_json(&found, arguments.confidence))?;
+        let mut report = report_json(&found, arguments.confidence);
+        report["same_data"] = json!(is_same);
+        print_json(&report)?;
     } else {
         print_report(&found, model.quantile())?;
     }

@@ -29,6 +29,11 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    /// Returns the site and the camera.
+    pub fn rig(&self) -> (Option<&Input>, Option<&str>) {
+        (self.site.as_ref(), self.camera.as_deref())
+    }
+
     /// Returns what the detections were taken with, or `None` if nothing is stated.
     pub fn described(&self, files: &Files) -> Result<Option<TakenWith>, Failure> {
         let mut taken = match (&self.camera, &self.site) {

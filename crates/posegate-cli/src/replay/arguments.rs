@@ -1,12 +1,16 @@
 //! The arguments of `posegate replay`.
 
 use crate::gate::motion;
+use crate::recording::{Options, Reading};
 use crate::site_input::Failure;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate_host::files::{Input, Output};
-use posegate_host::log::recording::FrameNames;
 use posegate_host::log::replay::{Clock, Thresholds};
+use posegate_host::site::Site;
+
+/// The largest number of true poses of a topic that are kept.
+const MOST_TRUE: usize = 1 << 17;
 
 /// Replays a recording through the gate: what the gate would have permitted, and which permits were
 /// false
@@ -26,19 +30,8 @@ pub struct Arguments {
     /// The task
     #[arg(long)]
     pub task: String,
-    /// A topic with estimates (of a bag): PoseWithCovarianceStamped, Odometry, PoseStamped, AprilTagDetectionArray, or TFMessage (map to odom
-    /// composed with odom to the robot; it has no covariance: --set bounded); may be repeated
-    #[arg(long)]
-    pub topic: Vec<String>,
-    /// The truth: a file of TUM, EuRoC or KITTI (--times), a CSV (t_s, x_m, y_m, yaw_rad), or a topic of the bag
-    #[arg(long)]
-    pub truth: Option<Input>,
-    /// The times of a KITTI trajectory, as the truth or as the recording: one in each line, seconds
-    #[arg(long, value_name = "FILE")]
-    pub times: Option<Input>,
-    /// Longest time between two true poses across which the truth is interpolated, seconds
-    #[arg(long, default_value_t = 0.2)]
-    pub truth_gap: f64,
+    #[command(flatten)]
+    pub recorded: Options,
     /// A table of the task; without this option a table is built from the site, and proven
     #[arg(long, conflicts_with = "epsilon")]
     pub table: Option<Input>,
@@ -64,29 +57,10 @@ pub struct Arguments {
     /// Bounded sets: largest error of the heading, degrees
     #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
     pub yaw_deg: Option<f64>,
-    /// The world frame's name; estimates in another frame are denied
-    #[arg(long, default_value = "map")]
-    pub frame: String,
-    /// The odometry's frame in /tf
-    #[arg(long, default_value = "odom")]
-    pub odom_frame: String,
-    /// The robot's frame in /tf [default: base_link or base_footprint, whichever is the child of the odometry's frame]
-    #[arg(long)]
-    pub base_frame: Option<String>,
-    /// The frame whose poses are recorded, if it is not the robot's base; may be repeated. At its place in the site ([frame.NAME]) or in the
-    /// bag's /tf_static, else it counts as the base. Also for types without a child frame: the pose of a camera
-    #[arg(long, value_name = "NAME")]
-    pub child_frame: Vec<String>,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
     /// else log times, unless nearly all stamps are of another clock
     #[arg(long, value_enum, default_value = "auto")]
     pub clock: ClockName,
-    /// Use only estimates stamped at this time or later, seconds
-    #[arg(long, allow_negative_numbers = true)]
-    pub from: Option<f64>,
-    /// Use only estimates stamped at this time or earlier, seconds
-    #[arg(long, allow_negative_numbers = true)]
-    pub to: Option<f64>,
     /// Carry each fix forward along an odometry, as a controller would: a topic (nav_msgs/msg/Odometry, or /tf), or a file (CSV with t_s,
     /// x_m, y_m, yaw_rad, or TUM)
     #[arg(long, value_name = "TOPIC|FILE")]
@@ -137,9 +111,6 @@ pub struct Arguments {
     /// The camera whose detections are read; required if the site has several
     #[arg(long)]
     pub camera: Option<String>,
-    /// Standard deviation of a corner's coordinates in the image, pixels
-    #[arg(long, default_value_t = 0.3, allow_negative_numbers = true)]
-    pub sigma_px: f64,
     /// Limit of the rule `distance`, metres
     #[arg(long, default_value_t = 0.05)]
     pub distance: f64,
@@ -170,6 +141,10 @@ pub struct Arguments {
     /// Write one line of JSON per estimate; `-` for standard output
     #[arg(long)]
     pub rows: Option<Output>,
+    /// Write the estimates in the world frame that have a covariance, with the true poses where they are known, as `posegate learn`
+    /// reads them (CSV); `-` for standard output
+    #[arg(long)]
+    pub csv: Option<Output>,
     /// Write a picture (SVG): the gate, the interlock with its reasons and the rules in use today over time, and the Stanford diagram if the
     /// truth is known
     #[arg(short, long)]
@@ -234,12 +209,18 @@ impl Arguments {
         }
     }
 
-    /// Returns the frames of which poses are composed.
-    pub fn frames(&self) -> FrameNames {
-        FrameNames {
-            world: self.frame.clone(),
-            odometry: self.odom_frame.clone(),
-            base: self.base_frame.clone(),
+    /// Returns how the recording is read.
+    pub fn reading<'a>(&'a self, site: &'a Site) -> Reading<'a> {
+        let is_gaussian = self.set == Kind::Gaussian;
+        Reading {
+            log: &self.log,
+            options: &self.recorded,
+            topics: self.recorded.topic.clone(),
+            camera: self.camera.as_deref(),
+            site,
+            is_gaussian,
+            is_partial: is_gaussian && self.cross_terms != Terms::Filled,
+            most_true: MOST_TRUE,
         }
     }
 
@@ -280,15 +261,7 @@ impl Arguments {
                 ));
             }
         }
-        for (name, value) in [("--from", self.from), ("--to", self.to)] {
-            if value.is_some_and(f64::is_nan) {
-                return Err(Failure::usage(
-                    format!("{name} is not a time"),
-                    "give seconds, as in the stamps",
-                ));
-            }
-        }
-        Ok(())
+        self.recorded.check()
     }
 
     /// Returns the gate's clock; `defined` is the clock that the recording's format defines.

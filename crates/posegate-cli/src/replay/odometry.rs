@@ -1,7 +1,7 @@
 //! The odometry of a replay: a topic of the recording, or a file.
 
-use super::input::topics;
-use super::{Arguments, bag};
+use super::Arguments;
+use crate::recording::{body, failure, open, topics};
 use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
@@ -67,13 +67,13 @@ fn of_topic(
     files: &Files,
     site: &Site,
 ) -> Result<Vec<OdometryPose>, Failure> {
-    if arguments.topic.is_empty() {
+    if arguments.recorded.topic.is_empty() {
         return Err(Failure::usage(
             format!("--odom {topic}: there is no such file"),
             "give a TUM file or a CSV; topics are those of bags",
         ));
     }
-    if arguments.topic.iter().any(|known| known == topic) {
+    if arguments.recorded.topic.iter().any(|known| known == topic) {
         return Err(Failure::usage(
             format!("--odom {topic} is a topic of estimates too"),
             "name the topic of the odometry",
@@ -83,10 +83,11 @@ fn of_topic(
         topic: topic.to_string(),
         role: Role::Odometry,
     }];
-    let body = bag::body(arguments, files, site, &wanted)?;
-    let mut bag = bag::open(arguments, files, &wanted)?.with_body(body);
+    let reading = arguments.reading(site);
+    let body = body(&reading, files, &wanted)?;
+    let mut bag = open(&reading, files, &wanted)?.with_body(body);
     let mut poses = Vec::new();
-    while let Some(item) = bag.next().map_err(bag::failure)? {
+    while let Some(item) = bag.next().map_err(failure)? {
         if let Item::Truth(pose) = item {
             poses.push((pose.t_s, pose.level()));
         }
@@ -155,7 +156,7 @@ pub fn no_edge(of: &str, diagnostics: &ReaderDiagnostics, arguments: &Arguments)
         world,
         odometry,
         base,
-    } = arguments.frames();
+    } = arguments.recorded.frames();
     let base = base.unwrap_or_else(|| "base_link or base_footprint".into());
     Failure::list(
         &format!("{of} no pose of the robot, only the transforms{edges}"),

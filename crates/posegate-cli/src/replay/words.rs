@@ -1,8 +1,8 @@
 //! The texts that report a replay.
 
 use super::Arguments;
-use super::input::{Recorded, topics};
 use super::odometry::no_edge;
+use crate::recording::{Recorded, topics};
 use crate::site_input::{Failure, print};
 use posegate::gate::Reason;
 use posegate_host::log::Trajectory;
@@ -64,6 +64,7 @@ pub fn check_topics(arguments: &Arguments, diagnostics: &ReaderDiagnostics) -> R
         diagnostics.read.contains_key(topic) || diagnostics.skipped.contains_key(topic)
     };
     let missing: String = arguments
+        .recorded
         .topic
         .iter()
         .filter(|topic| !is_there(topic))
@@ -91,6 +92,7 @@ pub fn check_requested(
 ) -> Result<(), Failure> {
     let [(_, verdicts), ..] = replay.tallies();
     let Some(truth) = arguments
+        .recorded
         .truth
         .as_ref()
         .filter(|_| verdicts.with_truth == 0)

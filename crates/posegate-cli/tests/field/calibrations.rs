@@ -219,3 +219,11 @@ fn border_of(warning: &Value) -> f64 {
         .expect("a border");
     words[at + 2].parse().expect("pixels")
 }
+
+/// EuRoC's `sensor.yaml`: Kalibr's keys of one camera, without a camchain.
+#[test]
+fn sensor_file_of_one_camera_is_read() {
+    is_read(
+        "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [458.5, 457.5, 322.0, 238.0] #fu, fv, cu, cv\ndistortion_model: radial-tangential\ndistortion_coefficients: [-0.1, 0.02, 0.0002, 0.00002]\n",
+    );
+}

@@ -5,6 +5,8 @@ mod calibrations;
 mod child_frames;
 mod detections;
 mod docks;
+mod folder;
+mod learning;
 mod origins;
 mod rounds;
 mod run;

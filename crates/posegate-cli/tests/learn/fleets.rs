@@ -15,6 +15,7 @@ fn fleet(robots: u32, rows: u32, spread: f64, seed: u64) -> ScoredEstimates {
     let mut estimates = ScoredEstimates {
         rows: Vec::new(),
         impossible: Vec::new(),
+        without_truth: 0,
         condition: "log_det".into(),
         timed: true,
         groups: (0..robots)

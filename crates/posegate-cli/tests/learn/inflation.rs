@@ -33,6 +33,7 @@ pub fn estimates(runs: u32, seed: u64) -> ScoredEstimates {
     ScoredEstimates {
         rows,
         impossible: vec![7],
+        without_truth: 0,
         condition: "since_fix_s".into(),
         timed: true,
         groups: Vec::new(),
@@ -140,6 +141,7 @@ fn under(conditions: &[(f64, f64, usize)], name: &str) -> ScoredEstimates {
     ScoredEstimates {
         rows,
         impossible: Vec::new(),
+        without_truth: 0,
         condition: name.into(),
         timed: true,
         groups: Vec::new(),
@@ -244,5 +246,59 @@ fn inconsistent_model_file_is_refused() {
         let changed = text.replacen(from, to, 1);
         assert_ne!(changed, text);
         assert!(InflationModel::parse(&changed, "m.toml").is_err(), "{to}");
+    }
+}
+
+/// Returns estimates of one drive, whose errors have this correlation from row to row, with a covariance that is 4 times too small.
+fn drive(rows: usize, correlation: f64, seed: u64) -> ScoredEstimates {
+    let mut random = Random(seed);
+    let mut error = [0.0; 3].map(|_: f64| random.normal());
+    let mut estimates = under(&[(0.0, 1.0, rows)], "since_fix_s");
+    for row in &mut estimates.rows {
+        for e in &mut error {
+            *e = correlation * *e + (1.0 - correlation * correlation).sqrt() * random.normal();
+        }
+        row.squared_distance = 4.0 * error.iter().map(|e| e * e).sum::<f64>();
+        row.run = 0;
+    }
+    estimates
+}
+
+/// The promise holds for dependent rows: of 80 recordings at most 20 % give a factor that is too small, or none is given.
+#[test]
+fn factors_of_dependent_rows_are_large_enough_or_refused() {
+    for (correlation, rows) in [
+        (0.9, 500),
+        (0.98, 500),
+        (0.99, 500),
+        (0.99, 2000),
+        (0.0, 500),
+    ] {
+        for epsilon in [0.8, 0.9, 0.95] {
+            let settings = InflationSettings {
+                epsilon,
+                ..InflationSettings::default()
+            };
+            let factors = (0..80).map(|seed| {
+                let estimates = drive(rows, correlation, 7919 * seed + 1);
+                let model = learn_inflation(&estimates, &settings).ok()?;
+                Some(model.overall().inflation)
+            });
+            let factors: Vec<f64> = factors.flatten().collect();
+            let small = factors.iter().filter(|factor| **factor < 4.0).count();
+            println!(
+                "{correlation} {rows} {epsilon}: {small} of {} are too small",
+                factors.len()
+            );
+            assert!(small <= 16, "{correlation} {epsilon}: {small}");
+            // Independent rows are enough, and those with a short memory mostly.
+            if correlation <= 0.9 {
+                assert!(
+                    factors.len() >= 60,
+                    "{correlation} {epsilon}: {}",
+                    factors.len()
+                );
+            }
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::LearnError;
 use super::axis::PARTS;
 use super::binomial::clopper_pearson;
 use super::cells::{Cells, flat, numbered};
+use super::detections::hexadecimal;
 use super::document::{self, Document};
 use super::family::Family;
 use super::smooth::{Lattice, between};
@@ -245,6 +246,12 @@ impl ErrorModel {
     pub fn counts(&self) -> (u64, u64, f64) {
         let data = &self.document.data;
         (data.views, data.detections, data.flip_share)
+    }
+
+    /// Returns `true` if the model was learnt from the file with this SHA-256.
+    #[must_use]
+    pub fn is_of(&self, sha256: &[u8; 32]) -> bool {
+        self.document.data.sha256 == hexadecimal(sha256)
     }
 
     /// Returns `true` if the bounds are for the better one of the two poses that fit a tag's image, instead of the

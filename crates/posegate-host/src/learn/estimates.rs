@@ -43,6 +43,8 @@ pub struct ScoredEstimates {
     pub rows: Vec<Scored>,
     /// The lines of rows with an impossible covariance, or with a condition that is not finite.
     pub impossible: Vec<u64>,
+    /// The number of rows without a true pose (three empty fields), which are left out.
+    pub without_truth: u64,
     /// The column of the condition; `log_det` for the logarithm of the covariance's determinant.
     pub condition: String,
     /// `true` if the file has times, `t_s`.
@@ -61,7 +63,7 @@ pub(super) const LOG_DET: &str = "log_det";
 impl ScoredEstimates {
     /// Reads `x_m, y_m, yaw_rad, cov_xx, cov_xy, cov_xyaw, cov_yy, cov_yyaw, cov_yawyaw, true_x_m, true_y_m,
     /// true_yaw_rad`. The condition is the named column, else the first one with a name `since_..._s`, else the
-    /// covariance's size. Rows with the same names in the columns `robot`, `source` and `run` are a run, in the order of
+    /// covariance's size. Rows without a true pose are left out. Rows with the same names in the columns `robot`, `source` and `run` are a run, in the order of
     /// `t_s`. The groups are the robots, or else the runs.
     ///
     /// # Errors
@@ -86,6 +88,7 @@ impl ScoredEstimates {
         let mut found = Self {
             rows: Vec::new(),
             impossible: Vec::new(),
+            without_truth: 0,
             condition,
             timed: time.is_some(),
             groups: Vec::new(),
@@ -95,6 +98,11 @@ impl ScoredEstimates {
         let mut scored: Vec<([String; 3], f64, Scored)> = Vec::new();
         let mut groups: BTreeMap<String, u32> = BTreeMap::new();
         while let Some(line) = sheet.line()? {
+            let [_, _, _, truth @ ..] = poses;
+            if truth.iter().all(|column| line.text(*column).is_empty()) {
+                found.without_truth += 1;
+                continue;
+            }
             let what = "a number in metres or radians";
             let at = each(poses, |column| line.number(column, |_| true, what))?;
             let matrix = covariance_of(&line, covariance)?;
@@ -143,7 +151,7 @@ impl ScoredEstimates {
                 ..scored[index].2
             });
         }
-        if found.rows.is_empty() && found.impossible.is_empty() {
+        if found.rows.is_empty() && found.impossible.is_empty() && found.without_truth == 0 {
             return Err(LearnError::Empty {
                 file: file.to_owned(),
             });

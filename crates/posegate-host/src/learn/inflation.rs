@@ -6,6 +6,7 @@ use super::detections::hexadecimal;
 use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
 use super::groups::{self, GroupReport, for_a_new_group, own_factor};
+use super::memory::{FEWEST_BLOCKS, memory};
 use super::student::normal_quantile;
 use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
@@ -17,8 +18,8 @@ const MOST: usize = 6;
 const ROOMY: f64 = 1.5;
 /// The fewest independent rows for any result.
 const FEWEST: f64 = 10.0;
-/// The fewest blocks of consecutive rows for estimating the dependence of rows.
-const FEWEST_BLOCKS: usize = 20;
+/// Blocks of rows show the dependence of all rows if the data are at least this many times as long as their memory.
+const LONG: f64 = 60.0;
 /// If all rows have the same condition, other values within this tolerance count as equal: a difference for the
 /// logarithm of a determinant, a share for any other condition.
 const EQUAL_WITHIN: f64 = 0.01;
@@ -323,7 +324,7 @@ impl Scores<'_> {
         let n = factors.len() as u64;
         let needed =
             order_statistic(&factors, conformal_rank(n, epsilon).unwrap_or(n)).unwrap_or(0.0);
-        let independent = independent(rows, &mine, needed);
+        let independent = self.independent(&mine, needed);
         let margin = self.margin(independent);
         let nth = |share: f64| libm::ceil(share * n as f64 - 1e-9) as u64;
         let upper = self.upper_rank(n, independent);
@@ -350,6 +351,26 @@ impl Scores<'_> {
             needed,
             low: at(lower).unwrap_or(0.0),
             inflation,
+        }
+    }
+
+    /// Returns the number of independent rows among `mine`, for the share of rows beyond a factor. Blocks cannot show a dependence
+    /// that lasts longer than they do: if there are few runs, and the data are short compared with their memory, each memory
+    /// counts as one row. (A factor for a new group relies on the groups instead.)
+    fn independent(&self, mine: &[(usize, f64)], factor: f64) -> u64 {
+        let (independent, is_short) = independent(self.rows, mine, factor);
+        if self.groups > 0 || !is_short {
+            return independent;
+        }
+        let of_runs: Vec<(u32, f64)> = mine
+            .iter()
+            .map(|(index, score)| (self.rows[*index].run, *score))
+            .collect();
+        let memories = mine.len() as f64 / memory(&of_runs);
+        if memories < LONG {
+            independent.min(memories as u64)
+        } else {
+            independent
         }
     }
 
@@ -386,7 +407,7 @@ impl Scores<'_> {
         let of_group = |mine: &Vec<(usize, f64)>| {
             let scores: Vec<f64> = mine.iter().map(|(_, score)| *score).collect();
             let least = own_factor(&scores, self.epsilon);
-            let independent = independent(self.rows, mine, least);
+            let (independent, _) = independent(self.rows, mine, least);
             let upper = self.upper_rank(scores.len() as u64, independent);
             let upper = upper.and_then(|rank| order_statistic(&scores, rank));
             upper.map_or(least, |upper| upper.max(least))
@@ -454,15 +475,15 @@ impl Scores<'_> {
 
 /// Returns the number of independent rows with the same information on the share of rows beyond a factor. It is the
 /// number of rows divided by a variance ratio: that of sums over blocks of consecutive rows to that of independent
-/// rows, for the block length with the largest ratio.
-fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> u64 {
+/// rows, for the block length with the largest ratio. Also returns `true` if longer blocks would be too few.
+fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> (u64, bool) {
     let n = mine.len() as f64;
     let beyond = mine.iter().filter(|(_, score)| *score >= factor).count() as f64;
     let share = beyond / n;
     if mine.is_empty() || share >= 1.0 {
-        return mine.len() as u64;
+        return (mine.len() as u64, false);
     }
-    let mut effect = 1.0f64;
+    let (mut effect, mut is_short) = (1.0f64, false);
     let lengths = core::iter::successors(Some(1usize), |length| length.checked_mul(2));
     for length in lengths.take_while(|length| *length < 2 * rows.len()) {
         let (mut blocks, mut sum) = (0usize, 0.0);
@@ -479,12 +500,13 @@ fn independent(rows: &[Scored], mine: &[(usize, f64)], factor: f64) -> u64 {
         }
         sum += off * off;
         if blocks < FEWEST_BLOCKS {
+            is_short = true;
             break;
         }
         let spread = sum * blocks as f64 / (blocks - 1) as f64;
         effect = effect.max(spread / (n * share * (1.0 - share)));
     }
-    libm::floor(n / effect) as u64
+    (libm::floor(n / effect) as u64, is_short)
 }
 
 impl InflationModel {

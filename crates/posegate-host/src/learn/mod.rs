@@ -38,6 +38,7 @@ mod fisher;
 mod groups;
 mod inflation;
 mod kind;
+mod memory;
 mod model_file;
 mod outcomes;
 mod random;

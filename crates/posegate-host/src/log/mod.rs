@@ -19,6 +19,7 @@ pub mod detector;
 pub mod metrics;
 pub mod recording;
 pub mod replay;
+pub mod tables;
 pub mod trajectories;
 pub mod tum;
 

@@ -20,6 +20,7 @@ fn model(conditions: &[(f64, f64)], name: &str) -> InflationModel {
     let estimates = ScoredEstimates {
         rows,
         impossible: Vec::new(),
+        without_truth: 0,
         condition: name.into(),
         timed: true,
         groups: Vec::new(),

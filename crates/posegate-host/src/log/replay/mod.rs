@@ -89,14 +89,13 @@ mod tally;
 mod timeline;
 
 use self::clock::{clock_of, now_ms, stamp_ms};
-use super::recording::{Findings, Sample, TruePose, of_base, yaw_of};
+use super::recording::{Findings, Sample, TruePose, of_base};
 use super::{Trajectory, TruthLookup};
 use crate::log::{clock_ms, factor, remembers};
 use posegate::contain::Margin;
 use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
-use posegate::report::{FrameId, Heading, PoseEstimate, Report};
-use posegate::set::InputError;
+use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::Trust;
 use posegate::shape::SuccessSet;
 use posegate::track::{Tracker, TrackerSettings};
@@ -217,20 +216,8 @@ impl<'a> Replay<'a> {
     /// Adds a true pose. A pose in another frame, or with an orientation that the gate would refuse in an estimate, is
     /// refused and counted.
     pub fn truth(&mut self, pose: &TruePose) {
-        let Some(track) = &mut self.track else {
-            return;
-        };
-        if FrameId::of(&pose.frame) != self.world {
-            self.refused.other_frame += 1;
-            return;
-        }
-        match Heading::Quaternion(pose.orientation).angle() {
-            Err(InputError::OrientationInvalid) => self.refused.not_unit += 1,
-            Err(InputError::Tilted) => self.refused.tilted += 1,
-            _ => {
-                let [x, y, _] = pose.position;
-                track.push(pose.t_s, [x, y, yaw_of(pose.orientation)]);
-            }
+        if let Some(track) = &mut self.track {
+            self.refused.push(pose, self.world, track);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::margin_of;
 use crate::log::recording::Sample;
+use crate::log::tables::estimate_row;
 use crate::log::{coordinates, recording::yaw_of};
 use posegate::gate::{Reason, State, Verdict};
 use posegate::report::{Heading, PoseEstimate};
@@ -36,6 +37,8 @@ pub struct Row {
     pub possible: bool,
     /// The verdict on this estimate alone.
     pub verdict: Verdict,
+    /// `true` if two poses fit the image that the estimate is from.
+    pub is_ambiguous: bool,
     /// `true` if the margin was computed.
     pub examined: bool,
     /// `true` if the gate is open after the estimate.
@@ -96,6 +99,7 @@ impl Row {
             in_world: false,
             possible: false,
             verdict,
+            is_ambiguous: sample.is_ambiguous,
             examined: true,
             permitted: false,
             state: State::Inhibited(Reason::Silent),
@@ -132,6 +136,16 @@ impl Row {
             Verdict::Permit { .. } => None,
             Verdict::Deny { reason, .. } => Some(reason),
         }
+    }
+
+    /// Returns the estimate as a row of a table for `learn` ([`ESTIMATES`](crate::log::tables::ESTIMATES)). `None` if it is in another frame,
+    /// has no covariance, or if two poses fit.
+    #[must_use]
+    pub fn table_row(&self) -> Option<String> {
+        let is_usable = self.in_world && !self.is_ambiguous;
+        is_usable
+            .then(|| estimate_row(self.t_s, self.pose, self.recorded, self.truth))
+            .flatten()
     }
 
     /// Returns the row as `posegate gate` prints it, with the additional results of a replay.

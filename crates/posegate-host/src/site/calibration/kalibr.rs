@@ -1,9 +1,10 @@
-//! Kalibr's camchain, and those of OpenVINS and TagSLAM: several cameras in one file.
+//! Kalibr's camchain, and those of OpenVINS and TagSLAM: several cameras in one file. EuRoC's `sensor.yaml`: the same keys of one camera.
 
-use super::{Numbers, ParsedCalibration, lens_of_file};
+use super::{ParsedCalibration, lens_of_file};
 use crate::site::error::SiteError;
 use crate::site::suggest;
 use crate::site::yaml::{Document, Map, Node};
+use std::ops::Range;
 
 const AS_SAVED: &str = "copy the camchain again as Kalibr saved it";
 
@@ -32,19 +33,32 @@ pub(super) fn read(
             .expected(format!("one of {}", names()))
             .help("write `calibration = \"FILE#cam0\"`"));
     };
-    of_camera(document, name, camera)
+    of_camera(document, name, document.map(camera)?, camera.at.clone())
+}
+
+/// Returns `true` if the file has the keys of one camera.
+pub(super) fn is_of(keys: Map<'_>) -> bool {
+    keys.get("intrinsics").is_some() && keys.get("camera_model").is_some()
+}
+
+/// Reads a file with the keys of one camera.
+pub(super) fn read_one(
+    document: &Document<'_>,
+    keys: Map<'_>,
+) -> Result<ParsedCalibration, SiteError> {
+    of_camera(document, "the file", keys, 0..0)
 }
 
 fn of_camera(
     document: &Document<'_>,
     name: &str,
-    camera: &Node,
+    keys: Map<'_>,
+    at: Range<usize>,
 ) -> Result<ParsedCalibration, SiteError> {
-    let keys = document.map(camera)?;
     let required = |key: &str| {
         document.required(
             keys.get(key),
-            camera.at.clone(),
+            at.clone(),
             &format!("{name}.{key}"),
             AS_SAVED,
         )
@@ -77,19 +91,15 @@ fn of_camera(
     let model = required("distortion_model")?;
     let list = match document.text(model)? {
         "none" => None,
-        _ => Some(required("distortion_coeffs")?),
+        // EuRoC's name.
+        _ => Some(match keys.get("distortion_coefficients") {
+            Some(list) => list,
+            None => required("distortion_coeffs")?,
+        }),
     };
     let lens = lens_of_file(document, Some(model), list, "distortion_coeffs", &mut notes)?;
-    Ok(ParsedCalibration {
-        size_at: resolution.at.clone(),
-        numbers: Numbers {
-            size_px,
-            focal_px: [fx, fy],
-            axis_px: [cx, cy],
-            lens,
-            rect: [fx, fy, cx, cy],
-            notes,
-            ..Numbers::default()
-        },
-    })
+    let mut parsed =
+        ParsedCalibration::of_raw(resolution.at.clone(), size_px, [fx, fy, cx, cy], lens);
+    parsed.numbers.notes = notes;
+    Ok(parsed)
 }

@@ -105,6 +105,8 @@ pub(super) fn read(
     let keys = document.map(&root)?;
     let mut numbers = if keys.keys().any(is_camera) {
         kalibr::read(&document, keys, camera)?
+    } else if kalibr::is_of(keys) {
+        kalibr::read_one(&document, keys)?
     } else if vins::is_of(keys) {
         vins::read(&document, keys)?
     } else if ros::is_of(keys) {
@@ -145,6 +147,26 @@ struct ParsedCalibration {
 }
 
 impl ParsedCalibration {
+    /// Returns the contents of a file that describes the raw image: fx, fy, cx, cy in pixels.
+    fn of_raw(
+        size_at: std::ops::Range<usize>,
+        size_px: [f64; 2],
+        [fx, fy, cx, cy]: [f64; 4],
+        lens: Lens,
+    ) -> Self {
+        Self {
+            size_at,
+            numbers: Numbers {
+                size_px,
+                focal_px: [fx, fy],
+                axis_px: [cx, cy],
+                lens,
+                rect: [fx, fy, cx, cy],
+                ..Numbers::default()
+            },
+        }
+    }
+
     fn for_size(self, source: Source<'_>, size_px: [Option<f64>; 2]) -> Result<Numbers, SiteError> {
         let [width, height] = self.numbers.size_px;
         let site_size_px = [size_px[0].unwrap_or(width), size_px[1].unwrap_or(height)];
@@ -185,7 +207,7 @@ const COUNTS: [usize; 5] = [4, 5, 8, 12, 14];
 /// `equidistant`.
 pub(super) fn lens(model: &str, coefficients: &[f64]) -> Option<Result<Lens, Misfit>> {
     let (own, is_fisheye) = match model {
-        "plumb_bob" | "radtan" => (5, false),
+        "plumb_bob" | "radtan" | "radial-tangential" => (5, false),
         "rational_polynomial" => (8, false),
         "equidistant" | "equi" | "fisheye" | "kannala_brandt" => (4, true),
         _ => return None,

@@ -1,6 +1,6 @@
 //! PhotonVision's calibration in JSON, which OpenCV's calibrateCamera made.
 
-use super::{Misfit, Numbers, ParsedCalibration, lens};
+use super::{Misfit, ParsedCalibration, lens};
 use crate::site::error::{SiteError, Source};
 use crate::site::json::Value;
 
@@ -62,15 +62,10 @@ pub(super) fn read(source: Source<'_>) -> Result<ParsedCalibration, SiteError> {
             .expected("4, 5 or 8 coefficients of OpenCV, or zeros after them")
             .help("calibrate again with PhotonVision")
     })?;
-    Ok(ParsedCalibration {
-        size_at: size.span(),
-        numbers: Numbers {
-            size_px,
-            focal_px: [fx, fy],
-            axis_px: [cx, cy],
-            lens,
-            rect: [fx, fy, cx, cy],
-            ..Numbers::default()
-        },
-    })
+    Ok(ParsedCalibration::of_raw(
+        size.span(),
+        size_px,
+        [fx, fy, cx, cy],
+        lens,
+    ))
 }

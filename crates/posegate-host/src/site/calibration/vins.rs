@@ -1,6 +1,6 @@
 //! The camera files of VINS-Mono and VINS-Fusion (camodocal).
 
-use super::{Numbers, ParsedCalibration};
+use super::ParsedCalibration;
 use crate::site::error::SiteError;
 use crate::site::yaml::{Document, Map};
 use posegate::shape::Lens;
@@ -71,15 +71,10 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
         let error = document.error(at, message);
         return Err(error.expected("pixels, above 0").help("calibrate again"));
     }
-    Ok(ParsedCalibration {
-        size_at: width.at.clone(),
-        numbers: Numbers {
-            size_px,
-            focal_px: [fx, fy],
-            axis_px: [cx, cy],
-            lens,
-            rect: [fx, fy, cx, cy],
-            ..Numbers::default()
-        },
-    })
+    Ok(ParsedCalibration::of_raw(
+        width.at.clone(),
+        size_px,
+        [fx, fy, cx, cy],
+        lens,
+    ))
 }

@@ -14,6 +14,7 @@ fn row(pose: [f64; 3], covariance: [[f64; 3]; 3]) -> Row {
         in_world: true,
         possible: true,
         verdict: Verdict::deny(Reason::Stale),
+        is_ambiguous: false,
         examined: true,
         permitted: false,
         state: State::Inhibited(Reason::Silent),

@@ -1,14 +1,12 @@
-//! Opens the bag of a replay, and finds the places of frames on the robot.
+//! Opens a bag, and finds the places of frames on the robot.
 
-use super::Arguments;
-use super::arguments::{Kind, Terms};
+use super::Reading;
 use crate::site_input::Failure;
 use posegate_host::files::{FileError, Files, Input};
 use posegate_host::log::recording::{
     BAD_FOLDER, Bag, BagFile, BodyFrames, Recording, RecordingError, Role, Wanted, files_of,
 };
 use posegate_host::printable::printable;
-use posegate_host::site::Site;
 
 /// The topic of static transforms.
 const STATIC: &str = "/tf_static";
@@ -28,32 +26,31 @@ pub fn parts(files: &Files, input: &Input) -> Result<Vec<BagFile<'static>>, Fail
 
 /// Opens the recording as a bag, with the names of its frames.
 pub fn open(
-    arguments: &Arguments,
+    reading: &Reading<'_>,
     files: &Files,
     wanted: &[Wanted],
 ) -> Result<Bag<'static>, Failure> {
-    let bag = Bag::of_files(parts(files, &arguments.log)?, wanted);
-    Ok(bag.with_frames(arguments.frames()))
+    let bag = Bag::of_files(parts(files, reading.log)?, wanted);
+    Ok(bag.with_frames(reading.options.frames()))
 }
 
 /// Returns the places of frames on the robot: those of the site and, if the poses of the wanted topics need others, those of the bag's
 /// static transforms.
 pub fn body(
-    arguments: &Arguments,
+    reading: &Reading<'_>,
     files: &Files,
-    site: &Site,
     wanted: &[Wanted],
 ) -> Result<BodyFrames, Failure> {
-    let body = all_of_site(arguments, site);
+    let body = all_of_site(reading);
     // A stream cannot be read twice.
-    if !arguments.log.as_path().exists() || !needs_more(arguments, files, &body, wanted)? {
+    if !reading.log.as_path().exists() || !needs_more(reading, files, &body, wanted)? {
         return Ok(body);
     }
     let transforms = Wanted {
         topic: STATIC.into(),
         role: Role::Static,
     };
-    let mut bag = open(arguments, files, &[transforms])?.with_body(body);
+    let mut bag = open(reading, files, &[transforms])?.with_body(body);
     while bag.next().map_err(failure)?.is_some() {}
     let mut body = bag.into_body();
     body.add_static();
@@ -61,46 +58,42 @@ pub fn body(
 }
 
 /// Returns the places of a site's frames, for a file that names no frames.
-pub fn of_site(arguments: &Arguments, site: &Site) -> Result<BodyFrames, Failure> {
-    let body = all_of_site(arguments, site);
+pub fn of_site(reading: &Reading<'_>) -> Result<BodyFrames, Failure> {
+    let body = all_of_site(reading);
     let lever = |name: &String| body.place(name).is_some_and(|[x, y, _]| [x, y] != [0.0; 2]);
-    match arguments.child_frame.as_slice() {
-        [name] if is_partial(arguments) && lever(name) => {
-            let (topic, child) = (arguments.log.display().to_string(), name.clone());
+    match reading.options.child_frame.as_slice() {
+        [name] if reading.is_partial && lever(name) => {
+            let (topic, child) = (reading.log.display().to_string(), name.clone());
             Err(failure(RecordingError::PartialCovariance { topic, child }))
         }
         _ => Ok(body),
     }
 }
 
-fn all_of_site(arguments: &Arguments, site: &Site) -> BodyFrames {
-    let body = BodyFrames::new(&site.frames)
-        .with_origin(site.map_origin)
-        .with_named(&arguments.child_frame)
-        .with_base(arguments.base_frame.as_deref());
-    if is_partial(arguments) {
+fn all_of_site(reading: &Reading<'_>) -> BodyFrames {
+    let body = BodyFrames::new(&reading.site.frames)
+        .with_origin(reading.site.map_origin)
+        .with_named(&reading.options.child_frame)
+        .with_base(reading.options.base_frame.as_deref());
+    if reading.is_partial {
         body.of_partial_covariances()
     } else {
         body
     }
 }
 
-fn is_partial(arguments: &Arguments) -> bool {
-    arguments.set == Kind::Gaussian && arguments.cross_terms != Terms::Filled
-}
-
 /// Returns `true` if a named frame, or that of the first message of a wanted topic, has no known place.
 fn needs_more(
-    arguments: &Arguments,
+    reading: &Reading<'_>,
     files: &Files,
     body: &BodyFrames,
     wanted: &[Wanted],
 ) -> Result<bool, Failure> {
-    let named = &arguments.child_frame;
+    let named = &reading.options.child_frame;
     if named.iter().any(|name| body.place(name).is_none()) {
         return Ok(true);
     }
-    let mut bag = open(arguments, files, wanted)?.with_body(body.clone());
+    let mut bag = open(reading, files, wanted)?.with_body(body.clone());
     loop {
         match bag.next() {
             Ok(Some(_)) => {}

@@ -1,9 +1,7 @@
-//! The recording that is replayed, the truth, and the camera.
+//! An open recording, the truth, and the camera.
 
-use super::Arguments;
-use super::arguments::Kind;
+use super::Reading;
 use super::bag;
-use super::inflation::Inflated;
 use crate::site_input::Failure;
 use posegate_host::files::{FileError, Files, Opened};
 use posegate_host::log::corners::MountedCamera;
@@ -14,13 +12,12 @@ use posegate_host::log::recording::{
 use posegate_host::log::replay::{Clock, Part};
 use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, trajectories};
 use posegate_host::printable::printable;
-use posegate_host::site::Site;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 
-/// The largest number of true poses of a topic that are kept.
-const MOST_TRUE: usize = 1 << 17;
+/// A CSV that is read as a stream.
+pub type CsvText = Text<BufReader<Box<dyn Read + Send>>>;
 
 /// An open recording, with the truth, the time range and the camera that it is replayed with.
 pub struct Recorded {
@@ -39,22 +36,21 @@ pub struct Recorded {
 
 impl Recorded {
     pub fn open(
-        arguments: &Arguments,
+        reading: &Reading<'_>,
         files: &Files,
-        site: &Site,
         radius_squared: f64,
-        inflated: &Inflated,
+        since_fix: impl FnOnce(&mut CsvText, &str),
     ) -> Result<Self, Failure> {
         let Source {
             mut input,
             format,
             name,
             length,
-        } = Source::open(arguments, files)?;
+        } = Source::open(reading, files)?;
         let is_bag = format.is_bag();
-        if is_bag == arguments.topic.is_empty() {
+        if is_bag == reading.topics.is_empty() {
             return Err(if is_bag {
-                which_topic(Bag::of_files(input.parts(arguments, files)?, &[]), &name)?
+                which_topic(Bag::of_files(input.parts(reading, files)?, &[]), &name)?
             } else {
                 Failure::usage(
                     format!("{name} is not a bag: it has no topics"),
@@ -66,9 +62,9 @@ impl Recorded {
             track,
             topic: truth_topic,
             duplicates,
-        } = truth(arguments, files, site, is_bag)?;
+        } = truth(reading, files, is_bag)?;
         let looks = if is_bag {
-            looks(arguments, site, radius_squared)?
+            looks(reading, radius_squared)?
         } else {
             None
         };
@@ -76,7 +72,7 @@ impl Recorded {
         let body;
         let recording: Box<dyn Recording + Send> = match format {
             format if format.is_bag() => {
-                let numbered = (0u8..=255).zip(&arguments.topic);
+                let numbered = (0u8..=255).zip(&reading.topics);
                 let mut wanted: Vec<Wanted> = numbered
                     .map(|(number, topic)| Wanted {
                         topic: topic.clone(),
@@ -87,16 +83,16 @@ impl Recorded {
                     topic,
                     role: Role::Truth,
                 }));
-                body = bag::body(arguments, files, site, &wanted)?;
-                let bag = Bag::of_files(input.parts(arguments, files)?, &wanted);
-                let bag = bag.with_frames(arguments.frames());
+                body = bag::body(reading, files, &wanted)?;
+                let bag = Bag::of_files(input.parts(reading, files)?, &wanted);
+                let bag = bag.with_frames(reading.options.frames());
                 Box::new(bag.with_body(body.clone()))
             }
             Format::Csv => {
-                let gaussian = arguments.set == Kind::Gaussian;
-                let mut text = Text::csv(input.reader, &name, gaussian).map_err(Failure::input)?;
-                inflated.reads(&mut text, &name);
-                body = bag::of_site(arguments, site)?;
+                let mut text =
+                    Text::csv(input.reader, &name, reading.is_gaussian).map_err(Failure::input)?;
+                since_fix(&mut text, &name);
+                body = bag::of_site(reading)?;
                 // A recorded time of use is the clock, however far it is from the stamps.
                 clock = Some(if text.has_use() {
                     Clock::Logged
@@ -106,13 +102,13 @@ impl Recorded {
                 Box::new(text.with_body(body.clone()))
             }
             Format::Tum => {
-                body = bag::of_site(arguments, site)?;
+                body = bag::of_site(reading)?;
                 Box::new(Text::tum(input.reader, &name).with_body(body.clone()))
             }
             Format::Euroc | Format::Kitti => {
-                body = bag::of_site(arguments, site)?;
+                body = bag::of_site(reading)?;
                 let mut text = Vec::new();
-                let times = times(arguments, files)?;
+                let times = times(reading, files)?;
                 let times = times
                     .as_ref()
                     .map(|(text, name)| (text.as_slice(), name.as_str()));
@@ -135,8 +131,8 @@ impl Recorded {
             track,
             part: Part {
                 range: [
-                    arguments.from.unwrap_or(f64::NEG_INFINITY),
-                    arguments.to.unwrap_or(f64::INFINITY),
+                    reading.options.from.unwrap_or(f64::NEG_INFINITY),
+                    reading.options.to.unwrap_or(f64::INFINITY),
                 ],
                 looks,
                 outside: 0,
@@ -170,8 +166,8 @@ struct Beginning {
 }
 
 impl Source {
-    fn open(arguments: &Arguments, files: &Files) -> Result<Self, Failure> {
-        let log = &arguments.log;
+    fn open(reading: &Reading<'_>, files: &Files) -> Result<Self, Failure> {
+        let log = reading.log;
         if log.as_path().is_dir() {
             let paths =
                 files_of(log.as_path()).map_err(|fault| Failure::usage(fault, BAD_FOLDER))?;
@@ -206,8 +202,8 @@ impl Source {
 
 impl Beginning {
     /// Returns the files of a bag.
-    fn parts(self, arguments: &Arguments, files: &Files) -> Result<Vec<BagFile<'static>>, Failure> {
-        let log = &arguments.log;
+    fn parts(self, reading: &Reading<'_>, files: &Files) -> Result<Vec<BagFile<'static>>, Failure> {
+        let log = reading.log;
         // A pipe gives its bytes once.
         if log.as_path().is_file() || log.as_path().is_dir() {
             return bag::parts(files, log);
@@ -260,18 +256,13 @@ struct Truth {
 }
 
 /// Returns the truth from a file, or the topic that has it.
-fn truth(
-    arguments: &Arguments,
-    files: &Files,
-    site: &Site,
-    is_bag: bool,
-) -> Result<Truth, Failure> {
-    let Some(truth) = &arguments.truth else {
+fn truth(reading: &Reading<'_>, files: &Files, is_bag: bool) -> Result<Truth, Failure> {
+    let Some(truth) = &reading.options.truth else {
         return Ok(Truth::default());
     };
-    if !(arguments.truth_gap > 0.0) {
+    if !(reading.options.truth_gap > 0.0) {
         return Err(Failure::usage(
-            format!("--truth-gap {} is not a time", arguments.truth_gap),
+            format!("--truth-gap {} is not a time", reading.options.truth_gap),
             "give seconds above 0",
         ));
     }
@@ -283,13 +274,13 @@ fn truth(
                 "give a TUM file or a CSV; topics are those of bags",
             ));
         }
-        if arguments.topic.contains(&topic) {
+        if reading.topics.contains(&topic) {
             return Err(Failure::usage(
                 format!("--truth {topic} is a topic of estimates too"),
                 "estimates cannot be their own truth: name another topic",
             ));
         }
-        let track = Trajectory::new(MOST_TRUE, arguments.truth_gap);
+        let track = Trajectory::new(reading.most_true, reading.options.truth_gap);
         return Ok(Truth {
             track: Some(track),
             topic: Some(topic),
@@ -298,12 +289,12 @@ fn truth(
     }
     let (bytes, name) = files.read(truth)?;
     let mut duplicates = 0;
-    let [east, north] = site.map_origin;
+    let [east, north] = reading.site.map_origin;
     let track = match format_of(&bytes) {
         Format::Csv => {
             let rows = estimates(bytes.as_slice(), &name, Columns::TimedPoses);
             let rows = rows.map_err(Failure::input)?;
-            let mut track = Trajectory::new(rows.len(), arguments.truth_gap);
+            let mut track = Trajectory::new(rows.len(), reading.options.truth_gap);
             for row in rows {
                 let pose = row.estimate;
                 track.push(
@@ -315,7 +306,7 @@ fn truth(
             track
         }
         Format::Tum | Format::Euroc | Format::Kitti => {
-            let times = times(arguments, files)?;
+            let times = times(reading, files)?;
             let times = times
                 .as_ref()
                 .map(|(text, name)| (text.as_slice(), name.as_str()));
@@ -325,7 +316,7 @@ fn truth(
                 pose.position.x -= east;
                 pose.position.y -= north;
             }
-            Trajectory::of(&found.poses, arguments.truth_gap)
+            Trajectory::of(&found.poses, reading.options.truth_gap)
         }
         _ => {
             return Err(Failure::usage(
@@ -342,37 +333,34 @@ fn truth(
 }
 
 /// Reads the times of a KITTI trajectory. Returns the file and its name.
-fn times(arguments: &Arguments, files: &Files) -> Result<Option<(Vec<u8>, String)>, Failure> {
-    let times = arguments.times.as_ref();
+fn times(reading: &Reading<'_>, files: &Files) -> Result<Option<(Vec<u8>, String)>, Failure> {
+    let times = reading.options.times.as_ref();
     Ok(times.map(|times| files.read(times)).transpose()?)
 }
 
 /// Returns the localizer for detections, with the camera and the tags. `None` if the site has no camera, or has several and
 /// --camera is missing.
-fn looks(
-    arguments: &Arguments,
-    site: &Site,
-    radius_squared: f64,
-) -> Result<Option<TagLocalizer>, Failure> {
-    let camera = match &arguments.camera {
-        Some(name) => Some(site.cameras.get(name).ok_or_else(|| {
-            let names: Vec<&str> = site.cameras.keys().map(String::as_str).collect();
+fn looks(reading: &Reading<'_>, radius_squared: f64) -> Result<Option<TagLocalizer>, Failure> {
+    let camera = match reading.camera {
+        Some(name) => Some(reading.site.cameras.get(name).ok_or_else(|| {
+            let names: Vec<&str> = reading.site.cameras.keys().map(String::as_str).collect();
             Failure::usage(
                 format!("the site has no camera `{name}`"),
                 &format!("it has: {}", names.join(", ")),
             )
         })?),
-        None => site
+        None => reading
+            .site
             .cameras
             .values()
             .next()
-            .filter(|_| site.cameras.len() == 1),
+            .filter(|_| reading.site.cameras.len() == 1),
     };
-    if !(arguments.sigma_px > 0.0 && arguments.sigma_px.is_finite()) {
+    if !(reading.options.sigma_px > 0.0 && reading.options.sigma_px.is_finite()) {
         return Err(Failure::usage(
             format!(
                 "--sigma-px {} is not a standard deviation",
-                arguments.sigma_px
+                reading.options.sigma_px
             ),
             "give pixels above 0, like 0.3",
         ));
@@ -383,6 +371,11 @@ fn looks(
             mount: camera.mount,
             mount_tolerance: camera.mount_tolerance,
         };
-        TagLocalizer::new(eye, KnownTags::of(site), arguments.sigma_px, radius_squared)
+        TagLocalizer::new(
+            eye,
+            KnownTags::of(reading.site),
+            reading.options.sigma_px,
+            radius_squared,
+        )
     }))
 }
