@@ -25,6 +25,10 @@ import time
 # The longest time for which a heartbeat is valid, whatever it states. After a change of the run, heartbeats of the new run alone must
 # come for this time before one permits.
 MOST_VALID_MS = 1000
+# The same after an earlier run has come back: a node that was started again has a new run, so two nodes are alive, and one may be slow.
+TWO_NODES_MS = 10_000
+# The earlier runs that are kept.
+MOST_RUNS = 8
 # A heartbeat from farther in the future shows that the clocks of the machines differ.
 MOST_AHEAD_MS = 20
 FORMAT = "2"
@@ -39,6 +43,7 @@ class PermitWatch:
         self.robot = robot
         self.table = table
         self.run = None
+        self.earlier = []
         self.alone_ns = None
         self.sequence = 0
         self.ends_ns = None
@@ -84,12 +89,14 @@ class PermitWatch:
         if run == self.run and sequence <= self.sequence:
             return "heartbeats out of order"
         if self.run not in (None, run):
-            self.alone_ns = monotonic_ns + MOST_VALID_MS * 1_000_000
+            alone_ms = TWO_NODES_MS if run in self.earlier else MOST_VALID_MS
+            self.alone_ns = max(self.alone_ns or 0, monotonic_ns + alone_ms * 1_000_000)
+            self.earlier = [*self.earlier, self.run][-MOST_RUNS:]
         self.run, self.sequence = run, sequence
         if not self.robot or values.get("robot") != self.robot:
             return f"a heartbeat of the robot {values.get('robot')}, expected {self.robot}"
         if self.alone_ns is not None and monotonic_ns < self.alone_ns:
-            return "two nodes send heartbeats, or the node was just started again: another run came within a second"
+            return "two nodes send heartbeats, or the node was just started again: another run came a moment ago"
         if status.level not in (b"\x00", 0) or status.message != "permit" or values.get("state") != "permitted":
             return values.get("reason") or "denied"
         if values.get("reason") != "":

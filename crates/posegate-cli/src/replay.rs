@@ -188,7 +188,7 @@ fn summary(
     if arguments.inflation_model.is_some() {
         summary["inflation"] = inflated.to_json();
     }
-    summary["recording"] = recording(input);
+    summary["recording"] = recording(arguments, input);
     summary["child_frames"] = json!(input.recording.diagnostics().child_frames);
     summary["body_frames"] = input.body_frames();
     summary["truth"]["duplicates"] = json!(input.duplicates);

@@ -91,6 +91,14 @@ fn transforms_replace_a_missing_odometry_topic() {
         // The correction and the odometry, not the wheel.
         let driven = &summary["odometry"];
         assert_eq!(driven["poses"], 400);
+        // What is used is not listed as skipped.
+        let recording = &summary["recording"];
+        assert!(recording["skipped_topics"]["/tf"].is_null(), "{recording}");
+        assert!(
+            recording["topics"]["/tf"]
+                .as_u64()
+                .is_some_and(|count| count >= 400)
+        );
         let most = driven["most_m_s"].as_f64().expect("a speed");
         assert!((most - 0.05).abs() < 1e-6, "{driven}");
         let interlock = &summary["interlock"];

@@ -6,10 +6,16 @@
 use crate::clock::Now;
 use crate::message::{DiagnosticArray, OK};
 use crate::permission::{FORMAT, NAME, PERMIT};
+use std::collections::VecDeque;
 
 /// The longest time for which a heartbeat is valid, whatever it states, milliseconds. After a change of the run,
 /// heartbeats of the new run alone must come for this time before one permits.
 pub const MOST_VALID_MS: i128 = 1_000;
+/// The same after an earlier run has come back, milliseconds: a node that was started again has a new run, so two nodes
+/// are alive, and one of them may be slow.
+pub const TWO_NODES_MS: i128 = 10_000;
+/// The earlier runs that are kept.
+const MOST_RUNS: usize = 8;
 /// A heartbeat from farther in the future shows that the clocks of the machines differ, milliseconds.
 pub const MOST_AHEAD_MS: i128 = 20;
 
@@ -22,6 +28,8 @@ pub struct PermitWatch {
     robot: String,
     table: String,
     run: Option<(String, u64)>,
+    /// Runs before this one, the last one last.
+    earlier: VecDeque<String>,
     /// Until this moment of the monotonic clock two runs may be alive.
     alone_ns: Option<i128>,
     ends_ns: Option<i128>,
@@ -38,6 +46,7 @@ impl PermitWatch {
             robot: robot.into(),
             table: table.into(),
             run: None,
+            earlier: VecDeque::new(),
             alone_ns: None,
             ends_ns: None,
             reason: "silent".into(),
@@ -101,7 +110,18 @@ impl PermitWatch {
                 return Err("heartbeats out of order".into());
             }
             Some((other, _)) if other != run => {
-                self.alone_ns = Some(monotonic_ns + MOST_VALID_MS * MS);
+                let has_come_back = self.earlier.iter().any(|earlier| earlier == run);
+                let alone_ms = if has_come_back {
+                    TWO_NODES_MS
+                } else {
+                    MOST_VALID_MS
+                };
+                let until_ns = monotonic_ns + alone_ms * MS;
+                self.alone_ns = self.alone_ns.max(Some(until_ns));
+                if self.earlier.len() == MOST_RUNS {
+                    self.earlier.pop_front();
+                }
+                self.earlier.push_back(other);
             }
             _ => {}
         }
@@ -115,7 +135,7 @@ impl PermitWatch {
             .alone_ns
             .is_some_and(|alone_ns| monotonic_ns < alone_ns)
         {
-            return Err("two nodes send heartbeats, or the node was just started again: another run came within a second".into());
+            return Err("two nodes send heartbeats, or the node was just started again: another run came a moment ago".into());
         }
         if status.level != OK || status.message != PERMIT || value("state") != "permitted" {
             let reason = value("reason");

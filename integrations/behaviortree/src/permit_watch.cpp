@@ -81,7 +81,13 @@ std::pair<std::optional<std::string>, std::int64_t> PermitWatch::checked(const H
     return refused("heartbeats out of order");
   }
   if (!run_.empty() && *run != run_) {
-    alone_ns_ = monotonic_() + kMostValidMs * kMs;
+    const bool has_come_back = std::find(earlier_.begin(), earlier_.end(), *run) != earlier_.end();
+    const std::int64_t until_ns = monotonic_() + (has_come_back ? kTwoNodesMs : kMostValidMs) * kMs;
+    alone_ns_ = std::max(alone_ns_.value_or(until_ns), until_ns);
+    if (earlier_.size() == kMostRuns) {
+      earlier_.pop_front();
+    }
+    earlier_.push_back(run_);
   }
   run_ = *run;
   sequence_ = *sequence;
@@ -89,7 +95,7 @@ std::pair<std::optional<std::string>, std::int64_t> PermitWatch::checked(const H
     return refused("a heartbeat of the robot " + value("robot").value_or("") + ", expected " + robot_);
   }
   if (alone_ns_ && monotonic_() < *alone_ns_) {
-    return refused("two nodes send heartbeats, or the node was just started again: another run came within a second");
+    return refused("two nodes send heartbeats, or the node was just started again: another run came a moment ago");
   }
   if (message.level != 0 || message.message != "permit" || value("state") != "permitted") {
     const std::string reason = value("reason").value_or("");

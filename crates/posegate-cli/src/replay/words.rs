@@ -10,6 +10,7 @@ use posegate_host::log::recording::{ReaderDiagnostics, SkipReason};
 use posegate_host::log::replay::{Clock, NOT_FRESH, Replay};
 use posegate_host::printable::printable;
 use serde_json::{Map, Value, json};
+use std::path::Path;
 
 /// Returns the failure for a recording without estimates, with the reasons.
 pub fn no_estimates(
@@ -128,11 +129,23 @@ pub fn check_requested(
 }
 
 /// Returns the reader's counts and faults as JSON.
-pub fn recording(input: &Recorded) -> Value {
+pub fn recording(arguments: &Arguments, input: &Recorded) -> Value {
     let diagnostics = input.recording.diagnostics();
-    let skipped: Map<String, Value> = diagnostics
+    let mut read = diagnostics.read.clone();
+    // The odometry is read in a pass of its own.
+    let odometry = arguments.odom.as_ref().map(|odom| odom.as_path());
+    let is_odometry = |topic: &str| odometry.is_some_and(|odom| odom == Path::new(topic));
+    let (odometry, skipped) = diagnostics
         .skipped
         .iter()
+        .partition::<Vec<_>, _>(|(topic, _)| is_odometry(topic));
+    read.extend(
+        odometry
+            .into_iter()
+            .map(|(topic, odometry)| (topic.clone(), odometry.messages)),
+    );
+    let skipped: Map<String, Value> = skipped
+        .into_iter()
         .map(|(topic, skipped)| {
             let line = json!({
                 "schema": skipped.schema,
@@ -147,7 +160,7 @@ pub fn recording(input: &Recorded) -> Value {
         "file": input.name,
         "bytes": input.recording.bytes(),
         "message_bytes": diagnostics.message_bytes,
-        "topics": diagnostics.read,
+        "topics": read,
         "skipped_topics": skipped,
         "undecodable": diagnostics.undecodable,
         "first_undecodable": diagnostics.first_undecodable,

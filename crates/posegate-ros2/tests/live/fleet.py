@@ -73,7 +73,8 @@ def main():
     ]
     drive(robots, [two, three], 20.0, until=lambda: two.listener.permitted() and three.listener.permitted())
     asks, permits = drive(robots, [two, three], 5.0, wrong)
-    require(min(permits[1:3]) > 0.9 * asks, f"robots 2 and 3 are not permitted: {permits} of {asks}")
+    reasons = [robot.listener.reason() for robot in robots]
+    require(min(permits[1:3]) > 0.9 * asks, f"robots 2 and 3 are not permitted: {permits} of {asks}: {reasons}")
     require(f"robot {two.name}, expected {one.name}" in wrong[0].reason(), wrong[0].reason())
     require("by the table" in wrong[1].reason(), wrong[1].reason())
     figure("fleet: permits of a robot without a pose, in namespaces", permits[0], "permits", 0, at_least=False)
@@ -84,12 +85,14 @@ def main():
     # One topic and one name for two nodes; only one of them gets poses. Their runs alternate.
     nodes = [robot.start("-r", f"{PERMISSION}:=/shared", "-p", "robot:=cart") for robot in (one, two)]
     shared = PermitListener(one.node, "dock", robot="cart", table=DIGEST, topic="/shared")
+    # The first of them is obeyed until the other one joins.
+    drive(robots, [two], 20.0, [shared], until=lambda: "two nodes" in (shared.reason() or ""))
     asks, permits = drive(robots, [two], 6.0, [shared])
     require("two nodes" in shared.reason(), shared.reason())
     figure("fleet: permits of two nodes with one name", permits[3], "permits", 0, at_least=False)
     # When one is stopped, the other one permits.
     nodes[0].kill()
-    drive(robots, [two], 20.0, [shared], until=shared.permitted)
+    drive(robots, [two], 40.0, [shared], until=shared.permitted)
     require(shared.permitted(), shared.reason())
 
     words = [NODE, str(TABLE), "--ros-args", "-p", STILL[0], "-r", "__ns:=/robot1", "-r", "/amcl_pose:=/x"]

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -18,6 +19,11 @@ namespace posegate {
 /// The longest time for which a heartbeat is valid, whatever it states, milliseconds. After a change of the run, heartbeats of the new
 /// run alone must come for this time before one permits.
 constexpr std::int64_t kMostValidMs = 1000;
+/// The same after an earlier run has come back, milliseconds: a node that was started again has a new run, so two nodes are alive, and
+/// one of them may be slow.
+constexpr std::int64_t kTwoNodesMs = 10'000;
+/// The earlier runs that are kept.
+constexpr std::size_t kMostRuns = 8;
 /// A heartbeat from farther in the future shows that the clocks of the machines differ, milliseconds.
 constexpr std::int64_t kMostAheadMs = 20;
 
@@ -68,6 +74,8 @@ class PermitWatch : public PermitSource {
   std::mutex mutex_;
   std::string run_;
   std::int64_t sequence_ = 0;
+  /// Runs before this one, the last one last.
+  std::deque<std::string> earlier_;
   /// Until this moment of the monotonic clock two runs may be alive.
   std::optional<std::int64_t> alone_ns_;
   std::optional<std::int64_t> ends_ns_;
