@@ -116,7 +116,7 @@ def play(messages, rows, speed):
     # A heartbeat shows the last pose of a cycle: a machine that stops for longer than that between two poses hides one.
     figure(f"{name}: rows that the heartbeat showed", len(shown), "rows", len(rows) if speed == 1.0 else round(0.9 * len(rows)))
     figure(f"{name}: rows that differ from `posegate replay`", different, "rows", 0, at_least=False)
-    poses, ways = counts["posegate: pose"], counts["posegate: odometry"]
+    poses, ways = counts["carried: pose"], counts["carried: odometry"]
     sent = sum(not is_pose for is_pose, _, _ in messages)
     figure(f"{name}: odometry that was read", int(ways["messages"]), "messages", sent)
     figure(f"{name}: messages that could not be read", int(poses["unreadable"]) + int(ways["unreadable"]), "messages", 0, at_least=False)

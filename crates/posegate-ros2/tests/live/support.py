@@ -72,9 +72,9 @@ def end_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def start(*parameters, options=(), ros=(), table=TABLE):
-    """Starts the node, on the dock of the examples by default."""
-    words = [NODE, str(table), *options, "--ros-args"]
+def start(*parameters, options=(), ros=(), table=None):
+    """Starts the node, on the test's table if no other one is given."""
+    words = [NODE, str(table or TABLE), *options, "--ros-args"]
     for parameter in parameters:
         words += ["-p", parameter]
     process = subprocess.Popen([*words, *ros], stderr=subprocess.DEVNULL, preexec_fn=end_with_parent)
@@ -102,7 +102,7 @@ class Peer:
         if not rclpy.ok():
             rclpy.init()
         self.node = rclpy.create_node(name)
-        self.listener = PermitListener(self.node, "dock", robot=ROBOT, table=DIGEST)
+        self.listener = PermitListener(self.node, "dock", robot=ROBOT, table=hashlib.sha256(TABLE.read_bytes()).hexdigest())
         self.poses = self.node.create_publisher(PoseWithCovarianceStamped, "/amcl_pose", qos) if qos else None
         self.published = 0.0
         self.heartbeats = []
