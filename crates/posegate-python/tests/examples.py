@@ -5,7 +5,7 @@ import os
 import pickle
 import sys
 import tempfile
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def examples(name: str, subject: Any) -> int:
     for title, member in members.items():
         doc = getattr(member, "__doc__", None)
         if callable(member) or title == name:
-            require(doc, f"{title} has a docstring")
+            require(bool(doc), f"{title} has a docstring")
         test = doctest.DocTestParser().get_doctest(doc or "", {}, title, title, 0)
         runner = doctest.DocTestRunner()
         runner.run(test)
@@ -70,7 +70,8 @@ def main() -> None:
         poses = random.uniform(-0.1, 0.1, (300, 3))
         covs = np.tile(np.diag([1e-4, 2e-4, 1e-4]), (300, 1, 1))
         covs[0, 0, 0] = np.nan
-        for terms in ("filled", "yaw_unknown", "all_unknown"):
+        trusts: tuple[Literal["filled", "yaw_unknown", "all_unknown"], ...] = ("filled", "yaw_unknown", "all_unknown")
+        for terms in trusts:
             for inflation in (1.0, 2.5):
                 permit, reason, margin = table.decide_many(
                     poses, covs, margins=True, cross_terms=terms, inflation=inflation
@@ -78,12 +79,14 @@ def main() -> None:
                 fast = table.decide_many(poses, covs, cross_terms=terms, inflation=inflation)
                 require((fast[0] == permit).all() and (fast[1] == reason).all(), "equal without margins")
                 for row, pose in enumerate(poses):
-                    one = table.decide(*pose, covs[row], cross_terms=terms, inflation=inflation)
+                    x, y, yaw = (float(part) for part in pose)
+                    one = table.decide(x, y, yaw, covs[row], cross_terms=terms, inflation=inflation)
                     require(one.permit == permit[row], (terms, inflation, row))
                     require(one.reason == posegate.REASONS[reason[row]], (terms, inflation, row))
                     same = np.isnan(margin[row]) if one.margin is None else one.margin == margin[row]
                     require(same, (terms, inflation, row, one.margin, margin[row]))
-        for wrong in ({"cross_terms": "none"}, {"inflation": 0.5}):
+        wrongs: list[dict[str, Any]] = [{"cross_terms": "none"}, {"inflation": 0.5}]
+        for wrong in wrongs:
             try:
                 table.decide(0.0, 0.0, 0.0, cov, **wrong)
             except posegate.PosegateError as error:
