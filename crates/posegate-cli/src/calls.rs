@@ -9,7 +9,7 @@ use posegate::bake::BakeInput;
 use posegate::set::RadiusSquared;
 use posegate::table::Table;
 use posegate::verify::build;
-use posegate_host::files::{Files, Input};
+use posegate_host::files::{Files, Input, captured};
 use posegate_host::site::{Site, Task};
 use std::ffi::OsString;
 use std::path::Path;
@@ -51,6 +51,24 @@ pub fn program_of(library: &Path, words: impl IntoIterator<Item = OsString>) -> 
         .unwrap_or(3)
 }
 
+/// Runs a command line in this thread, and returns what it prints on standard output. An answer of no (exit code 1) is an answer, too.
+///
+/// # Errors
+/// The command line is wrong, or the command refuses its input.
+pub fn answer(words: Vec<OsString>) -> Result<String, Refusal> {
+    if let Err(error) = crate::arguments::command().try_get_matches_from(&words) {
+        let text = error.to_string();
+        let message = text.lines().next().unwrap_or_default();
+        return Err(Refusal {
+            message: message.trim_start_matches("error: ").to_owned(),
+            help: None,
+        });
+    }
+    let (ended, printed) = captured(|| crate::run(&words));
+    ended?;
+    Ok(String::from_utf8_lossy(&printed).into_owned())
+}
+
 /// Reads the bytes of a table, and checks them.
 ///
 /// # Errors
@@ -88,6 +106,14 @@ pub fn radius(table: &Table<'_>, epsilon: Option<f64>) -> Result<RadiusSquared, 
 /// The file, or one that it names, cannot be read or has a fault.
 pub fn read_site(path: OsString) -> Result<Site, Refusal> {
     Ok(site_input::site(&Files::new(), &Input::from(path))?)
+}
+
+/// Checks the text of a site file; `name` is its name in messages.
+///
+/// # Errors
+/// The text, or a file that it names, has a fault.
+pub fn parse_site(text: &str, name: &str) -> Result<Site, Refusal> {
+    Ok(site_input::parsed(&Files::new(), text, name)?)
 }
 
 /// Returns a task of a site by name.

@@ -1,12 +1,13 @@
 //! `posegate learn`: learns error bounds and inflation factors, and tests outcomes against a claim.
 
-use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, site, warn};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::{
-    BoundsSettings, Detections, ErrorModel, GroupReport, InflationModel, InflationReport,
-    InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, by_age_json, learn_bounds,
-    learn_inflation, outcomes, test_outcomes,
+    BoundsSettings, Detection, Detections, ErrorModel, GroupReport, InflationModel,
+    InflationReport, InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, by_age_json,
+    learn_bounds, learn_inflation, outcomes, test_outcomes,
 };
+use posegate_host::site::{Site, Task, TaskKind};
 use serde_json::{Value, json};
 
 mod check;
@@ -207,12 +208,51 @@ fn bounds(arguments: &Bounds, files: &Files) -> Outcome {
         &arguments.output,
         model.write().map_err(refused)?.as_bytes(),
     )?;
+    let too_wide = match arguments.taken_with.rig().0 {
+        Some(input) => wider_than_sets(&model, &detections.rows, &site(files, input)?),
+        None => Vec::new(),
+    };
+    for task in &too_wide {
+        warn(&format_args!(
+            "every bound is wider than the success set of the task `{task}`: with a pose-set of that size it is never permitted, not even at its goal"
+        ));
+    }
     if arguments.json {
-        print_json(&model_json(&model))?;
+        let mut report = model_json(&model);
+        report["wider_than"] = json!(too_wide);
+        print_json(&report)?;
     } else if !arguments.output.is_standard() {
         print_model(&model)?;
     }
     Ok(answer(true))
+}
+
+/// Returns the work tasks that no bound of a model permits: about the goal, a pose within the smallest bounds of all rows is outside of the
+/// success set.
+fn wider_than_sets(model: &ErrorModel, rows: &[Detection], site: &Site) -> Vec<String> {
+    let bounds = rows.iter().filter_map(|row| model.bounds_deg(row.at));
+    let smallest = bounds.reduce(|a, b| (a.0.min(b.0), a.1.min(b.1)));
+    let Some((translation, yaw)) = smallest else {
+        return Vec::new();
+    };
+    let fits = |task: &Task| {
+        let goal = task.success.goal;
+        (0..16).all(|step| {
+            let (sin, cos) = (f64::from(step) * std::f64::consts::TAU / 16.0).sin_cos();
+            [-yaw, 0.0, yaw].iter().all(|turn| {
+                let [x, y] = [goal.x + translation * cos, goal.y + translation * sin];
+                let pose = [x, y, goal.yaw_deg.to_radians() + turn];
+                task.success.membership(pose).inside
+            })
+        })
+    };
+    let work = site
+        .tasks
+        .iter()
+        .filter(|(_, task)| task.kind == TaskKind::Work);
+    work.filter(|(_, task)| !fits(task))
+        .map(|(name, _)| name.clone())
+        .collect()
 }
 
 /// Warns of rows at video rate without names of runs, which are cut into runs.

@@ -11,15 +11,24 @@ use std::path::PathBuf;
 
 mod arrays;
 mod error;
+mod gate;
 mod site;
 mod table;
 mod threads;
+mod trust;
 mod verdict;
 
 /// Runs a command line and returns its exit code. `library` is the file of this module.
 #[pyfunction]
 fn program(py: Python<'_>, library: PathBuf, words: Vec<OsString>) -> u8 {
     py.detach(|| posegate_cli::calls::program_of(&library, words))
+}
+
+/// Runs a command line that prints its answer, and returns the text.
+#[pyfunction]
+fn answer(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
+    let answer = py.detach(|| posegate_cli::calls::answer(words));
+    answer.map_err(|refusal| error::refused(py, refusal))
 }
 
 #[pymodule]
@@ -31,5 +40,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<table::PyTable>()?;
     module.add_class::<verdict::PyVerdict>()?;
     module.add_class::<site::PySite>()?;
+    module.add_class::<gate::PyGate>()?;
+    module.add_class::<gate::PyGateStep>()?;
+    module.add_class::<gate::PyTracker>()?;
+    module.add_function(wrap_pyfunction!(answer, module)?)?;
     module.add_function(wrap_pyfunction!(program, module)?)
 }

@@ -15,10 +15,27 @@ use std::path::PathBuf;
 const CHUNK: usize = 1024;
 
 /// The cameras, tags and tasks of a place.
+///
+/// >>> import posegate
+/// >>> site = posegate.Site.parse("""
+/// ... [task.dock]
+/// ... kind = "work"
+/// ... goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
+/// ... success = { shape = "box", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [-4.0, 4.0] }
+/// ... [table]
+/// ... extent = { x = [-0.5, 0.5], y = [-0.5, 0.5], yaw_deg = [-20.0, 20.0] }
+/// ... step = { xy = 0.01, yaw_deg = 0.5 }
+/// ... """)
+/// >>> site.contains("dock", [[0.07, 0.0, 0.0], [0.09, 0.0, 0.0]])
+/// array([ True, False])
+/// >>> site.build("dock").task
+/// 'dock'
 #[pyclass(frozen, name = "Site", module = "posegate")]
 pub struct PySite {
     site: Site,
     path: PathBuf,
+    /// The text, if the site is not of a file.
+    text: Option<String>,
 }
 
 #[pymethods]
@@ -28,7 +45,36 @@ impl PySite {
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let site = py.detach(|| calls::read_site(path.clone().into()));
         let site = site.map_err(|error| refused(py, error))?;
-        Ok(Self { site, path })
+        Ok(Self {
+            site,
+            path,
+            text: None,
+        })
+    }
+
+    /// Checks the text of a site file. Files that it names are relative to the working folder.
+    #[staticmethod]
+    fn parse(py: Python<'_>, text: String) -> PyResult<Self> {
+        let path = PathBuf::from("the text");
+        let site = py.detach(|| calls::parse_site(&text, "the text"));
+        let site = site.map_err(|error| refused(py, error))?;
+        Ok(Self {
+            site,
+            path,
+            text: Some(text),
+        })
+    }
+
+    /// The path of the site file; `None` for a text.
+    #[getter]
+    fn path(&self) -> Option<&PathBuf> {
+        self.text.is_none().then_some(&self.path)
+    }
+
+    /// The text that was parsed; `None` for a file.
+    #[getter]
+    fn text(&self) -> Option<&str> {
+        self.text.as_deref()
     }
 
     /// The names of the tasks.

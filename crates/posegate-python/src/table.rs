@@ -3,19 +3,23 @@
 use crate::arrays::Numbers;
 use crate::error::{refused, refused_argument};
 use crate::threads::on_all_cores;
+use crate::trust::trust;
 use crate::verdict::PyVerdict;
-use numpy::{IntoPyArray, PyArray1};
+use numpy::IntoPyArray;
 use posegate::contain::Decision;
 use posegate::contain::many::decide_many;
-use posegate::gate::Reason;
+use posegate::gate::{Reason, Verdict};
 use posegate::recordings::Evaluator;
-use posegate::set::{Estimate, PoseSet};
+use posegate::report::PoseEstimate;
+use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_cli::calls::{self, Refusal};
+use posegate_host::log::factor;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyTuple};
+use rayon::prelude::*;
 use self_cell::self_cell;
 use std::path::PathBuf;
 
@@ -37,6 +41,17 @@ self_cell! {
 }
 
 /// The proven table of a task.
+///
+/// >>> import posegate
+/// >>> table = posegate.Table.open("demo-out/dock.posegate")
+/// >>> cov = [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]
+/// >>> table.decide(0.07, 0.0, 0.0, cov).reason
+/// 'not_contained'
+/// >>> bool(table.decide(0.0, 0.0, 0.0, cov)), bool(table.decide(0.0, 0.0, 0.0, cov, inflation=9.0))
+/// (True, False)
+/// >>> permit, reason, margin = table.decide_many([[0.0, 0.0, 0.0]], [cov], margins=True)
+/// >>> bool(permit[0]), bool(margin[0] >= 1.0)
+/// (True, True)
 #[pyclass(frozen, name = "Table", module = "posegate")]
 pub struct PyTable {
     checked: Checked,
@@ -54,6 +69,16 @@ impl PyTable {
         });
         let checked = checked.map_err(PyRuntimeError::new_err)?;
         Ok(Self { checked })
+    }
+
+    /// Returns the bytes.
+    pub fn bytes(&self) -> &[u8] {
+        self.checked.borrow_owner()
+    }
+
+    /// Returns the squared radius of the Gaussian pose-sets.
+    pub fn radius_squared(&self) -> RadiusSquared {
+        self.table().radius_squared()
     }
 
     fn table(&self) -> &Table<'_> {
@@ -99,8 +124,10 @@ impl PyTable {
         format!("<posegate.Table {:?}, {length} bytes>", self.task())
     }
 
-    /// Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2.
-    #[pyo3(signature = (x, y, yaw, cov, epsilon=None))]
+    /// Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2. `cross_terms` says which
+    /// terms of it the source fills; `inflation` multiplies it.
+    #[pyo3(signature = (x, y, yaw, cov, epsilon=None, cross_terms="filled", inflation=1.0))]
+    #[allow(clippy::too_many_arguments)]
     fn decide(
         &self,
         py: Python<'_>,
@@ -109,7 +136,10 @@ impl PyTable {
         yaw: f64,
         cov: &Bound<'_, PyAny>,
         epsilon: Option<f64>,
+        cross_terms: &str,
+        inflation: f64,
     ) -> PyResult<PyVerdict> {
+        let trust = trust(py, cross_terms, inflation)?;
         let (table, evaluator) = self.checked.borrow_dependent();
         let radius = calls::radius(table, epsilon).map_err(|error| refused(py, error))?;
         let cov = Numbers::new(cov, "cov", &[Some(3), Some(3)])?;
@@ -121,23 +151,27 @@ impl PyTable {
                 y_m: y,
                 yaw_rad: yaw,
             };
-            evaluator.evaluate(0, 0, PoseSet::gaussian(estimate, covariance, radius))
+            evaluator.evaluate(0, 0, set(estimate, covariance, radius, trust))
         });
         Ok(verdict.into())
     }
 
     /// Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3). Returns two arrays: `True` for each that is permitted, and the
-    /// code of its reason, an index of `REASONS`.
-    #[pyo3(signature = (poses, covs, epsilon=None))]
-    #[allow(clippy::type_complexity)]
+    /// code of its reason, an index of `REASONS`. With `margins` also the margins, NaN where a reason has none.
+    #[pyo3(signature = (poses, covs, epsilon=None, margins=false, cross_terms="filled", inflation=1.0))]
+    #[allow(clippy::too_many_arguments)]
     fn decide_many<'py>(
         &self,
         py: Python<'py>,
         poses: &Bound<'py, PyAny>,
         covs: &Bound<'py, PyAny>,
         epsilon: Option<f64>,
-    ) -> PyResult<(Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<u8>>)> {
-        let table = self.table();
+        margins: bool,
+        cross_terms: &str,
+        inflation: f64,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let trust = trust(py, cross_terms, inflation)?;
+        let (table, evaluator) = self.checked.borrow_dependent();
         let radius = calls::radius(table, epsilon).map_err(|error| refused(py, error))?;
         let poses = Numbers::new(poses, "poses", &[None, Some(3)])?;
         let covs = Numbers::new(covs, "covs", &[None, Some(3), Some(3)])?;
@@ -151,22 +185,65 @@ impl PyTable {
                 "give one covariance for each pose",
             ));
         }
-        let codes: Vec<u8> = py.detach(|| {
+        let with_margins = || {
+            let all = poses.par_iter().zip(covs).with_min_len(MANY / 16);
+            let each = all.map(|([x_m, y_m, yaw_rad], covariance)| {
+                let estimate = Estimate {
+                    x_m: *x_m,
+                    y_m: *y_m,
+                    yaw_rad: *yaw_rad,
+                };
+                let set = set(estimate, *covariance, radius, trust);
+                if margins {
+                    return code_and_margin(evaluator.evaluate(0, 0, set));
+                }
+                let code = evaluator.permits(0, 0, set).err().map_or(0, Reason::code);
+                (code, f64::NAN)
+            });
+            each.unzip()
+        };
+        let (codes, found): (Vec<u8>, Vec<f64>) = py.detach(|| {
+            if margins || trust != Trust::FULL {
+                return on_all_cores(with_margins);
+            }
             let decide = || decide_many(table, radius, poses, covs);
             let found = if poses.len() < MANY {
                 decide()
             } else {
                 on_all_cores(decide)
             };
-            found.into_iter().map(code).collect()
+            (found.into_iter().map(code).collect(), Vec::new())
         });
         let permits: Vec<bool> = codes.iter().map(|code| *code == 0).collect();
-        Ok((permits.into_pyarray(py), codes.into_pyarray(py)))
+        let (permits, codes) = (permits.into_pyarray(py), codes.into_pyarray(py));
+        if margins {
+            (permits, codes, found.into_pyarray(py)).into_pyobject(py)
+        } else {
+            (permits, codes).into_pyobject(py)
+        }
+    }
+}
+
+/// Returns the pose-set of an estimate.
+fn set(
+    estimate: Estimate,
+    covariance: [[f64; 3]; 3],
+    radius: RadiusSquared,
+    trust: Trust,
+) -> Result<PoseSet, InputError> {
+    PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance)).pose_set(radius, trust)
+}
+
+/// Returns the code of a verdict's reason, and its margin or NaN.
+fn code_and_margin(verdict: Verdict) -> (u8, f64) {
+    match verdict {
+        Verdict::Permit { margin } => (0, factor(margin)),
+        Verdict::Deny { reason, margin, .. } => (reason.code(), margin.map_or(f64::NAN, factor)),
     }
 }
 
 /// Returns the code of a reason, 0 for a permit.
-fn code(found: Result<Decision, posegate::set::InputError>) -> u8 {
+fn code(found: Result<Decision, InputError>) -> u8 {
     match found {
         Ok(Decision::Inside) => 0,
         Ok(Decision::Outside(cause)) => Reason::from(cause).code(),

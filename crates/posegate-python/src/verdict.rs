@@ -1,5 +1,6 @@
 //! A verdict with its reason, margin and worst pose, as `posegate gate` prints them.
 
+use crate::error::refused_argument;
 use posegate::gate::{Reason, Verdict};
 use posegate_host::log::{coordinates, factor};
 use pyo3::prelude::*;
@@ -21,6 +22,10 @@ pub fn reasons() -> Vec<Option<&'static str>> {
 }
 
 /// The gate's decision on one estimate. True if it permits.
+///
+/// >>> import posegate
+/// >>> posegate.Verdict(False, "not_contained", 0.5, (0.1, 0.0, 0.0))
+/// Verdict(permit=False, reason='not_contained', margin=0.5, worst_pose=(0.1, 0.0, 0.0))
 #[pyclass(frozen, eq, name = "Verdict", module = "posegate")]
 #[derive(PartialEq)]
 pub struct PyVerdict {
@@ -63,6 +68,35 @@ impl From<Verdict> for PyVerdict {
 
 #[pymethods]
 impl PyVerdict {
+    #[new]
+    #[pyo3(signature = (permit, reason=None, margin=None, worst_pose=None))]
+    fn new(
+        py: Python<'_>,
+        permit: bool,
+        reason: Option<&str>,
+        margin: Option<f64>,
+        worst_pose: Option<(f64, f64, f64)>,
+    ) -> PyResult<Self> {
+        let known = |name: &str| Reason::ALL.iter().find(|reason| reason.name() == name);
+        let reason = reason
+            .map(|name| {
+                known(name).map(|reason| reason.name()).ok_or_else(|| {
+                    refused_argument(
+                        py,
+                        format!("there is no reason {name:?}"),
+                        "give one of posegate.REASONS",
+                    )
+                })
+            })
+            .transpose()?;
+        Ok(Self {
+            permit,
+            reason,
+            margin,
+            worst_pose,
+        })
+    }
+
     fn __bool__(&self) -> bool {
         self.permit
     }

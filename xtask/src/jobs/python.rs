@@ -69,6 +69,7 @@ pub fn python(given: &Arguments) -> Result {
     let test = |name: &str| program_at(&python).arg(format!("{CRATE}/tests/{name}"));
     test("equal_to_program.py").json()?;
     test("many.py").arg(sets.to_string()).json()?;
+    test("examples.py").json()?;
     let folder = Scratch::new()?;
     in_target(test("page.py")).arg(folder.path()).json()?;
     report.finish()

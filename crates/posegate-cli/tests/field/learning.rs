@@ -148,6 +148,22 @@ fn bounds_are_learnt_from_detections_and_truth() {
     // Errors of the poses that were drawn, not of the fits: up to 3 mm on each axis.
     let model = std::fs::read_to_string(case.path().join("m.toml")).expect("the model");
     assert!(model.contains("kind = \"bounds\""), "{model}");
+    assert_eq!(learnt["wider_than"], serde_json::json!([]));
+    let tight = SITE.replace("x = [-0.08, 0.08]", "x = [-0.001, 0.001]");
+    assert_ne!(tight, SITE);
+    std::fs::write(case.path().join("tight.toml"), tight).expect("the site");
+    let of_tight = recorded.replace("site.toml", "tight.toml");
+    let tight = case.run(&format!(
+        "learn bounds {of_tight} --quantile 0.8 --json -o t.toml"
+    ));
+    assert!(
+        tight
+            .err
+            .contains("wider than the success set of the task `dock`"),
+        "{}",
+        tight.err
+    );
+    assert_eq!(tight.json(0)["wider_than"], serde_json::json!(["dock"]));
     let check = case.run(&format!("learn check m.toml {recorded} --json"));
     assert!(
         check.err.contains("the model was learnt from these data"),

@@ -415,10 +415,35 @@ fn create(folder: &Path) -> Result<(), FileError> {
 /// # Errors
 /// [`FileError::StandardOutput`] if writing fails, [`FileError::Closed`] if the reader has ended.
 pub fn print(bytes: &[u8]) -> Result<(), FileError> {
+    let is_captured = CAPTURED
+        .with_borrow_mut(|captured| captured.as_mut().map(|text| text.extend(bytes)).is_some());
+    if is_captured {
+        return Ok(());
+    }
     let mut out = io::stdout().lock();
     out.write_all(bytes)
         .and_then(|()| out.flush())
         .map_err(unprinted)
+}
+
+thread_local! {
+    /// What [`print`] has taken instead of standard output.
+    static CAPTURED: RefCell<Option<Vec<u8>>> = const { RefCell::new(None) };
+}
+
+/// Runs a command in this thread, and also returns what it prints ([`print`]) instead of printing it.
+pub fn captured<T>(run: impl FnOnce() -> T) -> (T, Vec<u8>) {
+    /// Also ends with a panic.
+    struct End;
+    impl Drop for End {
+        fn drop(&mut self) {
+            CAPTURED.set(None);
+        }
+    }
+    CAPTURED.set(Some(Vec::new()));
+    let _end = End;
+    let result = run();
+    (result, CAPTURED.take().unwrap_or_default())
 }
 
 /// Converts an error of writing to standard output.
