@@ -9,8 +9,6 @@ use basin::{
 };
 use core::cell::RefCell;
 use posegate::shape::Pose3Deg;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// How a search descends from a place of the grid.
@@ -157,13 +155,14 @@ impl Search<'_> {
         }
         let every = guesses.len().div_ceil((most / 2).max(1)).max(1);
         let mut points: Vec<_> = guesses.into_iter().step_by(every).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
         let (rest, whole) = (
             most.saturating_sub(points.len()),
             pieces.iter().map(Piece::size).sum::<f64>(),
         );
         for (number, piece) in pieces.iter().enumerate() {
-            let shift: Vec<f64> = (0..piece.dimensions()).map(|_| random.r#gen()).collect();
+            // Each seed takes another part of the sequence.
+            let begin = (seed % 1_000 * 1_000) as u32;
+            let shift = spread(begin, &std::vec![0.0; piece.dimensions()]);
             let share = piece.size() / whole.max(f64::MIN_POSITIVE);
             // A narrow piece may have the best place.
             let count = (libm::floor(rest as f64 * share) as u32).max(2);
