@@ -9,8 +9,8 @@ use posegate_host::draw::{Column, Mounted, MountingSheet, placement_picture};
 use posegate_host::files::{Files, Input, Output};
 use posegate_host::learn::ErrorModel;
 use posegate_host::place::{
-    Candidate, Cmaes, Genetic, LearntCost, Objective, Optimizer, PlaceError, Placed, Placement,
-    PlacementProblem, PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
+    Candidate, LearntCost, Method, Objective, PlaceError, Placed, Placement, PlacementProblem,
+    PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
 };
 use posegate_host::printable::fixed;
 use posegate_host::site::{Site, pose_line};
@@ -61,13 +61,13 @@ pub struct Arguments {
     #[arg(long, conflicts_with_all = ["free", "wall", "method", "budget", "seed"])]
     candidates: Option<Input>,
     /// The search method
-    #[arg(long, value_enum, default_value_t = Method::Cmaes)]
-    method: Method,
+    #[arg(long, value_enum, default_value_t = MethodName::Bobyqa)]
+    method: MethodName,
     /// The seed of the search: the same seed gives the same answer
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Largest number of places that are evaluated
-    #[arg(long, default_value_t = 3_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(long, default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     budget: u64,
     /// The objective of the search
     #[arg(long, value_parser = objective, default_value = "cost")]
@@ -84,10 +84,12 @@ pub struct Arguments {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Method {
-    /// Covariance matrix adaptation with restarts, then a local polish
+enum MethodName {
+    /// Quadratic models within the borders, from the best places of a grid
+    Bobyqa,
+    /// CMA-ES from these places, for comparison
     Cmaes,
-    /// A genetic algorithm (the paper's), then a local polish
+    /// A genetic algorithm (the paper's) about these places, for comparison
     Ga,
 }
 
@@ -123,15 +125,6 @@ fn objective(text: &str) -> Result<Objective, String> {
         let names = Objective::ALL.map(Objective::name);
         format!("expected one of {}", names.join(", "))
     })
-}
-
-impl Method {
-    fn optimizer(self) -> Box<dyn Optimizer> {
-        match self {
-            Self::Cmaes => Box::new(Cmaes::default()),
-            Self::Ga => Box::new(Genetic::default()),
-        }
-    }
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
@@ -170,19 +163,16 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     let space = space(arguments, &site, &moved_task)?;
     let bar = progress(arguments.budget, "places");
-    let optimizer = arguments.method.optimizer();
+    let method = match arguments.method {
+        MethodName::Bobyqa => Method::Bobyqa,
+        MethodName::Cmaes => Method::Cmaes,
+        MethodName::Ga => Method::Genetic,
+    };
     let (budget, seed) = (arguments.budget, arguments.seed);
+    let tick = |count| bar.inc(count);
     let (before, found) = rayon::join(
         || order.placed(order.task.tag.pose),
-        || {
-            place(&order, &space, &*optimizer, budget, seed, &|count| {
-                bar.inc(count);
-                // The search is over; the margin is proven next.
-                if bar.position() >= budget {
-                    bar.set_message("proofs");
-                }
-            })
-        },
+        || place(&order, &space, method, budget, seed, &tick),
     );
     bar.finish_and_clear();
     let found = found.map_err(|error| refused(arguments, &error))?;

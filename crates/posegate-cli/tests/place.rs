@@ -390,7 +390,7 @@ fn wall_with_a_tag_hides_tags_behind_it() {
 fn result_is_equal_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let budget = if counts::is_deep() { 600 } else { 60 };
-    for method in counts::one_a_day(&["cmaes", "ga"]) {
+    for method in counts::one_a_day(&["bobyqa", "cmaes", "ga"]) {
         let line = place(
             "0.1",
             &format!("{FREE} --budget {budget} --method {method} --seed 5 --json"),

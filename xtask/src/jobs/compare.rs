@@ -29,7 +29,7 @@ pub fn lenses(_: &Arguments) -> Result {
         .print()
 }
 
-/// Compares the best place of a tag by `place`, by its genetic algorithm, and by RUNS long runs (20) of SciPy's differential
+/// Compares the best place of a tag by each method of `place`, and by RUNS long runs (20) of SciPy's differential
 /// evolution. The cost is the same, for the two pose-sets of Fig. 4. Counts the poses and places that are evaluated per second.
 pub fn placement(given: &Arguments) -> Result {
     let (runs, iterations) = (given.or(0, "20"), given.or(1, "1000"));
@@ -69,8 +69,9 @@ pub fn placement(given: &Arguments) -> Result {
                 place(&format!("--budget {tenth} --seed {seed}"))?,
             )?;
         }
-        write("cmaes", place("")?)?;
-        write("ga", place("--method ga")?)?;
+        for method in ["bobyqa", "cmaes", "ga"] {
+            write(method, place(&format!("--method {method}"))?)?;
+        }
     }
     program_at(&python)
         .arg("tests/support/placements.py")

@@ -39,20 +39,49 @@ fn carriers<'a>(site: &'a Site, tag: &SiteTag) -> impl Iterator<Item = &'a Wall>
     })
 }
 
-/// Returns the face of a wall on which a tag is mounted.
-fn face(wall: &Wall, tag: &SiteTag) -> Option<Space> {
-    let pose = tag.tag.pose;
-    let out: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
-    let front = [pose.x + 0.1 * out[0][0], pose.y + 0.1 * out[1][0]];
-    Space::wall(wall, [tag.tag.size, edge(tag)], front, None).ok()
+/// The face of a wall on which a tag is mounted.
+struct Face {
+    /// The places without a keep-out, and all places.
+    spaces: [Space; 2],
+}
+
+impl Face {
+    /// Returns `None` if the tag fits nowhere on the wall.
+    fn of(wall: &Wall, tag: &SiteTag) -> Option<Self> {
+        let pose = tag.tag.pose;
+        let out: [[f64; 3]; 3] = rotation(pose.roll_deg, pose.pitch_deg, pose.yaw_deg);
+        let front = [pose.x + 0.1 * out[0][0], pose.y + 0.1 * out[1][0]];
+        let bare = Wall {
+            keep_outs: std::vec![],
+            ..wall.clone()
+        };
+        let space = |wall| Space::wall(wall, [tag.tag.size, edge(tag)], front, None).ok();
+        Some(Self {
+            spaces: [space(wall)?, space(&bare)?],
+        })
+    }
+
+    /// Returns the offset from the nearest place to a pose, metres; `None` if that place is on a keep-out.
+    fn off(&self, pose: &Pose3Deg) -> Option<[f64; 3]> {
+        let off = |space: &Space| {
+            let on = space.nearest(pose);
+            [pose.x - on.x, pose.y - on.y, pose.z - on.z]
+        };
+        let [clear, any] = [0, 1].map(|k| off(&self.spaces[k]));
+        near(clear, any).then_some(clear)
+    }
+}
+
+/// Returns `true` if two offsets are equal.
+fn near(a: [f64; 3], b: [f64; 3]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6)
 }
 
 /// Returns the name of a wall if a tag, including its border, lies on one of the wall's keep-outs.
 pub(crate) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
     let mut walls = carriers(site, tag).filter(|wall| !wall.keep_outs.is_empty());
-    let wall = walls.find(|wall| {
-        face(wall, tag).is_none_or(|space| space.pose(&space.point(&tag.tag.pose)).is_err())
-    });
+    let clear = |wall: &Wall| Face::of(wall, tag)?.off(&tag.tag.pose);
+    let wall = walls.find(|wall| clear(wall).is_none());
     wall.map(|wall| wall.name.as_str())
 }
 
@@ -60,7 +89,7 @@ pub(crate) fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str
 pub(super) struct Place<'a> {
     site: &'a Site,
     /// The face on which it is mounted, and its offset from the face.
-    face: Option<(Space, [f64; 3])>,
+    face: Option<(Face, [f64; 3])>,
     tag: &'a SiteTag,
 }
 
@@ -78,12 +107,12 @@ impl<'a> Place<'a> {
             return Some(free);
         }
         walls.find_map(|wall| {
-            let space = face(wall, tag)?;
-            let off = off(&space, tag.tag.pose)?;
+            let face = Face::of(wall, tag)?;
+            let off = face.off(&tag.tag.pose)?;
             let away = off.iter().map(|by| by * by).sum::<f64>();
             (libm::sqrt(away) <= ON_A_WALL).then_some(Self {
                 site,
-                face: Some((space, off)),
+                face: Some((face, off)),
                 tag,
             })
         })
@@ -96,8 +125,7 @@ impl<'a> Place<'a> {
         moved.tag.pose = pose;
         let half = 0.5 * edge(self.tag);
         let stays = match &self.face {
-            Some((space, from)) => off(space, pose)
-                .is_some_and(|now| now.iter().zip(from).all(|(a, b)| (a - b).abs() < 1e-6)),
+            Some((face, from)) => face.off(&pose).is_some_and(|now| near(now, *from)),
             None => {
                 let away = |wall: &Wall| {
                     wall.distance([pose.x, pose.y]) > half
@@ -110,10 +138,4 @@ impl<'a> Place<'a> {
         let clear = |other: &SiteTag| !overlap(&moved, other) || overlap(self.tag, other);
         stays && others.into_iter().all(clear)
     }
-}
-
-/// Returns the offset from the nearest place of a face to a pose, metres.
-fn off(space: &Space, pose: Pose3Deg) -> Option<[f64; 3]> {
-    let on = space.pose(&space.point(&pose)).ok()?;
-    Some([pose.x - on.x, pose.y - on.y, pose.z - on.z])
 }

@@ -2,7 +2,7 @@
 
 use super::placement::Column;
 use crate::place::{
-    Cmaes, Cost, Gaussian, Objective, PlacementProblem, PosePrior, Space, Task, place,
+    Cost, Gaussian, Method, Objective, PlacementProblem, PosePrior, Space, Task, place,
 };
 use posegate::shape::{Pose3Deg, SuccessSet, Tolerance};
 use rayon::prelude::*;
@@ -111,7 +111,7 @@ pub(super) fn places(
         let found = place(
             &order(known, objective),
             &space,
-            &Cmaes::default(),
+            Method::Bobyqa,
             evaluations,
             1,
             &|_| (),

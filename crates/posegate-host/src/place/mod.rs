@@ -23,16 +23,14 @@ pub use self::placement::{
 };
 pub use self::quadrature::{Approximate, Quadrature};
 pub use self::ranges::{Candidate, candidates, ranges};
-pub use self::search::{
-    Budget, Cmaes, Descent, Fidelity, Genetic, Optimizer, Polish, Problem, Solution,
-};
-pub use self::space::{Faces, Space, SpaceError};
+pub use self::search::Method;
+pub use self::space::{Space, SpaceError};
 
 mod accuracy;
 mod cost;
 mod disc;
 mod gaussian;
-mod grid;
+mod guesses;
 mod headings;
 mod json;
 mod learnt;

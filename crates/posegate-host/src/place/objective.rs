@@ -1,12 +1,11 @@
 //! The objective of a placement: the value of a tag's place.
 
-use super::cost::{self, Cost, expected_cost_of};
+use super::cost::{Cost, expected_cost_of};
 use super::gaussian::Gaussian;
 use super::quadrature::Quadrature;
-use super::rough;
 use super::scale::{self, Fineness};
-use core::cell::Cell;
-use posegate::shape::{LineClipper, Pose3Deg, SuccessSet, Tag, Tolerance};
+use core::cmp::Ordering;
+use posegate::shape::{Pose3Deg, SuccessSet, Tag, Tolerance};
 
 /// The objective of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,11 +68,6 @@ pub trait ViewCost: Sync {
     /// Returns the definition of the cost in words, with its unit.
     fn definition(&self) -> String;
 
-    /// Returns `true` if the cost of every view is known to be finite.
-    fn is_finite(&self) -> bool {
-        false
-    }
-
     /// Returns the quadrature to use instead of the requested one: coarser if a cost is expensive or has kinks.
     fn quadrature(&self, wanted: Quadrature) -> Quadrature {
         wanted
@@ -91,13 +85,6 @@ impl ViewCost for Cost {
 
     fn definition(&self) -> String {
         Self::definition(self)
-    }
-
-    fn is_finite(&self) -> bool {
-        // The squares of distances and angles are below 1e100.
-        [self.c1, self.c2, self.c3]
-            .into_iter()
-            .all(|factor| factor <= 1e200)
     }
 }
 
@@ -180,8 +167,7 @@ pub(super) struct PlaceEvaluator<'a> {
     pub known: PosePrior,
     pub cost: &'a dyn ViewCost,
     pub objective: Objective,
-    /// The quadrature of costs; `None` for a quick estimate.
-    pub quadrature: Option<Quadrature>,
+    pub quadrature: Quadrature,
     pub fineness: Fineness,
 }
 
@@ -193,24 +179,37 @@ struct Expected {
     unknown: f64,
 }
 
-/// The sums of a quick estimate: the integral of the cost inside, and the masses outside and of the views without a
-/// known cost.
-struct QuickSums {
-    seen: f64,
-    outside: f64,
-    unknown: f64,
+/// The value of a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PlaceValue {
+    /// The objective; less is better.
+    pub objective: f64,
+    /// 0 for a valid place. Otherwise the place is worse than every valid one, and a smaller number is better: at most 1
+    /// as part of the scale is missing, above 1 if the goal does not see the tag.
+    pub missing: f64,
 }
 
-/// The quick estimate of a place for [`Objective::ContainedCost`].
-enum QuickAnswer {
-    /// The set contains the pose-set: the expected cost.
-    Mean(f64),
-    /// Views of this mass have no known cost.
-    Unknown(f64),
-    /// The set does not contain the pose-set: the largest scale at which it does.
-    Beyond(f64),
-    /// The set has no view of a tag.
-    NoView,
+impl PlaceValue {
+    /// How much a missing scale counts in a model of the objective's logarithm. It is more than the objective gains by it.
+    const STEEPNESS: f64 = 5.0;
+
+    pub fn valid(objective: f64) -> Self {
+        Self {
+            objective,
+            missing: 0.0,
+        }
+    }
+
+    /// Returns the order of two places, the better one first.
+    pub fn order(&self, other: &Self) -> Ordering {
+        let missing = self.missing.total_cmp(&other.missing);
+        missing.then(self.objective.total_cmp(&other.objective))
+    }
+
+    /// Returns a continuous number for optimizers. Costs differ by powers of ten; a model of their logarithms is more exact.
+    pub fn merit(&self) -> f64 {
+        libm::asinh(self.objective) + Self::STEEPNESS * self.missing
+    }
 }
 
 /// A scale from this value on counts as contained. It is above 1, so that containment can be proven.
@@ -220,86 +219,74 @@ pub(super) const CONTAINED: f64 = 1.0 + 2e-4;
 const MOST_LEFT: f64 = 45.0;
 
 impl PlaceEvaluator<'_> {
-    /// Returns the value of a pose; less is better. A pose is worse than every other if the tag is not seen from the
-    /// goal, or if its set contains less than required. Its value grows with the distance from a valid pose.
-    pub fn value(&self, pose: Pose3Deg) -> f64 {
+    /// Returns the value of a pose.
+    pub fn value(&self, pose: Pose3Deg) -> PlaceValue {
         let set = self.task.at(pose);
         let reserved = match self.objective {
             Objective::Cost => set.clone(),
             _ => self.task.reserved(pose, self.task.tag.size, 0.0),
         };
         let slack = reserved.membership(goal(&set)).slack;
-        let worst = slack
-            .iter()
-            .map(|(_, slack)| *slack)
-            .fold(f64::INFINITY, f64::min);
-        let bad = |by: f64| 1e30 * (1.0 + by.min(1e6));
-        let unseen = || bad(10.0 - worst);
-        match (self.objective, self.known) {
-            (Objective::Cost | Objective::ContainedCost, PosePrior::Exactly) => {
-                if worst >= 0.0 {
-                    self.at_goal(&set)
-                } else {
-                    unseen()
-                }
+        let slacks = slack.iter().map(|(_, slack)| *slack);
+        let worst = slacks.fold(f64::INFINITY, f64::min);
+        // If nothing is seen, a smaller distance from a view is better.
+        let unseen = PlaceValue {
+            objective: self.cost.of_miss(),
+            missing: (2.0 - worst).clamp(1.0, 1e6),
+        };
+        let PosePrior::About(belief) = self.known else {
+            if worst >= 0.0 {
+                return PlaceValue::valid(self.at_goal(&set));
             }
-            (_, PosePrior::Exactly) => f64::INFINITY,
-            (Objective::Cost, PosePrior::About(belief)) => {
-                let found = self.expected(&set, &belief);
-                // If nothing is seen, a smaller distance from a view is better.
-                match found {
-                    Some(Expected { mean, p_miss, .. }) if p_miss < 1.0 - 1e-9 => mean,
-                    _ => unseen(),
+            // Just beyond the border, the view is nearly as good as within.
+            let cost = self
+                .sight_from_goal(&set)
+                .map(|view| self.cost.of_view(view));
+            let known = cost.filter(|cost| cost.is_finite());
+            return PlaceValue {
+                objective: known.unwrap_or(unseen.objective),
+                missing: (-10.0 * worst).min(1e6),
+            };
+        };
+        if worst < 0.0 && self.objective != Objective::Cost {
+            return unseen;
+        }
+        let scale = |left: f64| {
+            let set = self.task.reserved(pose, self.task.tag.size, left);
+            scale::largest(&set, &belief, self.fineness)
+        };
+        let held = |objective: f64, scale: f64| PlaceValue {
+            objective,
+            missing: (CONTAINED - scale).max(0.0),
+        };
+        match self.objective {
+            Objective::Cost => match self.expected(&set, &belief) {
+                Some(Expected { mean, p_miss, .. }) if p_miss < 1.0 - 1e-9 => {
+                    PlaceValue::valid(mean)
                 }
-            }
-            (Objective::ContainedCost, PosePrior::About(belief)) => {
-                if worst < 0.0 {
-                    return unseen();
+                _ => unseen,
+            },
+            Objective::ContainedCost => match self.expected(&set, &belief) {
+                Some(found) if found.unknown > 0.0 => PlaceValue {
+                    objective: found.mean,
+                    missing: 1.0 + found.unknown,
+                },
+                Some(Expected { mean, p_miss, .. }) => {
+                    let mut value = held(mean, scale(0.0));
+                    value.missing = value.missing.max(p_miss);
+                    value
                 }
-                if self.quadrature.is_none() {
-                    let found = self.quick_if_contained(&set, &reserved, &belief);
-                    return match found {
-                        QuickAnswer::Mean(mean) => mean,
-                        QuickAnswer::Unknown(mass) => bad(1.0 + mass),
-                        QuickAnswer::Beyond(scale) => bad(1.0 - scale),
-                        QuickAnswer::NoView => unseen(),
-                    };
-                }
-                match self.expected(&set, &belief) {
-                    Some(Expected { unknown, .. }) if unknown > 0.0 => bad(1.0 + unknown),
-                    Some(Expected { mean, p_miss, .. }) if p_miss <= 0.0 => {
-                        let scale = scale::largest(&reserved, &belief, self.fineness);
-                        if scale >= CONTAINED {
-                            mean
-                        } else {
-                            bad(1.0 - scale)
-                        }
-                    }
-                    Some(Expected { p_miss, .. }) => bad(1.0 + p_miss),
-                    None => unseen(),
-                }
-            }
-            (Objective::Margin, PosePrior::About(belief)) => {
-                if worst < 0.0 {
-                    return unseen();
-                }
-                -scale::largest(&reserved, &belief, self.fineness).min(1e6)
-            }
-            (Objective::SmallestTag, PosePrior::About(belief)) => self.smallest(pose, &belief),
-            (Objective::Tolerance, PosePrior::About(belief)) => {
-                let within = |left: f64| {
-                    let set = self.task.reserved(pose, self.task.tag.size, left);
-                    scale::largest(&set, &belief, self.fineness)
-                };
-                let plain = within(0.0);
+                None => unseen,
+            },
+            Objective::Margin => PlaceValue::valid(-scale(0.0).min(1e6)),
+            Objective::SmallestTag => self.smallest(pose, &belief),
+            Objective::Tolerance => {
+                let plain = scale(0.0);
                 if plain < CONTAINED {
-                    return if worst < 0.0 {
-                        unseen()
-                    } else {
-                        bad(1.0 - plain)
-                    };
+                    return held(0.0, plain);
                 }
-                -bisected(0.0, MOST_LEFT, |left| within(left) >= CONTAINED)
+                let left = bisected(0.0, MOST_LEFT, |left| scale(left) >= CONTAINED);
+                PlaceValue::valid(-left)
             }
         }
     }
@@ -354,13 +341,8 @@ impl PlaceEvaluator<'_> {
 
     fn expected(&self, set: &SuccessSet, belief: &Gaussian) -> Option<Expected> {
         let miss = self.cost.of_miss();
-        let Some(quadrature) = &self.quadrature else {
-            let sums = self.quick_sums(set, belief)?;
-            let scale = scale::largest(set, belief, self.fineness);
-            return Some(self.quick(&sums, belief, scale));
-        };
         let of_view = |view| self.cost.of_view(view);
-        let found = expected_cost_of(set, belief, miss, &of_view, quadrature).ok()?;
+        let found = expected_cost_of(set, belief, miss, &of_view, &self.quadrature).ok()?;
         Some(Expected {
             mean: found.mean.value,
             p_miss: found.p_miss.value,
@@ -368,80 +350,8 @@ impl PlaceEvaluator<'_> {
         })
     }
 
-    /// Returns the sums of a quick estimate; `None` without a view.
-    fn quick_sums(&self, set: &SuccessSet, belief: &Gaussian) -> Option<QuickSums> {
-        let along = LineClipper::of(set);
-        if along.views() == 0 {
-            return None;
-        }
-        let met_unknown = Cell::new(false);
-        let of_view = |view| {
-            let cost = self.cost.of_view(view);
-            met_unknown.set(met_unknown.get() || !cost.is_finite());
-            cost
-        };
-        let white = belief.at(set.goal);
-        let [seen, outside] = rough::sums(&along, &white, &of_view);
-        let mut unknown = 0.0;
-        if met_unknown.get() {
-            let of_view = |view| cost::unknown(self.cost.of_view(view));
-            [unknown, _] = rough::sums(&along, &white, &of_view);
-        }
-        Some(QuickSums {
-            seen,
-            outside,
-            unknown,
-        })
-    }
-
-    /// Returns the quick estimate from its sums and the largest scale at which the set contains the pose-set.
-    fn quick(&self, sums: &QuickSums, belief: &Gaussian, scale: f64) -> Expected {
-        // A quick estimate misses parts between its rays. The mass outside is at least that of a cap.
-        let outside = sums.outside.max(belief.cap(scale));
-        let missed = outside + sums.unknown;
-        Expected {
-            mean: (sums.seen + self.cost.of_miss() * missed) / belief.mass(),
-            p_miss: (missed / belief.mass()).min(1.0),
-            unknown: sums.unknown,
-        }
-    }
-
-    /// Returns the quick estimate of the cost of a place at which the reserved set contains the pose-set. Sums that
-    /// the result does not depend on are not computed.
-    fn quick_if_contained(
-        &self,
-        set: &SuccessSet,
-        reserved: &SuccessSet,
-        belief: &Gaussian,
-    ) -> QuickAnswer {
-        let within = || scale::largest(reserved, belief, self.fineness);
-        if LineClipper::of(set).views() == 0 {
-            return QuickAnswer::NoView;
-        }
-        let early = self.cost.is_finite().then(within);
-        if let Some(scale) = early.filter(|scale| !(*scale >= CONTAINED)) {
-            return QuickAnswer::Beyond(scale);
-        }
-        let Some(sums) = self.quick_sums(set, belief) else {
-            return QuickAnswer::NoView;
-        };
-        if sums.unknown > 0.0 {
-            return QuickAnswer::Unknown(sums.unknown);
-        }
-        let scale = early.unwrap_or_else(within);
-        if !(scale >= CONTAINED) {
-            return QuickAnswer::Beyond(scale);
-        }
-        let own = if set == reserved {
-            scale
-        } else {
-            scale::largest(set, belief, self.fineness)
-        };
-        QuickAnswer::Mean(self.quick(&sums, belief, own).mean)
-    }
-
     /// Returns the smallest size with which S contains the pose-set, searched upwards from 1/8 of the tag's own size.
-    fn smallest(&self, pose: Pose3Deg, belief: &Gaussian) -> f64 {
+    fn smallest(&self, pose: Pose3Deg, belief: &Gaussian) -> PlaceValue {
         let scale = |size: f64| {
             let set = self.task.reserved(pose, size, 0.0);
             scale::largest(&set, belief, self.fineness)
@@ -454,16 +364,19 @@ impl PlaceEvaluator<'_> {
         for size in sizes {
             let held = scale(size);
             if held >= CONTAINED {
-                return if below > 0.0 {
+                return PlaceValue::valid(if below > 0.0 {
                     -bisected(-size, -below, |size| scale(-size) >= CONTAINED)
                 } else {
                     size
-                };
+                });
             }
             best = best.max(held);
             below = size;
         }
-        1e30 * (2.0 - best)
+        PlaceValue {
+            objective: below,
+            missing: CONTAINED - best,
+        }
     }
 }
 

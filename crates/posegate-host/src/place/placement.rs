@@ -1,14 +1,15 @@
 //! The search for the best place of a tag for its task.
 
 use super::gaussian::Gaussian;
-use super::grid;
-use super::objective::{self, Objective, PlaceEvaluator, PosePrior, Task, ViewCost};
+use super::guesses;
+use super::objective::{self, Objective, PlaceEvaluator, PlaceValue, PosePrior, Task, ViewCost};
 use super::quadrature::{Approximate, Quadrature};
 use super::scale::{self, Fineness};
-use super::search::{Budget, Descent, Fidelity, Optimizer, Polish, Problem, Solution};
+use super::search::{Method, Search};
 use super::space::Space;
 use super::{CostError, expected_cost_of};
-use posegate::shape::{Pose3Deg, Scalar, Tolerance};
+use core::cmp::Ordering;
+use posegate::shape::{Pose3Deg, Tolerance};
 use rayon::prelude::*;
 
 /// The input of a placement.
@@ -107,182 +108,61 @@ pub enum PlaceError {
     NoCandidates,
 }
 
-/// Percentages of the budget for each place that is polished: for a descent, and for the last steps.
-const DESCENT: u64 = 16;
-const LAST: u64 = 6;
-
-/// The share of the budget for the grid on which the search begins, percent.
-const GRID: u64 = 16;
-
-/// Smaller budgets start from a few hints instead of a grid.
-const SMALL: u64 = 1_200;
-
-/// The number of places that are polished: the best, and possible mirror images.
-const POLISHED: usize = 2;
-
-/// The number of places straight in front of the camera that a search may start from.
-const AHEAD: u32 = 8;
-
-struct Searched<'a> {
-    quick: PlaceEvaluator<'a>,
-    fine: PlaceEvaluator<'a>,
-    space: &'a Space,
-    hints: Vec<Vec<f64>>,
-}
-
-impl Problem for Searched<'_> {
-    fn dimensions(&self) -> usize {
-        self.space.dimensions()
-    }
-
-    fn is_periodic(&self, number: usize) -> bool {
-        self.space.is_periodic(number)
-    }
-
-    fn initial_guesses(&self) -> Vec<Vec<f64>> {
-        self.hints.clone()
-    }
-
-    fn value(&self, point: &[f64], look: Fidelity) -> f64 {
-        let evaluator = match look {
-            Fidelity::Quick => &self.quick,
-            Fidelity::Fine => &self.fine,
-        };
-        match self.space.pose(point) {
-            Ok(pose) => evaluator.value(pose),
-            // Worse than any valid pose, and better the closer it is to a valid one.
-            Err(depth) => 1e40 * (1.0 + depth),
-        }
-    }
-}
-
-/// Searches the best place in a space: an optimizer's search, a polish of its best solutions, and an evaluation of
-/// the final place at full accuracy.
+/// Searches the best place in a space, and evaluates it at full accuracy.
 ///
-/// `evaluations` is the number of places to evaluate, including those of the polish. The result is the same for the
-/// same arguments and any number of threads. `progress` is called with the number of evaluations of each batch.
+/// `looks` is the largest number of places to evaluate. The result is the same for the same arguments and any number of
+/// threads. `progress` is called with each number of places that were evaluated.
 ///
 /// # Errors
-/// [`PlaceError`] if the problem is invalid or no place was found.
+/// [`PlaceError`] if the problem is invalid.
 pub fn place(
     order: &PlacementProblem<'_>,
     space: &Space,
-    optimizer: &dyn Optimizer,
-    evaluations: u64,
+    method: Method,
+    looks: u64,
     seed: u64,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Placement, PlaceError> {
     order.check()?;
-    let share = |of_100: u64| evaluations * of_100 / 100;
-    let polished = if optimizer.refines_internally() {
-        0
-    } else {
-        POLISHED as u64 * share(DESCENT + LAST)
-    };
-    let searched = Searched {
-        quick: order.evaluator(None, Fineness::ROUGH),
-        fine: order.evaluator(Some(POLISH), Fineness::CLOSE),
+    let evaluator = order.evaluator(SEARCH, Fineness::CLOSE);
+    let search = Search {
         space,
-        hints: if evaluations < SMALL {
-            let ahead = order.task.ahead();
-            ahead.iter().map(|pose| space.point(pose)).collect()
-        } else {
-            grid::grid(order.task, space, share(GRID) as usize)
-        },
+        value: &|pose| evaluator.value(pose),
+        guesses: guesses::guesses(order.task),
+        progress,
     };
-    let search = Budget::new(evaluations - polished, progress);
-    let mut found = optimizer.search(&searched, &search, seed);
-    found.sort_by(|a, b| a.value.total_cmp(&b.value));
-    let restarts: Vec<Restart> = found
-        .par_iter()
-        .filter_map(|found| {
-            let pose = space.pose(&found.point).ok()?;
-            let mean = searched.fine.mean(pose);
-            Some(Restart { pose, mean })
-        })
-        .collect();
-    found.truncate(POLISHED);
-    let mut total = search.spent();
-    let mut polished = Vec::new();
-    if optimizer.refines_internally() {
-        polished = core::mem::take(&mut found);
-    }
-    // Each solution has its own budgets, so the solutions can be polished in parallel with the same results.
-    let budgets = [DESCENT, LAST].map(share);
-    let ends: Vec<(Vec<Solution>, u64)> = found
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|solution| polish(&searched, solution.point, budgets, seed, progress))
-        .collect();
-    for (ends, spent) in ends {
-        polished.extend(ends);
-        total += spent;
-    }
-    let found = super::search::distinct(&searched, polished);
-    let placed: Vec<Result<Placed, PlaceError>> = found
-        .par_iter()
-        .filter_map(|found| {
-            let pose = space.pose(&found.point).ok()?;
-            Some(order.placed(pose))
-        })
-        .collect();
-    let mut placed = best_first(placed, order.objective).into_iter();
-    let best = placed.next().ok_or(PlaceError::NoCandidates)??;
+    let found = search.run(method, looks, seed);
+    let restart = |pose: &Pose3Deg| Restart {
+        pose: *pose,
+        mean: evaluator.mean(*pose),
+    };
+    let placed = found.best.par_iter().map(|pose| order.placed(*pose));
+    let mut placed = placed.collect::<Result<Vec<_>, _>>()?;
+    placed.sort_by(|a, b| order.objective.compared(a, b));
+    let best = if placed.is_empty() {
+        return Err(PlaceError::NoCandidates);
+    } else {
+        placed.remove(0)
+    };
     Ok(Placement {
         best,
-        others: placed.collect::<Result<_, _>>()?,
-        restarts,
-        evaluations: total,
+        others: placed,
+        restarts: found.descents.par_iter().map(restart).collect(),
+        evaluations: found.looks,
     })
 }
 
-/// Improves a solution in two steps, a descent and a polish of what it finds, with a budget of evaluations for each. Returns the ends,
-/// and the evaluations that were spent.
-fn polish(
-    searched: &Searched<'_>,
-    point: Vec<f64>,
-    [descent, last]: [u64; 2],
-    seed: u64,
-    progress: &(dyn Fn(u64) + Sync),
-) -> (Vec<Solution>, u64) {
-    let budget = Budget::new(descent, progress);
-    let value = budget.values(searched, core::slice::from_ref(&point), Fidelity::Fine)[0];
-    let from = Solution { point, value };
-    let found = Descent { from, sigma: 0.01 }.search(searched, &budget, seed);
-    let mut spent = budget.spent();
-    let mut ends = Vec::new();
-    for from in found {
-        let budget = Budget::new(last, progress);
-        let last = Polish {
-            from,
-            step: 1e-3,
-            smallest: 1e-8,
-        };
-        ends.extend(last.search(searched, &budget, seed));
-        spent += budget.spent();
+impl Objective {
+    /// Returns the order of two places by their cost at full accuracy; equal if the objective is no cost.
+    fn compared(self, a: &Placed, b: &Placed) -> Ordering {
+        let cost = |one: &Placed| one.mean.map_or(one.cost_at_goal, |mean| mean.value);
+        let by_cost = cost(a).total_cmp(&cost(b));
+        match self {
+            Self::Cost => by_cost,
+            Self::ContainedCost => b.contained.cmp(&a.contained).then(by_cost),
+            _ => Ordering::Equal,
+        }
     }
-    (ends, spent)
-}
-
-/// Sorts places by their cost at full accuracy, if the objective is a cost. A place that cannot be evaluated comes first, so that its
-/// error is reported.
-fn best_first(
-    mut placed: Vec<Result<Placed, PlaceError>>,
-    objective: Objective,
-) -> Vec<Result<Placed, PlaceError>> {
-    if matches!(objective, Objective::Cost | Objective::ContainedCost) {
-        let contained = objective == Objective::ContainedCost;
-        placed.sort_by(|a, b| match (a, b) {
-            (Ok(a), Ok(b)) => {
-                let cost = |one: &Placed| one.mean.map_or(one.cost_at_goal, |mean| mean.value);
-                let misses = |one: &Placed| contained && !one.contained;
-                let order = misses(a).cmp(&misses(b));
-                order.then(cost(a).total_cmp(&cost(b)))
-            }
-            _ => a.is_ok().cmp(&b.is_ok()),
-        });
-    }
-    placed
 }
 
 /// Evaluates each of the given poses. Returns the index of the best, and the results in the order of the poses.
@@ -295,8 +175,8 @@ pub fn compare(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<(usize, Vec<Placed>), PlaceError> {
     order.check()?;
-    let evaluator = order.evaluator(Some(POLISH), Fineness::FINE);
-    let looked: Vec<(f64, Result<Placed, PlaceError>)> = poses
+    let evaluator = order.evaluator(SEARCH, Fineness::FINE);
+    let looked: Vec<(PlaceValue, Result<Placed, PlaceError>)> = poses
         .par_iter()
         .map(|pose| {
             let both = (evaluator.value(*pose), order.placed(*pose));
@@ -306,14 +186,14 @@ pub fn compare(
         .collect();
     let values = looked.iter().map(|(value, _)| *value).enumerate();
     let (best, _) = values
-        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .min_by(|a, b| a.1.order(&b.1))
         .ok_or(PlaceError::NoCandidates)?;
     let placed = looked.into_iter().map(|(_, placed)| placed);
     Ok((best, placed.collect::<Result<_, _>>()?))
 }
 
-/// The quadrature of the polish: finer than in a search, to resolve the differences that it compares.
-const POLISH: Quadrature = Quadrature {
+/// The quadrature of a search: fine enough to resolve the differences that it compares.
+const SEARCH: Quadrature = Quadrature {
     accuracy: 1e-3,
     views: 30_000,
     ..Quadrature::ROUGH
@@ -339,13 +219,13 @@ impl PlacementProblem<'_> {
         Ok(())
     }
 
-    fn evaluator(&self, quadrature: Option<Quadrature>, fineness: Fineness) -> PlaceEvaluator<'_> {
+    fn evaluator(&self, quadrature: Quadrature, fineness: Fineness) -> PlaceEvaluator<'_> {
         PlaceEvaluator {
             task: self.task,
             known: self.known,
             cost: self.cost,
             objective: self.objective,
-            quadrature: quadrature.map(|wanted| self.cost.quadrature(wanted)),
+            quadrature: self.cost.quadrature(quadrature),
             fineness,
         }
     }
@@ -355,14 +235,14 @@ impl PlacementProblem<'_> {
     /// # Errors
     /// [`PlaceError::Cost`] if there is no expected cost.
     pub fn placed(&self, pose: Pose3Deg) -> Result<Placed, PlaceError> {
-        let evaluator = self.evaluator(Some(ANSWER), Fineness::FINE);
+        let evaluator = self.evaluator(ANSWER, Fineness::FINE);
         let size = match (self.objective, self.known) {
             (Objective::SmallestTag, PosePrior::About(_)) => {
-                let size = evaluator.value(pose);
-                if size < 1e20 {
-                    size
-                } else {
+                let value = evaluator.value(pose);
+                if value.missing > 0.0 {
                     self.task.tag.size
+                } else {
+                    value.objective
                 }
             }
             _ => self.task.tag.size,
@@ -449,34 +329,6 @@ impl PlacementProblem<'_> {
 }
 
 impl Task {
-    /// Returns poses straight in front of the camera at the goal, facing it, at distances up to the largest one.
-    fn ahead(&self) -> Vec<Pose3Deg> {
-        let mut places = Vec::new();
-        let goal = self.set.goal;
-        for view in self.set.views_of(&self.tag) {
-            let mount = &view.mount;
-            let yaw_deg = goal.yaw_deg + mount.yaw_deg;
-            let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
-            let eye = [
-                goal.x + c * mount.x - s * mount.y,
-                goal.y + s * mount.x + c * mount.y,
-            ];
-            let [c, s] = f64::cos_sin_deg(yaw_deg);
-            places.extend((0..AHEAD).map(|k| {
-                let share = f64::from(k) / f64::from(AHEAD - 1);
-                let far = view.d_max * libm::pow(20.0, share - 1.0);
-                Pose3Deg {
-                    x: eye[0] + far * c,
-                    y: eye[1] + far * s,
-                    z: mount.z,
-                    yaw_deg: yaw_deg + 180.0,
-                    ..self.tag.pose
-                }
-            }));
-        }
-        places
-    }
-
     fn asks_for_sharpness(&self) -> bool {
         let views = self.set.views_of(&self.tag);
         views.iter().any(|view| view.sharpness.is_some())

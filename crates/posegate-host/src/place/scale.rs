@@ -19,13 +19,7 @@ pub(super) struct Fineness {
 }
 
 impl Fineness {
-    /// For a search: accurate to about 1e-3.
-    pub(super) const ROUGH: Self = Self {
-        headings: 8,
-        directions: 24,
-        steps: 10,
-    };
-    /// For the end of a search: accurate to some 1e-5.
+    /// For a search: accurate to some 1e-5.
     pub(super) const CLOSE: Self = Self {
         headings: 16,
         directions: 48,
@@ -333,12 +327,12 @@ mod tests {
             let exact = (x / (r * s[1]))
                 .min(y / (r * s[0]))
                 .min(yaw_deg.to_radians() / (r * s[2]));
-            let rough = largest(&set, &belief, Fineness::ROUGH);
+            let close = largest(&set, &belief, Fineness::CLOSE);
             let fine = largest(&set, &belief, Fineness::FINE);
             assert!((fine / exact - 1.0).abs() < 2e-6, "{fine} {exact}");
             assert!(
-                rough >= exact * (1.0 - 1e-9) && rough < exact * 1.01,
-                "{rough} {exact}"
+                close >= exact * (1.0 - 1e-9) && close < exact * 1.0001,
+                "{close} {exact}"
             );
             let proven = proven(&set, &belief).unwrap();
             assert!(

@@ -3,6 +3,7 @@ use crate::site::{SAMPLE, Site};
 use posegate::shape::{Shape, SuccessSet};
 use posegate_testkit::counts;
 
+mod scenes;
 mod small;
 
 /// Returns the set of the sample's `see-t7`, with parts of its site replaced.

@@ -1,11 +1,8 @@
-//! A coarse grid of places from which searches begin: the same for every seed.
+//! Places that the camera at the goal sees: near them a search looks first.
 
 use super::objective::Task;
-use super::space::Space;
 use posegate::shape::{Pose3Deg, Scalar, Visibility, rotation};
 
-/// The number of places of the grid over the space itself.
-const OF_SPACE: usize = 400;
 /// Distances of the grid over the camera's view, as shares of the largest one.
 const DISTANCES: [f64; 8] = [0.06, 0.1, 0.16, 0.24, 0.36, 0.52, 0.72, 0.95];
 /// Angles to the left of the optical axis, as shares of the largest one.
@@ -14,33 +11,13 @@ const BEARINGS: [f64; 5] = [0.0, -0.45, 0.45, -0.9, 0.9];
 const ELEVATIONS: [f64; 3] = [0.0, -0.5, 0.5];
 /// Rotations of a tag away from the camera, as shares of the largest angle.
 const TURNS: [f64; 3] = [0.0, -0.55, 0.55];
-/// Points closer to each other than this, in the unit cube, count as one.
-const SAME: f64 = 1e-3;
 
-/// Returns at most `most` points of the unit cube of a space: a grid over each part of the space, and places that the
-/// camera at the goal sees.
-pub(super) fn grid(task: &Task, space: &Space, most: usize) -> Vec<Vec<f64>> {
-    let mut points = space.grid(OF_SPACE.min(most / 2));
+/// Returns poses of the tag all over the views of the cameras at the goal.
+pub(super) fn guesses(task: &Task) -> Vec<Pose3Deg> {
     let views = task.set.views_of(&task.tag);
-    let seen: Vec<Pose3Deg> = views.iter().flat_map(|view| in_view(task, view)).collect();
-    let mut kept: Vec<Vec<f64>> = Vec::new();
-    for pose in &seen {
-        let point = space.point(pose);
-        let same = |other: &Vec<f64>| {
-            let off = other.iter().zip(&point).map(|(a, b)| (a - b).abs());
-            off.fold(0.0, f64::max) < SAME
-        };
-        if !kept.iter().any(same) {
-            kept.push(point);
-        }
-    }
-    let rest = most.saturating_sub(points.len()).max(1);
-    let every = kept.len().div_ceil(rest).max(1);
-    points.extend(kept.into_iter().step_by(every));
-    points
+    views.iter().flat_map(|view| in_view(task, view)).collect()
 }
 
-/// Returns poses of the tag all over the view of the camera at the goal.
 fn in_view(task: &Task, view: &Visibility) -> Vec<Pose3Deg> {
     let goal = task.set.goal;
     let mount = &view.mount;
