@@ -85,12 +85,12 @@ impl Scene {
     fn random(random: &mut ChaCha8Rng, number: usize) -> Self {
         let sigmas = [random.gen_range(0.03..0.3), random.gen_range(0.5..3.0)];
         let pitch_deg = random.gen_range(-15.0..15.0);
-        if number % 2 == 0 {
-            let flat = number % 4 == 0;
+        if number.is_multiple_of(2) {
+            let flat = number.is_multiple_of(4);
             let z = random.gen_range(0.3..1.2);
             let heights = if flat { [z, z] } else { [0.0, 2.5] };
             let (far, lean) = (random.gen_range(1.2..3.5), random.gen_range(-1.0..1.0));
-            let corners = if number % 3 == 0 {
+            let corners = if number.is_multiple_of(3) {
                 let wide = random.gen_range(0.3..1.5);
                 let [a, b, c, d] = [
                     [far, wide],
