@@ -1,5 +1,6 @@
 //! A folder with an input for every subcommand, and a command line for each subcommand that runs there.
 
+use crate::bags::{Bag, Pose};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use std::sync::OnceLock;
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 36] = [
+pub const LINES: [(&str, &str); 37] = [
     ("init", "init {file}"),
     ("check", "check {site}"),
     (
@@ -46,19 +47,26 @@ pub const LINES: [(&str, &str); 36] = [
     ),
     (
         "learn bounds",
-        "learn bounds {detections} --quantile 0.9 --camera rear --site {site} --tag-size 0.2 --family tag36h11 -o {output}",
+        "learn bounds {detections} --quantile 0.9 --camera rear --site {site} --tag-size 0.2 --family tag36h11 --truth {truth} --times {times} -o {output}",
     ),
     (
         "learn inflation",
         "learn inflation {estimates} --epsilon 0.9 -o {output}",
     ),
+    (
+        "learn inflation",
+        "learn inflation drive.mcap --topic /pose --epsilon 0.5 --site {site} --truth {truth} --times {times} -o {output}",
+    ),
     ("learn outcomes", "learn outcomes {outcomes} --epsilon 0.9"),
-    ("learn check", "learn check {model} {detections}"),
+    (
+        "learn check",
+        "learn check {model} {detections} --site {site} --truth {truth} --times {times}",
+    ),
     ("learn survey", "learn survey {site} {dockings}"),
     ("predict", "predict {model} --at {at}"),
     (
         "replay",
-        "replay {site} {log} --task dock --truth {truth} --times {times} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --mcap {mcap} -o {output}",
+        "replay {site} {log} --task dock --truth {truth} --times {times} --odom {odom} --max-speed 1 --max-yaw-rate 90 --table {table} --rows {rows} --csv {csv} --mcap {mcap} -o {output}",
     ),
     (
         "replay",
@@ -322,6 +330,21 @@ projection_matrix: {rows: 3, cols: 4, data: [380.5, 0, 324.0, 0.0, 0.0, 384.25, 
 
 const FIELD: &str = r#"{"tags": [{"ID": 1, "pose": {"translation": {"x": 9.0, "y": 9.0, "z": 1.0}, "rotation": {"quaternion": {"W": 1.0, "X": 0.0, "Y": 0.0, "Z": 0.0}}}}]}"#;
 
+/// Returns an estimate with these errors, near the true pose of a row.
+fn near(t_s: f64, row: i32, [x, y, yaw]: [f64; 3]) -> Pose {
+    Pose {
+        t_s,
+        logged_s: None,
+        frame: "map",
+        x: 1.5 + x,
+        y: 0.2 + 1e-3 * f64::from(row) + y,
+        yaw,
+        roll: 0.0,
+        length: 1.0,
+        covariance: [1e-4; 3],
+    }
+}
+
 fn fixture() -> Folder {
     let folder = Folder(tempfile::tempdir().unwrap());
     let chain = include_str!("../../../examples/sites/paper-chain.toml");
@@ -352,6 +375,7 @@ fn fixture() -> Folder {
             .wrapping_add(1);
         (state >> 40) as f64 / f64::from(1 << 24) - 0.5
     };
+    let mut bag = Bag::new(None, true);
     for i in 0..400 {
         let t = f64::from(i) * 0.1;
         let row = format!(
@@ -363,6 +387,7 @@ fn fixture() -> Folder {
         if i < 50 {
             estimates += &format!("{row}\n");
             tum += &format!("{t:.1} 1.5 0.2{i:02} 0 0 0 0 1\n");
+            bag.pose("/pose", &near(t, i, [(); 3].map(|()| 0.02 * random())));
         }
         scored += &format!("{row},1.5,0.2,0\n");
     }
@@ -380,6 +405,7 @@ fn fixture() -> Folder {
         "dockings.csv",
         format!("run,dock,tag,x_m,y_m,yaw_rad\n{dockings}"),
     );
+    folder.write("drive.mcap", bag.finish());
     folder.write("estimates.csv", estimates);
     folder.write("scored.csv", scored);
     folder.write("truth.tum", &tum);

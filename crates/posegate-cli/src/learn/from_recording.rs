@@ -114,6 +114,12 @@ fn open(
             ));
         }
         if !asked {
+            if options.truth.is_some() {
+                warn(&format_args!(
+                    "{}: a CSV has its own true poses or errors: --truth is not used",
+                    log.display()
+                ));
+            }
             return Ok(None);
         }
     }
