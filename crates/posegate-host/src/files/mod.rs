@@ -431,7 +431,7 @@ thread_local! {
     static CAPTURED: RefCell<Option<Vec<u8>>> = const { RefCell::new(None) };
 }
 
-/// Runs a command in this thread, and also returns what it prints ([`print`]) instead of printing it.
+/// Runs a command in this thread, and also returns what it prints ([`print()`]) instead of printing it.
 pub fn captured<T>(run: impl FnOnce() -> T) -> (T, Vec<u8>) {
     /// Also ends with a panic.
     struct End;
