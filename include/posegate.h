@@ -10,9 +10,9 @@
  *
  * What a gate + tracker of a robot that drives takes, without its table, and a 100 Hz cycle of it (./ci.sh costs; `posegate table cost` reports
  * it for your table, with the bound of a cycle):
- *   Cortex-M4F: flash 36 + 18 kB (boxes, -Os) to 78 + 23 kB (all shapes, -O3), stack 2,880 B, 13,638 instructions
- *   Cortex-M0+: flash 39 + 19 kB (boxes, -Os) to 80 + 24 kB (all shapes, -O3), stack 3,004 B, 40,345 instructions
- *   RV32IMC: flash 48 + 24 kB (boxes, -Os) to 101 + 33 kB (all shapes, -O3), stack 2,832 B, 17,345 instructions
+ *   Cortex-M4F: flash 36 + 17 kB (boxes, -Os) to 77 + 22 kB (all shapes, -O3), stack 2,704 B, 13,562 instructions
+ *   Cortex-M0+: flash 39 + 19 kB (boxes, -Os) to 79 + 23 kB (all shapes, -O3), stack 2,992 B, 40,196 instructions
+ *   RV32IMC: flash 48 + 22 kB (boxes, -Os) to 100 + 32 kB (all shapes, -O3), stack 2,608 B, 17,297 instructions
  *
  * C99 and C++11. Link libposegate_c.a after your own objects, with -Wl,--gc-sections; examples/c has
  * recipes for Make and CMake.
@@ -107,16 +107,16 @@
 /**
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
-#define POSEGATE_ABI_VERSION 7U
+#define POSEGATE_ABI_VERSION 6U
 
 /**
  * Number of 64-bit words of a `posegate_tracker`.
  */
-#define POSEGATE_TRACKER_WORDS 224U
+#define POSEGATE_TRACKER_WORDS 192U
 
 /**
- * Number of increments that a tracker keeps; those that together last at most 8 ms are kept as one. A fix with a stamp before the oldest
- * one is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`): see `posegate_tracker_reach`.
+ * Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
+ * (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
  */
 #define POSEGATE_TRACKER_INCREMENTS 64U
 
@@ -2247,16 +2247,6 @@ posegate_status posegate_tracker_init(struct posegate_tracker *tracker,
 posegate_status posegate_tracker_odometry(struct posegate_tracker *tracker,
                                           const struct posegate_increment *increment,
                                           uint32_t *reason);
-
-/**
- * Writes how far back the kept increments reach from the newest, milliseconds: 64 times the period of the odometry, and at least 256 ms at
- * a shorter period than 8 ms. An older fix is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
- *
- * # Safety
- * Each pointer is null, misaligned, or valid for its type.
- */
-posegate_status posegate_tracker_reach(struct posegate_tracker *tracker,
-                                       uint32_t *reach_ms);
 
 /**
  * Takes a fix, also a late one: it is carried along the increments since its stamp. All fixes come from one source, each with
