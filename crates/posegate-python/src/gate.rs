@@ -202,7 +202,7 @@ impl PyGate {
         Ok(self.with(|gate| gate.step(now_ms, &report)).into())
     }
 
-    /// Evaluates what a tracker carries to the time `now_ms`. Without a usable fix the gate is told so, and closes.
+    /// Evaluates what a tracker carries to the time `now_ms`. Without a usable fix the gate closes, with the reason.
     fn step_on(&mut self, now_ms: u32, tracker: &mut PyTracker) -> PyGateStep {
         let tracked = tracker.tracker.tracked(now_ms);
         let step = self.with(|gate| match &tracked {
