@@ -341,11 +341,11 @@ fn best_place_at_the_border_of_a_keep_out_is_found_by_every_seed() {
     }
 }
 
+/// The fast suite tries one scene, `./ci.sh deep` all.
 #[test]
-#[ignore = "takes long: ./ci.sh deep"]
 fn best_places_of_random_scenes_are_found_by_every_seed() {
     let mut missed = Vec::new();
-    for number in 0..60 {
+    for number in 0..if counts::is_deep() { 60 } else { 1 } {
         // The next random scene in which a place sees the tag well.
         let mut random = ChaCha8Rng::seed_from_u64(number);
         let (best, ratios) = (0..50)
