@@ -32,6 +32,8 @@ use crate::set::Growth;
 pub struct MotionBounds {
     /// Micrometres per millisecond, 2^-10, in the direction in which the robot is fastest.
     speed_q10: u32,
+    /// The same across the robot's axis.
+    side_q10: u32,
     /// 2^-24 turn per millisecond, 2^-16.
     turn_q16: u32,
 }
@@ -48,6 +50,7 @@ impl MotionBounds {
     /// brakes that the same output releases.
     pub const STANDS_STILL: Self = Self {
         speed_q10: 0,
+        side_q10: 0,
         turn_q16: 0,
     };
 
@@ -74,6 +77,7 @@ impl MotionBounds {
         };
         Some(Self {
             speed_q10: u32::try_from(speed).ok()?,
+            side_q10: u32::try_from(across).ok()?,
             turn_q16: up(turn_rad_s, &TURN)?,
         })
     }
@@ -91,26 +95,29 @@ impl MotionBounds {
         });
         Self {
             speed_q10: within_range(root.wrapping_mul(1 << 10)),
+            side_q10: within_range(wide(across_mm_s, 1 << 10)),
             // 2^24 / (2 pi) * 2^16 / 10^6 is 174,992.7.
             turn_q16: limited(wide(turn_mrad_s, 174_993)),
         }
     }
 
-    /// Returns the largest movement within a time in milliseconds: the radius of its positions, and the turn to either side.
+    /// Returns the largest movement within a time in milliseconds: the radius of its positions, how far they lead across the robot's axis, and the turn to
+    /// either side.
     #[must_use]
     pub const fn within(&self, ms: u32) -> Growth {
         if self.speed_q10 | self.turn_q16 == 0 {
             return Growth::NONE;
         }
         let length = wide(self.speed_q10, ms).wrapping_add((1 << 10) - 1) >> 10;
+        let side = wide(self.side_q10, ms).wrapping_add((1 << 10) - 1) >> 10;
         let turn = wide(self.turn_q16, ms).wrapping_add((1 << 16) - 1) >> 16;
-        Growth::new(limited(length), limited(turn))
+        Growth::along(limited(length), limited(side), limited(turn))
     }
 
-    /// Returns the two numbers that state the bounds, for a digest of settings.
+    /// Returns the numbers that state the bounds, for a digest of settings.
     #[must_use]
-    pub const fn words(&self) -> [u32; 2] {
-        [self.speed_q10, self.turn_q16]
+    pub const fn words(&self) -> [u32; 3] {
+        [self.speed_q10, self.side_q10, self.turn_q16]
     }
 }
 
@@ -163,7 +170,8 @@ mod tests {
     #[test]
     fn longest_time_gives_largest_movement() {
         let bounds = MotionBounds::new(1.0, 0.0, 1.0).unwrap();
-        assert_eq!(bounds.within(u32::MAX), Growth::new(u32::MAX, u32::MAX));
+        let most = Growth::along(u32::MAX, 0, u32::MAX);
+        assert_eq!(bounds.within(u32::MAX), most);
         assert_eq!(bounds.within(0), Growth::NONE);
         assert_eq!(MotionBounds::STANDS_STILL.within(u32::MAX), Growth::NONE);
     }
@@ -189,7 +197,7 @@ mod tests {
             );
         }
         let fastest = of(u32::MAX, u32::MAX, u32::MAX);
-        assert_eq!(fastest.words(), [LARGEST, u32::MAX]);
+        assert_eq!(fastest.words(), [LARGEST, LARGEST, u32::MAX]);
     }
 
     proptest! {
@@ -214,11 +222,11 @@ mod tests {
         use crate::error_budget::{Exact, Random, Row, Search};
         use crate::gate::Settings;
         let mut random = Random::new(31);
-        let mut searches = [(); 5].map(|()| Search::new());
+        let mut searches = [(); 6].map(|()| Search::new());
         let metre = Exact::int(1_000_000);
         let radian = Exact::int(1 << 23).div(&Exact::pi());
         for _ in 0..crate::test_share(50_000, 20) {
-            let [length, turn, rounded, turned, later] = &mut searches;
+            let [length, turn, rounded, turned, later, aside] = &mut searches;
             let (speed, rate) = (random.log_within(1e-3, 10.0), random.log_within(1e-3, 20.0));
             let ms = random.log_within(1.0, 5e3) as u32;
             let across = random.log_within(1e-3, 10.0) * random.within(-1.0, 1.0).max(0.0);
@@ -231,9 +239,9 @@ mod tests {
             length.case(growth.translation_um().into(), exact.to_f64());
             let exact = &(&Exact::float(rate) * &seconds) * &radian;
             turn.case(growth.yaw_q24().into(), exact.to_f64());
-            let [mm, aside, mrad] = [speed, across, rate].map(|v| (v * 1e3) as u32);
-            let constant = MotionBounds::of_mm_mrad(mm, aside, mrad).within(ms);
-            let root = Exact::int(u64::from(mm).pow(2) + u64::from(aside).pow(2)).sqrt();
+            let [mm, mm_across, mrad] = [speed, across, rate].map(|v| (v * 1e3) as u32);
+            let constant = MotionBounds::of_mm_mrad(mm, mm_across, mrad).within(ms);
+            let root = Exact::int(u64::from(mm).pow(2) + u64::from(mm_across).pow(2)).sqrt();
             let exact = &root * &Exact::int(ms);
             if mm > 0 {
                 rounded.case(constant.translation_um().into(), exact.to_f64());
@@ -242,6 +250,23 @@ mod tests {
                 let exact = &(&Exact::int(mrad).div(&Exact::int(1_000)) * &seconds) * &radian;
                 turned.case(constant.yaw_q24().into(), exact.to_f64());
             }
+            // A drive from a heading that is off to one side, whose turn and way across lead to the same side.
+            let error = random.log_within(1e-4, 2.0);
+            let fast = MotionBounds::new(speed, across, rate.min(1.0 / seconds.to_f64())).unwrap();
+            let grown = fast.within(ms);
+            let q24 = (error / TAU * 16_777_216.0) as i32;
+            let steps = 64;
+            let step = seconds.to_f64() / f64::from(steps);
+            let rate = rate.min(1.0 / seconds.to_f64()) * random.unit().round();
+            let mut place = [0.0f64; 2];
+            for k in 0..steps {
+                let since = (f64::from(k) + 0.5) * step;
+                let (s, c) = (f64::from(q24) / 16_777_216.0 * TAU + rate * since).sin_cos();
+                place[0] += (speed * c - across * s) * step;
+                place[1] += (speed * s + across * c) * step;
+            }
+            aside.case(f64::from(grown.aside_um(q24)), place[1].abs() * 1e6);
+            assert!(place[0].hypot(place[1]) * 1e6 <= f64::from(grown.translation_um()));
             // The true stamp begins its millisecond, and the permission's end ends its own.
             let period_ms = random.log_within(5.0, 500.0) as u32;
             let settings = Settings::for_source(period_ms, (random.unit() * 50.0) as u32);
@@ -263,6 +288,7 @@ mod tests {
             "motion: a length by whole numbers",
             "motion: a turn by whole numbers",
             "motion: a movement until a permission ends",
+            "motion: a movement across the estimate's heading",
         ];
         for (search, name) in searches.iter().zip(names) {
             search.report(&Row {

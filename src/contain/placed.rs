@@ -27,7 +27,7 @@ pub(super) struct Placed {
     pub place: [i32; 2],
     heading: BinaryAngle,
     /// Cosine and sine of the heading, 2^-15.
-    facing: [i32; 2],
+    pub facing: [i32; 2],
     /// The estimate's heading relative to the goal's, 2^-32 turn.
     pub above_goal: u32,
     /// The largest heading offset of the whole set, 2^-32 turn, or `u32::MAX`.
@@ -55,6 +55,10 @@ pub(super) struct Placed {
 pub(super) struct Movement {
     /// The radius in the plane, extent units, up.
     pub length: i32,
+    /// The largest part of it across the estimate's heading, extent units, up; the radius if it may lead anywhere.
+    pub side: i32,
+    /// The same, micrometres.
+    pub aside_um: i32,
     /// The turn to either side: at most half a radian.
     pub turn: Turn,
     /// The right shift of a product of the turn and a length in length units, to extent units.
@@ -189,9 +193,12 @@ impl Placed {
             }
         };
         if ellipsoid.is_some() && has_moved {
-            let length = by.translation_um().unsigned_abs().wrapping_shr(e);
+            let extent = |um: i32| um.unsigned_abs().wrapping_shr(e).wrapping_add(1) as i32;
+            let aside_um = by.aside_um(factor.map_or(0, |factor| factor.yaw));
             placed.movement = Some(Movement {
-                length: length.wrapping_add(1) as i32,
+                length: extent(by.translation_um()),
+                side: extent(aside_um),
+                aside_um,
                 turn: swing,
                 shift: swing.shift(finer),
                 by,

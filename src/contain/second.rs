@@ -105,6 +105,7 @@ fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth
         trust,
         radius_q16: word32(table, 64)?,
         moved_um: movement.translation_um().unsigned_abs(),
+        side_um: movement.side_um().unsigned_abs(),
         // From a turn on, every heading is reached.
         swing: i64::from(movement.yaw_q24().min(1 << 24)) << 8,
     };

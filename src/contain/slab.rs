@@ -20,7 +20,7 @@
 //! | its `abs(F23' n + tau F23' J n)` is convex in y | the chord between its ends: `N + L y` |
 //! | `L y r(u)` | `L r(e) y + abs(L) max abs(r(u) - r(e))` |
 //! | what is left: `g y + N r(e + h y)` | at an end, or `(hypot(g, h N) - g e) / h` |
-//! | growth by a movement: radius rho, turn d | `rho abs(n) + d (abs(S) + abs(C) (w + d/2))`, in robot axes also d times the longest offset |
+//! | growth by a movement: radius rho, turn d, in a strip of half width a | `min(rho, rho abs(n . u) + a abs(n . Ju)) + d (abs(S) + abs(C) (w + d/2))`, in robot axes also d times the longest offset |
 //!
 //! For the whole set (`e = 0`, `h = 1`) the last but one is `hypot(g, N)` with the larger end for N. All errors of the bound fall with the square of
 //! w, or faster.
@@ -30,7 +30,7 @@
 //! else rounds against acceptance. Its parts are listed in `contain/error_budget.rs`, which adds them up and searches for the largest sum. The
 //! proof of a table covers the rounding of a point, at any heading ([`super::facet_clearance_q14`]).
 
-use super::placed::{Placed, Seen, dot, q15};
+use super::placed::{Movement, Placed, Seen, dot, q15};
 use crate::num::{product, sqrt_ceil, towards_zero, wide};
 use crate::set::Turn;
 use crate::table::parts;
@@ -306,7 +306,7 @@ impl Section {
         // Each of two was rounded down by less than a quarter.
         let mut less = (less.wrapping_add(5) >> 2).wrapping_add(placed.slack(self.turns, e));
         if let Some(movement) = &placed.movement {
-            less = less.wrapping_add(self.moved(movement, placed.broad, width));
+            less = less.wrapping_add(self.moved(movement, placed, width));
         }
         let spare = self.left.wrapping_sub(less);
         let is_inside = if width.depth == 0 {
@@ -370,7 +370,7 @@ impl Section {
 
     /// Returns an upper bound of a movement's growth along the normal over a slab, extent units.
     #[inline(never)]
-    fn moved(&self, movement: &super::placed::Movement, broad: i32, width: &Width) -> i32 {
+    fn moved(&self, movement: &Movement, placed: &Placed, width: &Width) -> i32 {
         let turn = &movement.turn;
         let radians = turn.radians_q15;
         // |S| + |C| (w + d/2), length units: 2^17 / 4 * 2^14.6.
@@ -387,18 +387,36 @@ impl Section {
         let mut moved = long_lever(turn, lever, movement.shift);
         // n with the part of it that turns; no normal and no weighted sum of normals is longer than 1 by more than 2^-8.
         const LONGEST: i32 = (1 << 14) + (1 << 6) + 1;
-        let mut normal = sqrt_ceil(squares(self.normal[0], self.normal[1]).into()) as i32;
+        let turned = if self.turns {
+            width.turn.radians_q15.wrapping_add(radians) >> 1
+        } else {
+            0
+        };
         if self.turns {
-            normal = normal.wrapping_add(width.turn.radians_q15.wrapping_add(radians) >> 1);
             // The longest offset turns with the robot: 2^15.2 * 2^14.
-            let longest = broad.wrapping_add(broad >> 3).wrapping_add(1);
+            let longest = placed.broad.wrapping_add(placed.broad >> 3).wrapping_add(1);
             moved = moved
                 .wrapping_add(longest.wrapping_mul(radians) >> 15)
                 .wrapping_add(1);
         }
-        let normal = normal.wrapping_add(4).min(LONGEST);
-        // 2^15 * 2^14.1.
-        moved.wrapping_add((movement.length.wrapping_mul(normal) >> 14).wrapping_add(1))
+        let along = |length: i32, normal: i32| {
+            // 2^15 * 2^14.1.
+            let normal = normal.wrapping_add(turned).wrapping_add(4).min(LONGEST);
+            (length.wrapping_mul(normal) >> 14).wrapping_add(1)
+        };
+        let [nx, ny] = self.normal;
+        if movement.side == movement.length {
+            let normal = sqrt_ceil(squares(nx, ny).into()) as i32;
+            return moved.wrapping_add(along(movement.length, normal));
+        }
+        // Along the estimate's heading and across it: 2^14 * 2^15 each.
+        let [c, s] = placed.facing;
+        let part = |sum: i32| sum.wrapping_abs() >> 15;
+        let ahead = part(nx.wrapping_mul(c).wrapping_add(ny.wrapping_mul(s)));
+        let aside = part(ny.wrapping_mul(c).wrapping_sub(nx.wrapping_mul(s)));
+        moved
+            .wrapping_add(along(movement.length, ahead))
+            .wrapping_add(along(movement.side, aside))
     }
 
     /// Returns the offset from the estimate of the section's pose that is farthest along the normal: x and y in world axes, extent units times 2^15.

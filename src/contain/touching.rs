@@ -66,10 +66,31 @@ impl Touching {
     };
 
     /// Returns the pose after a movement along the normal that turns it outwards, to first order.
-    fn moved(self, movement: &Movement, section: &Section) -> Self {
+    fn moved(self, movement: &Movement, section: &Section, [c, s]: [i32; 2]) -> Self {
         let [nx, ny] = section.normal;
         let length = sqrt_ceil(squares(nx, ny).into()).max(1);
-        let along = |v: i32| towards_zero(product(v, movement.by.translation_um()), length);
+        let radius = movement.by.translation_um();
+        let [by_x, by_y] = if movement.side == movement.length {
+            [nx, ny].map(|v| towards_zero(product(v, radius), length))
+        } else {
+            // A corner of the strip in the disc, or a point that is nearer.
+            let side = movement.aside_um;
+            let ahead = radius.wrapping_sub(side);
+            let ahead = if product(nx, c).wrapping_add(product(ny, s)) < 0 {
+                ahead.wrapping_neg()
+            } else {
+                ahead
+            };
+            let aside = if product(ny, c).wrapping_sub(product(nx, s)) < 0 {
+                side.wrapping_neg()
+            } else {
+                side
+            };
+            [
+                product(ahead, c).wrapping_sub(product(aside, s)) >> 15,
+                product(ahead, s).wrapping_add(product(aside, c)) >> 15,
+            ]
+        };
         let swung = movement.turn.at(section.s.wrapping_abs(), movement.shift);
         let turn = i64::from(movement.by.yaw_q24());
         let turn = if section.s < 0 {
@@ -85,8 +106,8 @@ impl Touching {
                 .wrapping_add(swung.into()),
             e: self.e,
             offset: [
-                x.wrapping_add(along(nx)),
-                y.wrapping_add(along(ny)),
+                x.wrapping_add(by_x),
+                y.wrapping_add(by_y),
                 yaw.wrapping_add(turn),
             ],
         }
@@ -108,7 +129,7 @@ impl Placed {
             offset: [x, y, product(self.yaw as i32, e) >> U],
         };
         match &self.movement {
-            Some(movement) => touching.moved(movement, section),
+            Some(movement) => touching.moved(movement, section, self.facing),
             None => touching,
         }
     }

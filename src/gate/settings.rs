@@ -358,12 +358,13 @@ impl Settings<'_> {
                 CrossTerms::YawUnknown(share) => 0x100 | u32::from(share.q8()),
                 CrossTerms::AllUnknown(share) => 0x200 | u32::from(share.q8()),
             };
-            let [speed, turn] = source.motion.words();
+            let [speed, side, turn] = source.motion.words();
             [
                 // A flipped bit of one part changes the word.
                 frame as u32 ^ (frame >> 32) as u32,
                 source.trust.inflation.q16() ^ terms ^ source.aging.digest(),
                 speed,
+                side,
                 turn,
             ]
             .into_iter()

@@ -192,8 +192,15 @@ impl Given {
     }
 
     /// Returns `true` if an offset (um, um, 2^-32 turn) is certain to lead to a pose of the set, moved by up to `by`: if one of some movements back
-    /// leads into the set. A pose that is in it may be missed.
-    pub(super) fn holds_moved(&self, by: Growth, [dx, dy, apart]: [i64; 3]) -> bool {
+    /// leads into the set. A pose that is in it may be missed. The movement leads at most `aside_um` across a heading, whose cosine and sine have
+    /// the unit 2^-15.
+    pub(super) fn holds_moved(
+        &self,
+        by: Growth,
+        aside_um: i32,
+        [c, s]: [i32; 2],
+        [dx, dy, apart]: [i64; 3],
+    ) -> bool {
         let radius = i64::from(by.translation_um());
         let turn = i64::from(by.yaw_q24()) << 8;
         let turn = apart.min(turn).max(turn.wrapping_neg());
@@ -203,7 +210,20 @@ impl Given {
                 .unsigned_abs(),
         )
         .max(1);
+        let (c, s, side) = (i64::from(c), i64::from(s), i64::from(aside_um));
         let back = |x: i64, y: i64| {
+            // Shorter, until it is in the strip.
+            let across = y.wrapping_mul(c).wrapping_sub(x.wrapping_mul(s)) >> 15;
+            let across = (across.unsigned_abs() as i64).wrapping_add(2);
+            let shorter = |v: i64| {
+                let share = v.wrapping_mul(side.min(across)).checked_div(across);
+                share.unwrap_or(0)
+            };
+            let (x, y) = if side < radius {
+                (shorter(x), shorter(y))
+            } else {
+                (x, y)
+            };
             [
                 dx.wrapping_sub(x),
                 dy.wrapping_sub(y),

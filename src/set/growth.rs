@@ -2,6 +2,11 @@
 //!
 //! The grown set is `{ p + c : p in the set, |(cx, cy)| <= translation, |c_yaw| <= yaw }` (the Minkowski sum). It is not
 //! an ellipsoid. The decision keeps both parts apart: along any normal, the extent of the sum is the sum of the extents.
+//!
+//! # A robot that hardly moves sideways
+//! Each piece of the movement leads along the robot's heading of that moment, and little across. Relative to the estimate's heading, that heading is off
+//! by at most the yaw error of a pose of the set and the turn of the movement, t together. So an offset leads at most
+//! `side + translation sin(t)` across the estimate's heading ([`Growth::aside_um`]): the offsets are those of a strip in the disc.
 
 use super::{Extent, Inflation, Q24_PER_RADIAN_Q52};
 use crate::num::{Float, Rounding, UM_PER_M, wide};
@@ -12,6 +17,8 @@ use crate::pose::REACH_UM;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Growth {
     translation_um: i32,
+    /// Across the robot's own heading: at most the translation.
+    side_um: i32,
     yaw_q24: i32,
 }
 
@@ -35,6 +42,7 @@ impl Growth {
     /// No movement.
     pub const NONE: Self = Self {
         translation_um: 0,
+        side_um: 0,
         yaw_q24: 0,
     };
 
@@ -42,6 +50,12 @@ impl Growth {
     /// that size. Turns are limited to 32 turns.
     #[must_use]
     pub const fn new(translation_um: u32, yaw_q24: u32) -> Self {
+        Self::along(translation_um, translation_um, yaw_q24)
+    }
+
+    /// Returns a growth of a length in micrometres, of which at most `side_um` is across the robot's own heading, and a turn, as [`Growth::new`].
+    #[must_use]
+    pub const fn along(translation_um: u32, side_um: u32, yaw_q24: u32) -> Self {
         let translation_um = if translation_um < REACH_UM.unsigned_abs() {
             translation_um as i32
         } else {
@@ -54,6 +68,11 @@ impl Growth {
         };
         Self {
             translation_um,
+            side_um: if side_um < translation_um.unsigned_abs() {
+                side_um as i32
+            } else {
+                translation_um
+            },
             yaw_q24,
         }
     }
@@ -83,6 +102,22 @@ impl Growth {
         self.translation_um
     }
 
+    /// Returns how much of the radius may be across the robot's own heading, micrometres.
+    #[must_use]
+    pub const fn side_um(self) -> i32 {
+        self.side_um
+    }
+
+    /// Returns the largest offset across the estimate's heading, micrometres, rounded up, in a set whose yaw errors are at most `yaw_q24`: at most
+    /// the radius.
+    #[must_use]
+    pub(crate) fn aside_um(self, yaw_q24: i32) -> i32 {
+        let swung = self
+            .swung(yaw_q24.saturating_add(self.yaw_q24))
+            .translation_um;
+        swung.saturating_add(self.side_um).min(self.translation_um)
+    }
+
     /// Returns the largest turn to either side, 2^-24 turn: at most 32 turns. From half a turn on, every heading is reached.
     #[must_use]
     pub const fn yaw_q24(self) -> i32 {
@@ -97,10 +132,11 @@ impl Growth {
         if other.translation_um | other.yaw_q24 == 0 {
             return self;
         }
-        Self::new(
+        Self::along(
             self.translation_um
                 .wrapping_add(other.translation_um)
                 .unsigned_abs(),
+            self.side_um.wrapping_add(other.side_um).unsigned_abs(),
             self.yaw_q24.wrapping_add(other.yaw_q24).unsigned_abs(),
         )
     }
@@ -119,7 +155,7 @@ impl Growth {
             let length = inflation.of_length(i64::from(value));
             u32::try_from(length).unwrap_or(u32::MAX)
         };
-        Self::new(up(self.translation_um), up(self.yaw_q24))
+        Self::along(up(self.translation_um), up(self.side_um), up(self.yaw_q24))
     }
 
     /// Returns the growth times `q16 / 2^16`, rounded up. `None` if that is out of range.
@@ -128,9 +164,11 @@ impl Growth {
             let product = u64::from(value.unsigned_abs()).wrapping_mul(u64::from(q16));
             product.wrapping_add(0xffff) >> 16
         };
-        let translation_um = i32::try_from(up(self.translation_um)).ok()?;
+        let [translation_um, side_um] = [self.translation_um, self.side_um].map(up);
+        let translation_um = i32::try_from(translation_um).ok()?;
         (translation_um <= REACH_UM).then_some(Self {
             translation_um,
+            side_um: i32::try_from(side_um).ok()?,
             yaw_q24: scaled_yaw(self.yaw_q24, q16),
         })
     }

@@ -346,7 +346,10 @@ impl PoseSet {
     fn surely_holds(&self, offset: [i64; 3]) -> bool {
         let given = self.given.unwrap_or_else(|| Given::of(self.extent));
         match self.extent {
-            Extent::Grown { by, .. } => given.holds_moved(by, offset),
+            Extent::Grown { factor, by } => {
+                let facing = [self.common.cos_q15, self.common.sin_q15];
+                given.holds_moved(by, by.aside_um(factor.yaw), facing, offset)
+            }
             _ => given.holds(offset),
         }
     }

@@ -24,6 +24,8 @@ pub(super) struct Question<'a> {
     pub radius_q16: u32,
     /// The largest movement of the robot, micrometres.
     pub moved_um: u32,
+    /// Most of it that is across the robot's own heading.
+    pub side_um: u32,
     /// The largest turn of the robot to either side, 2^-32 turn: at most one turn.
     pub swing: i64,
 }

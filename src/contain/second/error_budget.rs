@@ -74,6 +74,7 @@ fn question(belief: &PoseEstimate) -> Question<'_> {
         trust: Trust::FULL,
         radius_q16: 743_498,
         moved_um: 0,
+        side_um: 0,
         swing: 0,
     }
 }

@@ -94,7 +94,7 @@ impl Body {
         let spare = if self.moved == 0 {
             spare
         } else {
-            spare.wrapping_sub(Self::along_any(normal, self.moved))
+            spare.wrapping_sub(self.moved_along(turned))
         };
         let size = |value: i64| self.scaled(value).map_or(1 << 30, i64::from);
         let spare = if spare < 0 {

@@ -134,6 +134,8 @@ pub(super) struct Body {
     whole_reach: u64,
     /// The largest movement of an ellipsoid, 2^-14 length units, down.
     pub(super) moved: i64,
+    /// How far it leads across the estimate's heading: at most as far.
+    aside: i64,
     /// The largest turn of the movement to either side, 2^-32 turn.
     pub(super) swing: i64,
     pub(super) is_cylinder: bool,
@@ -168,6 +170,7 @@ impl Body {
         reach: 0,
         whole_reach: 0,
         moved: 0,
+        aside: 0,
         swing: 0,
         is_cylinder: false,
         clearance: 0,
@@ -235,20 +238,40 @@ impl Body {
         if question.moved_um == 0 && question.swing == 0 {
             return;
         }
-        self.moved = i64::from(question.moved_um)
-            .wrapping_shl(14)
-            .wrapping_shr(unit);
+        let length = |um: u32| i64::from(um).wrapping_shl(14).wrapping_shr(unit);
+        self.moved = length(question.moved_um);
         self.swing = question.swing;
         let turn = self.swing.unsigned_abs();
         self.alpha = angle(turn);
         let whole = root(self.reach).wrapping_add(turn);
         self.whole_reach = whole.saturating_mul(whole);
+        // The robot's heading of any moment is off by at most its yaw error and its turn: radians, 2^-31, down.
+        let turned = i64::from(angle(whole.min(1 << 31)) >> 1).wrapping_mul(self.moved >> 10) >> 20;
+        self.aside = length(question.side_um)
+            .wrapping_add(turned.wrapping_sub(turned >> 10))
+            .min(self.moved);
+        if self.aside < self.moved {
+            self.facing = cosine_and_sine(self.heading);
+        }
     }
 
-    /// Returns a length of 2^-14 units times the length of a normal, 2^-28 units, down.
-    pub(super) fn along_any([x, y]: [i32; 2], length: i64) -> i64 {
+    /// Returns a bound of a movement along a normal in world axes, 2^-28 units, down.
+    pub(super) fn moved_along(&self, [x, y]: [i32; 2]) -> i64 {
         let square = x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y));
-        i64::from(root32(square.unsigned_abs())).wrapping_mul(length)
+        let any = i64::from(root32(square.unsigned_abs())).wrapping_mul(self.moved);
+        if self.aside == self.moved {
+            return any;
+        }
+        let [c, s] = self.facing;
+        // The parts of the normal, down.
+        let ahead = both(c, x, s, y).unsigned_abs().saturating_sub(1);
+        let across = both(c, y, s.wrapping_neg(), x)
+            .unsigned_abs()
+            .saturating_sub(1);
+        let strip = i64::from(ahead)
+            .wrapping_mul(self.moved)
+            .wrapping_add(i64::from(across).wrapping_mul(self.aside));
+        any.min(strip)
     }
 
     /// Computes C of an ellipsoid, lowered by its rounding.
@@ -353,7 +376,14 @@ impl Body {
             .wrapping_add(seen.clearance)
             .wrapping_sub(dot(normal, seen.at));
         if self.moved != 0 {
-            spare = spare.wrapping_sub(Self::along_any(normal, self.moved));
+            let [nx, ny] = normal;
+            let [c, s] = self.facing;
+            let in_world = if seen.is_robot {
+                [both(c, nx, s.wrapping_neg(), ny), both(s, nx, c, ny)]
+            } else {
+                normal
+            };
+            spare = spare.wrapping_sub(self.moved_along(in_world));
         }
         if self.alpha != 0 {
             // L is 2^(16 - up) units.

@@ -135,7 +135,8 @@ fn moved(question: &Question<'_>, [x, y, turn]: [i64; 3]) -> [i64; 3] {
         .wrapping_mul(small_x)
         .wrapping_add(small_y.wrapping_mul(small_y));
     let length = root(square.unsigned_abs()).wrapping_add(2);
-    let by = drawn_in(i64::from(question.moved_um) << FINER);
+    // What is left of it in every direction.
+    let by = drawn_in(i64::from(question.side_um) << FINER);
     let along = |v: i64| quotient(v.wrapping_mul(by), length);
     let swing = drawn_in(question.swing).wrapping_mul(turn.signum());
     [

@@ -182,6 +182,7 @@ fn shares_of_what_is_unknown_are_no_more_than_the_whole() {
                 },
                 radius_q16: 743_498,
                 moved_um: 0,
+                side_um: 0,
                 swing: 0,
             };
             let set = question.ellipsoid(covariance).unwrap();
