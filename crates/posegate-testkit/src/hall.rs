@@ -69,6 +69,31 @@ pub struct Believed {
     pub y: [f64; 3],
 }
 
+/// Returns how far a drive leads along a direction at most, of those tried: from a heading to one that differs by `share` of the swing.
+fn farthest([x, y]: [f64; 2], length: f64, swing: f64, first: f64, share: f64) -> f64 {
+    let from = first - y.atan2(x);
+    if swing == 0.0 {
+        return length * from.cos().abs();
+    }
+    // The integral of the cosine's magnitude.
+    let integral = |angle: f64| {
+        let halves = (angle / PI + 0.5).floor();
+        2.0 * halves + (angle - PI * halves).sin()
+    };
+    let last = from + swing * share;
+    // The heading that is kept: the nearest to the direction, or one of some.
+    let aligned = (from / PI).round() * PI;
+    let headings = (-8..=8).map(|k| from + swing * f64::from(k) / 8.0);
+    let ways = headings.chain([aligned]).filter_map(|kept| {
+        let turned = (kept - from).abs() + (last - kept).abs();
+        let rest = swing - turned;
+        let ends = [(from, kept), (kept, last)];
+        let moving = ends.map(|(a, b): (f64, f64)| (integral(b) - integral(a)).abs());
+        (rest >= -1e-12).then(|| moving[0] + moving[1] + rest.max(0.0) * kept.cos().abs())
+    });
+    length / swing * ways.fold(0.0, f64::max)
+}
+
 impl Believed {
     /// Returns a set whose axes have up to `most` metres and radians.
     pub fn drawn(rng: &mut Rng, [metres, radians]: [f64; 2]) -> Self {
@@ -92,8 +117,9 @@ impl Believed {
         })
     }
 
-    /// Returns the least distance of the robot's corners from a wall over the set after a movement, metres; negative beyond a wall.
-    /// `length` is the longest movement in metres, `swing` the largest turn to either side in radians.
+    /// Returns the least distance of the robot's corners from a wall over the set after a drive, metres; negative beyond a wall.
+    /// `length` is the longest way in metres, ahead or back along the robot's axis of the moment, `swing` the largest turn in radians, at an even rate or less. Each
+    /// drive that is tried is possible: the robot turns to a heading, keeps it, and turns to its last heading.
     #[must_use]
     pub fn room(&self, length: f64, swing: f64) -> f64 {
         let mut least = f64::INFINITY;
@@ -101,8 +127,10 @@ impl Believed {
             let u = (f64::from(k) / 20.0 * std::f64::consts::FRAC_PI_2).sin();
             let r = (1.0 - u * u).max(0.0).sqrt();
             for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
-                let (s, c) = (self.mean[2] + self.turn * u + swing * share).sin_cos();
+                let first = self.mean[2] + self.turn * u;
+                let (s, c) = (first + swing * share).sin_cos();
                 for wall in WALLS {
+                    let length = farthest(wall, length, swing, first, share);
                     let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
                     let reach = along(0) * u + r * along(1).hypot(along(2)) + length;
                     let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
