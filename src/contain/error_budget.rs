@@ -171,7 +171,7 @@ struct Case {
     factor: [[f64; 3]; 3],
     is_cylinder: bool,
     /// The movement: um, radians.
-    by: [f64; 2],
+    by: [f64; 3],
 }
 
 fn plane(read: &mut Reader<'_>, reach: f64, is_robot: bool) -> Plane {
@@ -228,8 +228,11 @@ impl Case {
             x: [entry(1.0), entry(1.0), entry(narrow)],
             y: [entry(1.0), entry(narrow), entry(1.0)],
         };
-        let by = Growth::new(
-            read.size(1.0, 2.0 * size) as u32,
+        let length = read.size(1.0, 2.0 * size);
+        let side = (1.2 * read.unit() - 0.1).clamp(0.0, 1.0) * length;
+        let by = Growth::along(
+            length as u32,
+            side as u32,
             read.size(1.0, 0.3 / Q24) as u32,
         );
         let scale_q16 = read.size(6_553.6, 655_360.0) as u32;
@@ -256,16 +259,17 @@ impl Case {
                     translation_um: radius,
                     yaw_q24: yaw,
                 };
-                (extent, [0.0; 2])
+                (extent, [0.0; 3])
             }
             1 => {
                 let moved = [
                     f64::from(by.translation_um()),
                     f64::from(by.yaw_q24()) * Q24,
+                    f64::from(by.aside_um(factor.yaw)),
                 ];
                 (Extent::Grown { factor, by }, moved)
             }
-            _ => (Extent::Gaussian(factor), [0.0; 2]),
+            _ => (Extent::Gaussian(factor), [0.0; 3]),
         };
         let mean = Pose {
             x_um: place[0],
@@ -323,7 +327,19 @@ impl Case {
         }
         let column = |k: usize| nx * x[k] + ny * y[k];
         let root = (1.0 - u * u).max(0.0).sqrt();
-        sum + column(0) * u + root * column(1).hypot(column(2)) + self.by[0] * length
+        sum + column(0) * u + root * column(1).hypot(column(2)) + self.moved(normal)
+    }
+
+    /// Returns the largest reach of the movement along a normal in world axes: of a disc, and of a strip along the estimate's heading.
+    fn moved(&self, [nx, ny]: [f64; 2]) -> f64 {
+        let (s, c) = (f64::from(self.set.mean().yaw.0) / 4_294_967_296.0 * TAU).sin_cos();
+        let [ahead, across] = [(c * nx + s * ny).abs(), (c * ny - s * nx).abs()];
+        let [radius, _, aside] = self.by;
+        if radius * across <= aside * nx.hypot(ny) {
+            radius * nx.hypot(ny)
+        } else {
+            ahead * (radius * radius - aside * aside).sqrt() + across * aside
+        }
     }
 
     /// Returns the largest reach over a range of u, and over the turns of the movement: a lower bound.

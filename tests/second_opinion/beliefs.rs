@@ -23,6 +23,8 @@ pub struct ReportForm {
     length: f64,
     /// Growth by a movement, as shares of the set's size and of its turn.
     moved: [f64; 2],
+    /// The share of the growth that may be across the robot's heading.
+    aside: f64,
 }
 
 impl ReportForm {
@@ -34,6 +36,7 @@ impl ReportForm {
             tilt: [0.0; 2],
             length: 1.0,
             moved: [0.0; 2],
+            aside: 1.0,
         }
     }
 
@@ -79,7 +82,10 @@ impl ReportForm {
             PoseSet::Bounded { translation, yaw } => [*translation, *yaw],
         };
         let [by_length, by_turn] = self.moved;
-        Growth::of(length * by_length, turn * by_turn).unwrap()
+        let by = Growth::of(length * by_length, turn * by_turn).unwrap();
+        let [translation, yaw] = [by.translation_um(), by.yaw_q24()].map(i32::unsigned_abs);
+        let aside = (f64::from(translation) * self.aside) as u32;
+        Growth::along(translation, aside, yaw)
     }
 }
 
@@ -113,6 +119,7 @@ pub fn drawn(rng: &mut Rng) -> ReportForm {
             1 => [rng.log_within(1e-3, 30.0), rng.log_within(1e-3, 30.0)],
             _ => [0.0; 2],
         },
+        aside: if rng.chance(0.3) { 0.0 } else { rng.within(0.0, 1.1) },
     }
 }
 

@@ -208,7 +208,7 @@ fn no_open_moment_has_a_pose_outside() {
 fn judge_detects_a_gate_with_too_small_bounds() {
     let still = driven(200, 3, |_| MotionBounds::STANDS_STILL);
     assert!(still.outside > 100, "{still:?}");
-    let slower = driven(200, 3, |drive| {
+    let slower = driven(800, 3, |drive| {
         MotionBounds::new(0.9 * drive.speed, 0.0, drive.rate).expect("bounds")
     });
     assert!(slower.outside > 20, "{slower:?}");

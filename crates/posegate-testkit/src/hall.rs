@@ -5,6 +5,7 @@ use crate::oracle::Rng;
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::verify::build;
 use posegate_host::site::Site;
+use std::f64::consts::PI;
 
 /// The success set: a robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m.
 pub const SUCCESS: &str = r#"{ shape = "footprint", footprint = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]], region = [[2, 2], [-2, 2], [-2, -2], [2, -2]] }"#;
@@ -81,10 +82,11 @@ fn farthest([x, y]: [f64; 2], length: f64, swing: f64, first: f64, share: f64) -
         2.0 * halves + (angle - PI * halves).sin()
     };
     let last = from + swing * share;
-    // The heading that is kept: the nearest to the direction, or one of some.
+    // The heading that is kept: the nearest to the direction, or the farthest to either side.
     let aligned = (from / PI).round() * PI;
-    let headings = (-8..=8).map(|k| from + swing * f64::from(k) / 8.0);
-    let ways = headings.chain([aligned]).filter_map(|kept| {
+    let spare = 0.5 * (swing - (last - from).abs());
+    let headings = [from.min(last) - spare, from.max(last) + spare, from, last];
+    let ways = headings.into_iter().chain([aligned]).filter_map(|kept| {
         let turned = (kept - from).abs() + (last - kept).abs();
         let rest = swing - turned;
         let ends = [(from, kept), (kept, last)];
