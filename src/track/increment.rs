@@ -13,6 +13,9 @@ use crate::set::Q24_PER_RADIAN_Q52;
 /// The bounds of its length and slip also hold if the direction of movement leaves the range between its directions at both ends by at most
 /// 0.014 rad in total. A robot that turns first and then drives has up to 1.42 times the deviation that this increment adds; that matters only for a
 /// path of few increments. A robot that drives to and fro within one increment drives farther than these bounds allow for.
+///
+/// For fixes that come late, a tracker keeps increments that together last at most 8 ms as one: what is needed of an increment is then needed of all
+/// of them together, except that the lengths and turns of each are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Increment {
@@ -32,12 +35,20 @@ pub(super) struct Step {
     pub turn: i32,
     /// The time at its end, milliseconds of the controller's clock.
     pub stamp_ms: u32,
+    /// The length, 2^-4 um, and the turn, 2^-24 turn, that the robot drove in addition to those of an arc between both ends.
+    pub more: [u16; 2],
 }
 
 /// The largest turn of an increment, 2^-32 turn.
 const LARGEST_TURN: u32 = 1 << 29;
 /// The largest entry of an increment on an axis, 2^-8 um.
 const LONGEST: u32 = 1 << 30;
+
+const fn is_small(x_q8: i32, y_q8: i32, turn: i32) -> bool {
+    x_q8.unsigned_abs() <= LONGEST
+        && y_q8.unsigned_abs() <= LONGEST
+        && turn.unsigned_abs() <= LARGEST_TURN
+}
 
 impl Increment {
     /// Returns an increment from metres ahead, metres to the left, and radians counter-clockwise, each to the nearest unit of
@@ -66,10 +77,7 @@ impl Increment {
         turn: i32,
         [begins_ms, stamp_ms]: [u32; 2],
     ) -> Option<Self> {
-        let is_small = ahead_q8.unsigned_abs() <= LONGEST
-            && left_q8.unsigned_abs() <= LONGEST
-            && turn.unsigned_abs() <= LARGEST_TURN;
-        if !is_small {
+        if !is_small(ahead_q8, left_q8, turn) {
             return None;
         }
         Some(Self {
@@ -78,6 +86,7 @@ impl Increment {
                 y_q8: left_q8,
                 turn,
                 stamp_ms,
+                more: [0; 2],
             },
             begins_ms,
         })
@@ -98,12 +107,12 @@ impl Increment {
 }
 
 impl Step {
-    /// Returns an upper bound of the length that the robot drove, 2^-8 um: below 2^31.
+    /// Returns upper bounds of the length that the robot drove, 2^-8 um, below 2^31.1, and of its turns, 2^-24 turn, below 2^21.1.
     ///
     /// If the direction of movement stays within a range `r < pi`, the length is at most the chord over `cos(r / 2)`. With
     /// `r = t + 0.014 rad` for a turn t of at most an eighth of a turn, that factor is at most `1 + 6 t^2 + 2^-12`, t in turns. The
     /// length of an arc is the chord times `(t / 2) / sin(t / 2)`, about a quarter of this above 1.
-    pub fn driven_q8(&self) -> u32 {
+    pub fn driven(&self) -> [u32; 2] {
         let chord = if self.y_q8 == 0 {
             self.x_q8.unsigned_abs()
         } else {
@@ -113,9 +122,53 @@ impl Step {
         // Unit 2^-28: at most 2^22 and a unit.
         let square = (wide(turn, turn) >> 20) as u32;
         let longer = square.wrapping_add(1).wrapping_mul(6).wrapping_add(1 << 16);
-        chord
-            .wrapping_add((wide(chord, longer) >> 28) as u32)
-            .wrapping_add(1)
+        let [length, turned] = self.more.map(u32::from);
+        let length = length.wrapping_shl(4).wrapping_add(1);
+        [
+            chord
+                .wrapping_add((wide(chord, longer) >> 28) as u32)
+                .wrapping_add(length),
+            turn.wrapping_add(turned),
+        ]
+    }
+
+    /// Returns this movement and a later one as one. `None` if it is not that of an increment, or the robot drove much to and fro.
+    pub fn and(&self, later: &Self) -> Option<Self> {
+        let [c, s] = BinaryAngle(self.turn as u32).cos_sin_q30().map(i64::from);
+        let (dx, dy) = (i64::from(later.x_q8), i64::from(later.y_q8));
+        let sum = |from: i32, by: i64| from.wrapping_add((by.wrapping_add(1 << 29) >> 30) as i32);
+        // Sums below 2^61, and below 2^31.6 after the shift: the movement of 8 ms is shorter than 4 m, or the sum is refused.
+        let is_short = [self, later]
+            .iter()
+            .all(|one| one.chord_squared() < 1 << 58);
+        let both = Self {
+            x_q8: sum(
+                self.x_q8,
+                c.wrapping_mul(dx).wrapping_sub(s.wrapping_mul(dy)),
+            ),
+            y_q8: sum(
+                self.y_q8,
+                s.wrapping_mul(dx).wrapping_add(c.wrapping_mul(dy)),
+            ),
+            turn: self.turn.wrapping_add(later.turn),
+            stamp_ms: later.stamp_ms,
+            more: [0; 2],
+        };
+        if !(is_short && is_small(both.x_q8, both.y_q8, both.turn)) {
+            return None;
+        }
+        let ([length, turned], [own, own_turn]) = (self.driven(), both.driven());
+        let [and_length, and_turned] = later.driven();
+        let length = length.wrapping_add(and_length).saturating_sub(own);
+        let turned = turned.wrapping_add(and_turned).saturating_sub(own_turn);
+        let more = [length.wrapping_add(15) >> 4, turned];
+        let [Ok(length), Ok(turned)] = more.map(u16::try_from) else {
+            return None;
+        };
+        Some(Self {
+            more: [length, turned],
+            ..both
+        })
     }
 
     /// Returns the square of the distance between both ends, 2^-16 um^2: at most 2^61.
@@ -137,12 +190,21 @@ impl Step {
             && self.turn_q24() <= most.yaw_q24().unsigned_abs().saturating_add(2)
     }
 
-    /// Returns an upper bound of the length that the robot drove in a part of the movement, 2^-8 um: the share of an arc is not shorter, though its
-    /// turn is smaller.
-    pub fn driven_part_q8(&self, [after, whole]: [u32; 2]) -> u32 {
-        let share = wide(self.driven_q8(), after).checked_div(u64::from(whole));
-        let share = share.and_then(|share| u32::try_from(share).ok());
-        share.unwrap_or(u32::MAX).saturating_add(1)
+    /// Returns upper bounds of the length and the turns that the robot drove in a part of the movement, as [`Step::driven`]: the share of an arc is not
+    /// shorter, though its turn is smaller, and what was driven besides may all have been in this part.
+    pub fn driven_part(&self, [after, whole]: [u32; 2]) -> [u32; 2] {
+        let [besides, turned] = self.more.map(u32::from);
+        let arc = Self {
+            more: [0; 2],
+            ..*self
+        };
+        let [length, turn] = arc.driven().map(|all| {
+            let share = wide(all, after).checked_div(u64::from(whole));
+            let share = share.and_then(|share| u32::try_from(share).ok());
+            share.unwrap_or(u32::MAX).saturating_add(1)
+        });
+        let length = length.saturating_add(besides.wrapping_shl(4));
+        [length, turn.saturating_add(turned)]
     }
 
     /// Returns the last `after / whole` of the movement.
@@ -155,7 +217,7 @@ impl Step {
             x_q8: share(self.x_q8),
             y_q8: share(self.y_q8),
             turn: share(self.turn),
-            stamp_ms: self.stamp_ms,
+            ..*self
         }
     }
 }

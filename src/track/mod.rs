@@ -159,7 +159,8 @@ impl Start {
     }
 }
 
-/// Carries the newest fix along the odometry. N is the number of increments that are kept for late fixes.
+/// Carries the newest fix along the odometry. N is the number of increments that are kept for late fixes; increments that together last at most 8 ms
+/// are kept as one, so 64 reach back 256 ms at least ([`Tracker::reach_ms`]).
 #[derive(Debug)]
 pub struct Tracker<const N: usize> {
     settings: TrackerSettings,
@@ -240,7 +241,7 @@ impl<const N: usize> Tracker<N> {
             self.restart(step.stamp_ms);
             return Err(reason);
         }
-        if let Some(oldest) = self.ring.push(step) {
+        if let Some(oldest) = self.ring.push(step, begins_ms) {
             self.begins_ms = oldest.stamp_ms;
         }
         self.newest_ms = Some(step.stamp_ms);
@@ -248,7 +249,7 @@ impl<const N: usize> Tracker<N> {
         self.fix
             .take_if(|fix| step.stamp_ms.wrapping_sub(fix.stamp_ms) as i32 > most as i32);
         if let Some(fix) = &mut self.fix {
-            fix.way.add(&step, step.driven_q8(), passed, &self.noise);
+            fix.way.add(&step, step.driven(), passed, &self.noise);
         }
         Ok(())
     }
@@ -269,6 +270,14 @@ impl<const N: usize> Tracker<N> {
         self.begins_ms = stamp_ms;
         self.newest_ms = Some(stamp_ms);
         self.fix = None;
+    }
+
+    /// Returns how far back the kept increments reach from the newest, milliseconds: a fix that is older is refused with
+    /// [`Reason::OdometryTooShort`].
+    #[must_use]
+    pub fn reach_ms(&self) -> u32 {
+        self.newest_ms
+            .map_or(0, |newest| newest.wrapping_sub(self.begins_ms))
     }
 
     /// Takes a fix, also a late one: it is carried along the increments since its stamp.
@@ -326,8 +335,8 @@ impl<const N: usize> Tracker<N> {
                     if after < passed {
                         // The robot may have moved unevenly: back and forth within its bounds.
                         let share = [after, passed];
-                        let driven_q8 = increment.driven_part_q8(share);
-                        way.add(&increment.part(share), driven_q8, after, &self.noise);
+                        let driven = increment.driven_part(share);
+                        way.add(&increment.part(share), driven, after, &self.noise);
                         way.leave_out(self.settings.bounds.within(unevenness([after, passed])));
                         // The axes of the increment are those before the turn up to the fix.
                         let turned = self
@@ -337,7 +346,7 @@ impl<const N: usize> Tracker<N> {
                         let driven = self.settings.bounds.within(after.saturating_add(1));
                         way.leave_out(driven.swung(turned.yaw_q24()));
                     } else {
-                        way.add(increment, increment.driven_q8(), passed, &self.noise);
+                        way.add(increment, increment.driven(), passed, &self.noise);
                     }
                 }
                 since = increment.stamp_ms;

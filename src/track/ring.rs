@@ -9,7 +9,13 @@ pub(super) struct Ring<const N: usize> {
     /// From `oldest` to the end, then from the start.
     items: Vec<Step, N>,
     oldest: usize,
+    /// The stamp at which the newest entry begins.
+    begins_ms: u32,
 }
+
+/// The longest time of increments that are kept as one, milliseconds: N entries reach back at least half of N times this time, whatever the
+/// rate of the odometry.
+pub(super) const TOGETHER_MS: u32 = 8;
 
 impl<const N: usize> Ring<N> {
     pub const fn new() -> Self {
@@ -17,6 +23,7 @@ impl<const N: usize> Ring<N> {
         Self {
             items: Vec::new(),
             oldest: 0,
+            begins_ms: 0,
         }
     }
 
@@ -24,8 +31,20 @@ impl<const N: usize> Ring<N> {
         *self = Self::new();
     }
 
-    /// Adds the newest increment. Returns the oldest one if it is overwritten.
-    pub fn push(&mut self, newest: Step) -> Option<Step> {
+    /// Adds the newest increment and the stamp at which it begins. Returns the oldest entry if it is overwritten.
+    pub fn push(&mut self, newest: Step, begins_ms: u32) -> Option<Step> {
+        let last = match self.oldest.checked_sub(1) {
+            Some(before) => self.items.get_mut(before),
+            None => self.items.last_mut(),
+        };
+        if let Some(last) = last
+            && newest.stamp_ms.wrapping_sub(self.begins_ms) <= TOGETHER_MS
+            && let Some(both) = last.and(&newest)
+        {
+            *last = both;
+            return None;
+        }
+        self.begins_ms = begins_ms;
         let Err(newest) = self.items.push(newest) else {
             return None;
         };
@@ -57,22 +76,23 @@ mod tests {
             y_q8: 2,
             turn: 3,
             stamp_ms,
+            more: [0; 2],
         };
         let mut ring = Ring::<5>::new();
         let mut expected = VecDeque::new();
-        for stamp in 0..23 {
+        for stamp in (0..23).map(|k| 9 * k) {
             expected.push_back(of(stamp));
             let left = if expected.len() > 5 {
                 expected.pop_front()
             } else {
                 None
             };
-            assert_eq!(ring.push(of(stamp)), left);
+            assert_eq!(ring.push(of(stamp), stamp.wrapping_sub(9)), left);
             let kept: List<Step> = ring.iter().copied().collect();
             assert_eq!(kept, expected.iter().copied().collect::<List<_>>());
         }
         ring.clear();
         assert_eq!(ring.iter().count(), 0);
-        assert_eq!(ring.push(of(1)), None);
+        assert_eq!(ring.push(of(1), 0), None);
     }
 }

@@ -353,7 +353,7 @@ fn part_of_an_arc_has_its_share_of_the_length() {
         };
         let step = Increment::of(ahead, left, turn, [0, 10]).unwrap().step;
         for after in 1..=10u32 {
-            let found = f64::from(step.driven_part_q8([after, 10])) / 256e6;
+            let found = f64::from(step.driven_part([after, 10])[0]) / 256e6;
             let exact = f64::from(after) / 10.0;
             assert!(
                 found >= exact && found <= exact * 1.08 + 1e-8,
@@ -552,4 +552,59 @@ fn a_fix_is_carried_with_the_trust_in_its_source() {
     // Twice the lengths have four times the covariance; a movement of a millisecond is in both.
     assert!(wide.translation_um() > plain.translation_um() + 49_000);
     assert!(wide.yaw_q24() > plain.yaw_q24() + 52_000);
+}
+
+/// At a thousand increments a second, 64 entries reach back far enough for a fix that is 120 ms old; at a hundred, none are kept as one.
+#[test]
+fn short_increments_are_kept_as_one() {
+    for (period_ms, reach_ms) in [
+        (1, 64 * 8),
+        (2, 64 * 8),
+        (3, 64 * 6),
+        (5, 64 * 5),
+        (10, 64 * 10),
+    ] {
+        let mut tracker = Tracker::<64>::new(settings(ERRORS)).unwrap();
+        let metres = 3e-4 * f64::from(period_ms);
+        for k in 0..2_000u32 {
+            let span = [k, k + 1].map(|k| k.wrapping_mul(period_ms).wrapping_sub(100));
+            // It drives to and fro, too.
+            let ahead = if k % 5 == 4 { -metres } else { metres };
+            tracker
+                .odometry(Increment::of(ahead, 0.0, 1e-3, span).unwrap())
+                .unwrap();
+        }
+        let now = (2_000 * period_ms).wrapping_sub(100);
+        assert!(
+            tracker.reach_ms().abs_diff(reach_ms) <= 8,
+            "{period_ms}: {}",
+            tracker.reach_ms()
+        );
+        let covariance = [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-8]];
+        tracker
+            .fix(&fix([0.0; 3], covariance, now.wrapping_sub(120)))
+            .unwrap();
+        let (late, mut live) = (tracker.fix.unwrap().way, Way::new(&tracker.noise));
+        let kept = 120 / period_ms;
+        for k in 2_000 - kept..2_000 {
+            let ahead = if k % 5 == 4 { -metres } else { metres };
+            let step = Increment::of(ahead, 0.0, 1e-3, [k * period_ms, (k + 1) * period_ms])
+                .unwrap()
+                .step;
+            live.add(&step, step.driven(), period_ms, &tracker.noise);
+        }
+        // The noise is that of all that was driven, to and fro.
+        let [late_noise, live_noise] = [&late, &live].map(Way::noise_of_path);
+        assert!(
+            late_noise.xx >= live_noise.xx && late_noise.tt >= live_noise.tt,
+            "{period_ms}"
+        );
+        let apart = [0, 1].map(|k| late.place_q8()[k].abs_diff(live.place_q8()[k]));
+        assert!(
+            apart
+                .iter()
+                .all(|off| *off <= u64::from(period_ms.max(8)) * 256 * 300),
+            "{apart:?}"
+        );
+    }
 }

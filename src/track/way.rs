@@ -19,6 +19,7 @@
 
 use super::increment::Step;
 use super::model::Noise;
+use super::ring::TOGETHER_MS;
 use super::turned;
 use crate::num::{BinaryAngle, Float, Rounding, product, wide};
 use crate::set::{Growth, PathNoise, RadiusSquared};
@@ -49,7 +50,7 @@ pub(super) struct Way {
     /// The length of the path, 2^-8 um, and the sum of its turns, 2^-24 turn: rounded up.
     length_q8: u64,
     turned_q24: u64,
-    /// The number of its increments.
+    /// The largest number of its increments.
     count: u32,
     /// Bound of the part of the first increment that belongs to the time before the fix.
     left_out: Growth,
@@ -120,21 +121,27 @@ impl Way {
             },
             length_q8: 0,
             turned_q24: 0,
-            count: 0,
+            // Those of which only a part is on the path.
+            count: TOGETHER_MS,
             left_out: Growth::NONE,
         }
     }
 
-    /// Adds an increment of a length that the robot drove at most, 2^-8 um, and that lasted for a time, milliseconds.
+    /// Adds an increment with the length, 2^-8 um, and the turns, 2^-24 turn, that the robot drove at most, and the time that it lasted, milliseconds.
     #[inline(never)]
-    pub fn add(&mut self, increment: &Step, length_q8: u32, ms: u32, noise: &Noise) {
+    pub fn add(
+        &mut self,
+        increment: &Step,
+        [length_q8, turn_q24]: [u32; 2],
+        ms: u32,
+        noise: &Noise,
+    ) {
         let [c, s] = BinaryAngle(self.turn).cos_sin_q30().map(i64::from);
         let (dx, dy) = (i64::from(increment.x_q8), i64::from(increment.y_q8));
         let whole = |sum: i64| sum.wrapping_add(1 << 29) >> 30;
         // Sums below 2^61.
         let x = whole(c.wrapping_mul(dx).wrapping_sub(s.wrapping_mul(dy)));
         let y = whole(s.wrapping_mul(dx).wrapping_add(c.wrapping_mul(dy)));
-        let turn_q24 = increment.turn_q24();
         let [plane, turn] = noise.variances(length_q8, turn_q24, ms);
         let [bent, curved] = along_arc(length_q8, turn_q24, turn);
         let plane = plane.saturating_add(bent);
@@ -143,7 +150,9 @@ impl Way {
         self.turn = self.turn.wrapping_add(increment.turn as u32);
         self.length_q8 = self.length_q8.saturating_add(u64::from(length_q8));
         self.turned_q24 = self.turned_q24.saturating_add(u64::from(turn_q24));
-        self.count = self.count.saturating_add(1);
+        // A short one may be as many as it has milliseconds.
+        let increments = if ms <= TOGETHER_MS { ms } else { 1 };
+        self.count = self.count.saturating_add(increments);
         let n = &mut self.noise;
         if n.tt >= WIDEST_TURN || n.xx.max(n.yy) >= WIDEST_PLANE {
             // Too large to be used, and refused later: such a sum is not carried.
@@ -221,7 +230,7 @@ impl Way {
     /// |---|---|
     /// | an increment to 2^-8 um on each axis, and turned to the axes of the fix | 1.42 of 2^-8 um each |
     /// | the turn of an increment to 2^-32 turn | half of it each |
-    /// | cosines to 2^-30, of each increment and of the whole path | 2^-28 of the length |
+    /// | cosines to 2^-30, of each increment, of those that are kept as one, and of the whole path | 2^-27 of the length |
     /// | the part of an increment after a fix, the whole path, its start, and the odometry's poses, to the micrometre | 3 um; 1 of 2^-24 turn |
     pub fn slip(&self, noise: &Noise) -> Growth {
         let [length, turn] = noise.slip(self.length_q8, self.turned_q24);
@@ -230,7 +239,7 @@ impl Way {
             .saturating_add(u64::from(self.count >> 9))
             .saturating_add(2);
         let rounded = (u64::from(self.count).wrapping_mul(3) >> 9)
-            .saturating_add(self.length_q8 >> 36)
+            .saturating_add(self.length_q8 >> 35)
             .saturating_add(5);
         let length = length
             .saturating_add(u64::from(self.left_out.translation_um().unsigned_abs()))
