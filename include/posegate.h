@@ -107,16 +107,16 @@
 /**
  * Version of this interface. It changes if a struct or the meaning of a function changes.
  */
-#define POSEGATE_ABI_VERSION 6U
+#define POSEGATE_ABI_VERSION 7U
 
 /**
  * Number of 64-bit words of a `posegate_tracker`.
  */
-#define POSEGATE_TRACKER_WORDS 192U
+#define POSEGATE_TRACKER_WORDS 224U
 
 /**
- * Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
- * (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
+ * Number of increments that a tracker keeps; those that together last at most 8 ms are kept as one. A fix with a stamp before the oldest
+ * one is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`): see `posegate_tracker_reach`.
  */
 #define POSEGATE_TRACKER_INCREMENTS 64U
 
@@ -2247,6 +2247,16 @@ posegate_status posegate_tracker_init(struct posegate_tracker *tracker,
 posegate_status posegate_tracker_odometry(struct posegate_tracker *tracker,
                                           const struct posegate_increment *increment,
                                           uint32_t *reason);
+
+/**
+ * Writes how far back the kept increments reach from the newest, milliseconds: 64 times the period of the odometry, and at least 256 ms at
+ * a shorter period than 8 ms. An older fix is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
+ *
+ * # Safety
+ * Each pointer is null, misaligned, or valid for its type.
+ */
+posegate_status posegate_tracker_reach(struct posegate_tracker *tracker,
+                                       uint32_t *reach_ms);
 
 /**
  * Takes a fix, also a late one: it is carried along the increments since its stamp. All fixes come from one source, each with

@@ -5,7 +5,7 @@ use posegate::table::TableError;
 use posegate::wire::WireError;
 
 /// Version of this interface. It changes if a struct or the meaning of a function changes.
-pub const POSEGATE_ABI_VERSION: u32 = 6;
+pub const POSEGATE_ABI_VERSION: u32 = 7;
 
 /// The result of a function: 0, or the reason why it did nothing. After an error every output is a denial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,9 +11,9 @@ use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
 
 /// Number of 64-bit words of a `posegate_tracker`.
-pub const POSEGATE_TRACKER_WORDS: usize = 192;
-/// Number of increments that a tracker keeps. A fix with a stamp before the oldest one is refused
-/// (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
+pub const POSEGATE_TRACKER_WORDS: usize = 224;
+/// Number of increments that a tracker keeps; those that together last at most 8 ms are kept as one. A fix with a stamp before the oldest
+/// one is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`): see `posegate_tracker_reach`.
 pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
 
 /// Storage of a tracker, which carries the newest fix of a slow source along the odometry. So a gate can evaluate a
@@ -240,6 +240,25 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
         };
         written?;
         write(reason, code(taken))
+    })
+}
+
+/// Writes how far back the kept increments reach from the newest, milliseconds: 64 times the period of the odometry, and at least 256 ms at
+/// a shorter period than 8 ms. An older fix is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`).
+///
+/// # Safety
+/// Each pointer is null, misaligned, or valid for its type.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn posegate_tracker_reach(
+    tracker: *mut posegate_tracker,
+    reach_ms: *mut u32,
+) -> posegate_status {
+    // SAFETY: the caller's promise; sealed storage has been written.
+    posegate_status::of(|| unsafe {
+        let apart = separate(tracker, reach_ms);
+        write(reach_ms, 0)?;
+        apart?;
+        write(reach_ms, (*open(tracker)?).reach_ms())
     })
 }
 

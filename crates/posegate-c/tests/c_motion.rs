@@ -267,6 +267,13 @@ fn c_tracker_equals_rust_tracker() {
             *found
         };
         seen.insert(found.reason);
+        let mut reach_ms = 77;
+        // SAFETY: valid pointers.
+        let status = unsafe { posegate_tracker_reach(tracker_c, &mut reach_ms) };
+        assert_eq!(
+            (status, reach_ms),
+            (posegate_status::Ok, tracker.reach_ms())
+        );
         let tracked = tracker.tracked(now);
         let expected = match &tracked {
             Ok(tracked) => gate_of_direct.step_on(now, &tracked.evidence()),
@@ -522,6 +529,10 @@ fn bad_pointers_are_errors_and_close() {
             assert_eq!(posegate_tracker_tracked(bad.cast(), 0, tracked), expected);
             assert_ne!((*tracked).reason, 0);
             assert_eq!(posegate_tracker_tracked(tracker, 0, bad.cast()), expected);
+            assert_eq!(posegate_tracker_reach(tracker, bad.cast()), expected);
+            let mut reach_ms = 77;
+            let status = posegate_tracker_reach(bad.cast(), &mut reach_ms);
+            assert_eq!((status, reach_ms), (expected, 0));
         }
         let not_initialised = posegate_status::NotInitialised;
         let status = posegate_tracker_tracked(zeroed(), 0, zeroed());

@@ -540,6 +540,12 @@ fn functions() -> Vec<Function> {
         p[2].cast()
     );
     function!(
+        posegate_tracker_reach,
+        [tracker(), output::<u32>()],
+        |p| p[0].cast(),
+        p[1].cast()
+    );
+    function!(
         posegate_tracker_tracked,
         [tracker(), output::<posegate_tracked>()],
         |p| p[0].cast(),
