@@ -230,11 +230,7 @@ impl Case {
         };
         let length = read.size(1.0, 2.0 * size);
         let side = (1.2 * read.unit() - 0.1).clamp(0.0, 1.0) * length;
-        let by = Growth::along(
-            length as u32,
-            side as u32,
-            read.size(1.0, 0.3 / Q24) as u32,
-        );
+        let by = Growth::along(length as u32, side as u32, read.size(1.0, 0.3 / Q24) as u32);
         let scale_q16 = read.size(6_553.6, 655_360.0) as u32;
         let (scale, factor) = match base.scaled(scale_q16) {
             Some(factor) if is_scaled => (f64::from(scale_q16) / 65_536.0, factor),

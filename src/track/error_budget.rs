@@ -1,6 +1,6 @@
 //! The rows of the tracker's error budget, each searched for its worst case.
 
-use super::increment::{Increment, Step};
+use super::increment::{Excess, Increment, Step};
 use super::model::Noise;
 use super::way::{Way, along_arc};
 use super::*;
@@ -126,7 +126,12 @@ fn rounding_of_short_increments() {
                     turn / 4_294_967_296.0 * TAU,
                 ];
                 let mut tried = way;
-                tried.add(&increment(by).step, increment(by).step.driven(), 1, &noise);
+                tried.add(
+                    &increment(by).step,
+                    increment(by).step.driven(Excess::NONE),
+                    1,
+                    &noise,
+                );
                 let (sin, cos) = (f64::from(way.turn()) / 4_294_967_296.0 * TAU).sin_cos();
                 let [x, y] = [by[0], by[1]].map(|v| v * 256e6);
                 let ([x0, y0], [x1, y1]) = (way.place_q8(), tried.place_q8());
@@ -171,14 +176,14 @@ fn rounding_of_increments_kept_as_one() {
         let (mut x, mut y, mut heading) = (0.0, 0.0, 0.0f64);
         let longest = random.log_within(10.0, 1e6);
         for _ in 0..many(round) / 8 {
-            let mut entry: Option<Step> = None;
-            let mut each = [0u64; 2];
+            let mut entry: Option<(Step, Excess)> = None;
+            let mut each = [0u32; 2];
             let from = heading;
             for _ in 0..8 {
                 let units = random.log_within(1.0, longest).round();
                 let turn = random.log_within(1.0, 1e6).round() * random.sign();
                 let (sin, cos) = heading.sin_cos();
-                let mut best: Option<(f64, Step, [f64; 2], [u32; 2])> = None;
+                let mut best: Option<(f64, (Step, Excess), [f64; 2], [u32; 2])> = None;
                 for sides in [
                     [0.499, 0.499],
                     [0.499, -0.499],
@@ -188,27 +193,31 @@ fn rounding_of_increments_kept_as_one() {
                     let [dx, dy] = [units + sides[0], sides[1]];
                     let angle = turn / 4_294_967_296.0 * TAU;
                     let step = increment([dx / 256e6, dy / 256e6, angle]).step;
-                    let both = entry.map_or(step, |entry| entry.and(&step).expect("short ones"));
+                    let driven = step.driven(Excess::NONE);
+                    let all = [0, 1].map(|k| each[k] + driven[k]);
+                    let both = entry.map_or((step, Excess::NONE), |(entry, _)| {
+                        entry.and(&step, all).expect("short ones")
+                    });
                     let place = [x + cos * dx - sin * dy, y + sin * dx + cos * dy];
                     // The entry is turned to the axes of the fix.
                     let (sin, cos) = from.sin_cos();
-                    let [ex, ey] = [both.x_q8, both.y_q8].map(f64::from);
+                    let [ex, ey] = [both.0.x_q8, both.0.y_q8].map(f64::from);
                     let [wx, wy] = way.place_q8().map(|v| v as f64);
                     let off = c * (place[0] - wx - cos * ex + sin * ey)
                         + s * (place[1] - wy - sin * ex - cos * ey);
                     if best.as_ref().is_none_or(|(most, ..)| off > *most) {
-                        best = Some((off, both, place, step.driven()));
+                        best = Some((off, both, place, all));
                     }
                 }
-                let (_, both, place, driven) = best.unwrap();
+                let (_, both, place, all) = best.unwrap();
                 (entry, [x, y]) = (Some(both), place);
                 heading += turn / 4_294_967_296.0 * TAU;
-                each = [0, 1].map(|k| each[k] + u64::from(driven[k]));
+                each = all;
             }
-            let entry = entry.unwrap();
-            let [length, turned] = entry.driven().map(u64::from);
+            let (entry, excess) = entry.unwrap();
+            let [length, turned] = entry.driven(excess);
             assert!(length >= each[0] && turned >= each[1], "{entry:?} {each:?}");
-            way.add(&entry, entry.driven(), 8, &noise);
+            way.add(&entry, entry.driven(excess), 8, &noise);
         }
         let bound = way.slip(&noise);
         let [found_x, found_y] = way.place_q8().map(|v| v as f64);
@@ -244,7 +253,12 @@ fn rounding_of_turns() {
             } else {
                 [metres, 0.0, 0.0]
             };
-            way.add(&increment(by).step, increment(by).step.driven(), 1, &noise);
+            way.add(
+                &increment(by).step,
+                increment(by).step.driven(Excess::NONE),
+                1,
+                &noise,
+            );
             if k < count {
                 path.yaw = &path.yaw + &Exact::float(by[2]);
             } else {
@@ -291,7 +305,8 @@ fn length_of_an_increment() {
             ..
         } = increment([x, y, turn]).step;
         let chord = Exact::int(i64::from(x_q8).pow(2) + i64::from(y_q8).pow(2)).sqrt();
-        let bound = f64::from(increment([x, y, turn]).step.driven()[0]) - chord.to_f64();
+        let bound =
+            f64::from(increment([x, y, turn]).step.driven(Excess::NONE)[0]) - chord.to_f64();
         let half = Exact::dyadic(units, 32);
         let half = (&half * &Exact::pi()).abs();
         // Two straight legs, at half of the range to either side of the chord.
@@ -395,7 +410,6 @@ fn rounding_of_carried_noise() {
             y_q8: (random.within(-1.0, 1.0) * length) as i32,
             turn: 0,
             stamp_ms: 0,
-            more: [0; 2],
         };
         if let Some((_, noise, at)) = &best
             && round % 5_000 > 500
@@ -417,9 +431,9 @@ fn rounding_of_carried_noise() {
             best = None;
         }
         let mut way = Way::new(&noise).with_noise(start);
-        way.add(&step, step.driven(), 1, &noise);
-        let [plane, own] = noise.variances(step.driven()[0], 0, 1);
-        let [p, h] = along_arc(step.driven()[0], 0, own);
+        way.add(&step, step.driven(Excess::NONE), 1, &noise);
+        let [plane, own] = noise.variances(step.driven(Excess::NONE)[0], 0, 1);
+        let [p, h] = along_arc(step.driven(Excess::NONE)[0], 0, own);
         let [x, y] = way.place_q8();
         let lever = |q8: i64| &(&turn * &Exact::int(q8)) * &Exact::dyadic(1, 32);
         let (a, b) = (lever(-y), lever(x));
@@ -503,7 +517,7 @@ fn curvature_of_a_heading_error() {
     for round in 0..test_share(20_000, 20) {
         let mut way = Way::new(&noise);
         for _ in 0..1 + round % 20 {
-            way.add(&step, step.driven(), 1, &noise);
+            way.add(&step, step.driven(Excess::NONE), 1, &noise);
         }
         let reach = random.log_within(0.003, 30.0);
         let tt = reach * reach / 743_499.0 * 65_536.0;
@@ -542,7 +556,7 @@ fn swing_of_a_heading_error() {
         let mut way = Way::new(&noise);
         let step = increment([random.log_within(1e-4, 4.0), 0.0, 0.0]).step;
         for _ in 0..(random.log_within(1.0, 50.0) as u32) {
-            way.add(&step, step.driven(), 1, &noise);
+            way.add(&step, step.driven(Excess::NONE), 1, &noise);
         }
         let turn = random.log_within(1.0, 16_777_216.0) as i32;
         let half = &Exact::dyadic(turn, 24) * &Exact::pi();

@@ -35,8 +35,48 @@ pub(super) struct Step {
     pub turn: i32,
     /// The time at its end, milliseconds of the controller's clock.
     pub stamp_ms: u32,
-    /// The length, 2^-4 um, and the turn, 2^-24 turn, that the robot drove in addition to those of an arc between both ends.
-    pub more: [u16; 2],
+}
+
+/// Bounds of the length and the turns that a robot drove in addition to those of an arc between both ends: powers of two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Excess {
+    /// The exponents of both, 0 for none.
+    exponents: u8,
+}
+
+impl Excess {
+    pub const NONE: Self = Self { exponents: 0 };
+    /// What is added to an exponent: 2^-2 um is the smallest length, and 2^-22 turn the smallest turn.
+    const LEAST: [u32; 2] = [5, 1];
+
+    /// Returns bounds of a length, 2^-8 um, and of turns, 2^-24 turn. `None` above 4 mm or 1.4 degrees.
+    fn of([length, turns]: [u32; 2]) -> Option<Self> {
+        let exponent = |amount: u32, least: u32| {
+            let bits = amount.checked_sub(1).map_or(0, |below| {
+                u32::BITS
+                    .wrapping_sub(below.leading_zeros())
+                    .max(least.wrapping_add(1))
+                    .wrapping_sub(least)
+            });
+            (bits < 16).then_some(bits as u8)
+        };
+        let [of_length, of_turn] = Self::LEAST;
+        let exponents = exponent(length, of_length)? | exponent(turns, of_turn)? << 4;
+        Some(Self { exponents })
+    }
+
+    /// Returns the length, 2^-8 um, and the turns, 2^-24 turn.
+    fn amounts(self) -> [u32; 2] {
+        let amount = |exponent: u8, least: u32| match u32::from(exponent) {
+            0 => 0,
+            exponent => 1_u32.wrapping_shl(exponent.wrapping_add(least)),
+        };
+        let [of_length, of_turn] = Self::LEAST;
+        [
+            amount(self.exponents & 0xf, of_length),
+            amount(self.exponents >> 4, of_turn),
+        ]
+    }
 }
 
 /// The largest turn of an increment, 2^-32 turn.
@@ -86,7 +126,6 @@ impl Increment {
                 y_q8: left_q8,
                 turn,
                 stamp_ms,
-                more: [0; 2],
             },
             begins_ms,
         })
@@ -112,7 +151,8 @@ impl Step {
     /// If the direction of movement stays within a range `r < pi`, the length is at most the chord over `cos(r / 2)`. With
     /// `r = t + 0.014 rad` for a turn t of at most an eighth of a turn, that factor is at most `1 + 6 t^2 + 2^-12`, t in turns. The
     /// length of an arc is the chord times `(t / 2) / sin(t / 2)`, about a quarter of this above 1.
-    pub fn driven(&self) -> [u32; 2] {
+    #[inline(never)]
+    pub fn driven(&self, excess: Excess) -> [u32; 2] {
         let chord = if self.y_q8 == 0 {
             self.x_q8.unsigned_abs()
         } else {
@@ -122,25 +162,26 @@ impl Step {
         // Unit 2^-28: at most 2^22 and a unit.
         let square = (wide(turn, turn) >> 20) as u32;
         let longer = square.wrapping_add(1).wrapping_mul(6).wrapping_add(1 << 16);
-        let [length, turned] = self.more.map(u32::from);
-        let length = length.wrapping_shl(4).wrapping_add(1);
+        let [length, turns] = excess.amounts();
         [
             chord
                 .wrapping_add((wide(chord, longer) >> 28) as u32)
-                .wrapping_add(length),
-            turn.wrapping_add(turned),
+                .wrapping_add(length)
+                .wrapping_add(1),
+            turn.wrapping_add(turns),
         ]
     }
 
-    /// Returns this movement and a later one as one. `None` if it is not that of an increment, or the robot drove much to and fro.
-    pub fn and(&self, later: &Self) -> Option<Self> {
-        let [c, s] = BinaryAngle(self.turn as u32).cos_sin_q30().map(i64::from);
-        let (dx, dy) = (i64::from(later.x_q8), i64::from(later.y_q8));
-        let sum = |from: i32, by: i64| from.wrapping_add((by.wrapping_add(1 << 29) >> 30) as i32);
+    /// Returns this movement and a later one as one, with the length and the turns that the robot drove in addition to those of an arc, of all that it
+    /// `drove`. `None` if it is not the movement of an increment, or the robot drove much to and fro.
+    pub fn and(&self, later: &Self, drove: [u32; 2]) -> Option<(Self, Excess)> {
         // Sums below 2^61, and below 2^31.6 after the shift: the movement of 8 ms is shorter than 4 m, or the sum is refused.
         let is_short = [self, later]
             .iter()
             .all(|one| one.chord_squared() < 1 << 58);
+        let [c, s] = BinaryAngle(self.turn as u32).cos_sin_q30().map(i64::from);
+        let (dx, dy) = (i64::from(later.x_q8), i64::from(later.y_q8));
+        let sum = |from: i32, by: i64| from.wrapping_add((by.wrapping_add(1 << 29) >> 30) as i32);
         let both = Self {
             x_q8: sum(
                 self.x_q8,
@@ -152,23 +193,13 @@ impl Step {
             ),
             turn: self.turn.wrapping_add(later.turn),
             stamp_ms: later.stamp_ms,
-            more: [0; 2],
         };
         if !(is_short && is_small(both.x_q8, both.y_q8, both.turn)) {
             return None;
         }
-        let ([length, turned], [own, own_turn]) = (self.driven(), both.driven());
-        let [and_length, and_turned] = later.driven();
-        let length = length.wrapping_add(and_length).saturating_sub(own);
-        let turned = turned.wrapping_add(and_turned).saturating_sub(own_turn);
-        let more = [length.wrapping_add(15) >> 4, turned];
-        let [Ok(length), Ok(turned)] = more.map(u16::try_from) else {
-            return None;
-        };
-        Some(Self {
-            more: [length, turned],
-            ..both
-        })
+        let ([length, turns], [own, own_turn]) = (drove, both.driven(Excess::NONE));
+        let excess = [length.saturating_sub(own), turns.saturating_sub(own_turn)];
+        Some((both, Excess::of(excess)?))
     }
 
     /// Returns the square of the distance between both ends, 2^-16 um^2: at most 2^61.
@@ -191,20 +222,15 @@ impl Step {
     }
 
     /// Returns upper bounds of the length and the turns that the robot drove in a part of the movement, as [`Step::driven`]: the share of an arc is not
-    /// shorter, though its turn is smaller, and what was driven besides may all have been in this part.
-    pub fn driven_part(&self, [after, whole]: [u32; 2]) -> [u32; 2] {
-        let [besides, turned] = self.more.map(u32::from);
-        let arc = Self {
-            more: [0; 2],
-            ..*self
-        };
-        let [length, turn] = arc.driven().map(|all| {
+    /// shorter, though its turn is smaller, and what was driven in addition may all have been in this part.
+    pub fn driven_part(&self, excess: Excess, [after, whole]: [u32; 2]) -> [u32; 2] {
+        let [more, turns] = excess.amounts();
+        let [length, turn] = self.driven(Excess::NONE).map(|all| {
             let share = wide(all, after).checked_div(u64::from(whole));
             let share = share.and_then(|share| u32::try_from(share).ok());
             share.unwrap_or(u32::MAX).saturating_add(1)
         });
-        let length = length.saturating_add(besides.wrapping_shl(4));
-        [length, turn.saturating_add(turned)]
+        [length.saturating_add(more), turn.saturating_add(turns)]
     }
 
     /// Returns the last `after / whole` of the movement.
@@ -217,7 +243,7 @@ impl Step {
             x_q8: share(self.x_q8),
             y_q8: share(self.y_q8),
             turn: share(self.turn),
-            ..*self
+            stamp_ms: self.stamp_ms,
         }
     }
 }

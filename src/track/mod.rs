@@ -57,6 +57,7 @@ use crate::task::Risk;
 pub use self::increment::Increment;
 pub use self::model::OdometryErrors;
 
+use self::increment::Excess;
 use self::model::Noise;
 use self::ring::Ring;
 use self::way::Way;
@@ -241,7 +242,8 @@ impl<const N: usize> Tracker<N> {
             self.restart(step.stamp_ms);
             return Err(reason);
         }
-        if let Some(oldest) = self.ring.push(step, begins_ms) {
+        let driven = step.driven(Excess::NONE);
+        if let Some(oldest) = self.ring.push(step, driven, begins_ms) {
             self.begins_ms = oldest.stamp_ms;
         }
         self.newest_ms = Some(step.stamp_ms);
@@ -249,7 +251,8 @@ impl<const N: usize> Tracker<N> {
         self.fix
             .take_if(|fix| step.stamp_ms.wrapping_sub(fix.stamp_ms) as i32 > most as i32);
         if let Some(fix) = &mut self.fix {
-            fix.way.add(&step, step.driven(), passed, &self.noise);
+            fix.way
+                .add(&step, step.driven(Excess::NONE), passed, &self.noise);
         }
         Ok(())
     }
@@ -327,7 +330,7 @@ impl<const N: usize> Tracker<N> {
                 return Err(Reason::OdometryTooShort);
             }
             let mut since = from_ms;
-            for increment in self.ring.iter() {
+            for (increment, excess) in self.ring.iter() {
                 let passed = increment.stamp_ms.wrapping_sub(since);
                 // How long the increment lasted after the fix.
                 let after = increment.stamp_ms.wrapping_sub(report.stamp_ms);
@@ -335,7 +338,7 @@ impl<const N: usize> Tracker<N> {
                     if after < passed {
                         // The robot may have moved unevenly: back and forth within its bounds.
                         let share = [after, passed];
-                        let driven = increment.driven_part(share);
+                        let driven = increment.driven_part(excess, share);
                         way.add(&increment.part(share), driven, after, &self.noise);
                         way.leave_out(self.settings.bounds.within(unevenness([after, passed])));
                         // The axes of the increment are those before the turn up to the fix.
@@ -346,7 +349,7 @@ impl<const N: usize> Tracker<N> {
                         let driven = self.settings.bounds.within(after.saturating_add(1));
                         way.leave_out(driven.swung(turned.yaw_q24()));
                     } else {
-                        way.add(increment, increment.driven(), passed, &self.noise);
+                        way.add(increment, increment.driven(excess), passed, &self.noise);
                     }
                 }
                 since = increment.stamp_ms;

@@ -1,6 +1,6 @@
 //! The newest movements, in memory of fixed size.
 
-use super::increment::Step;
+use super::increment::{Excess, Step};
 use heapless::Vec;
 
 /// The newest N movements. An array whose oldest entry is overwritten: `heapless::Deque` has arithmetic that may panic.
@@ -8,9 +8,13 @@ use heapless::Vec;
 pub(super) struct Ring<const N: usize> {
     /// From `oldest` to the end, then from the start.
     items: Vec<Step, N>,
+    /// What the robot drove in addition in each.
+    more: [Excess; N],
     oldest: usize,
     /// The stamp at which the newest entry begins.
     begins_ms: u32,
+    /// The length and the turns that the robot drove in the newest entry, as [`Step::driven`].
+    drove: [u32; 2],
 }
 
 /// The longest time of increments that are kept as one, milliseconds: N entries reach back at least half of N times this time, whatever the
@@ -22,8 +26,10 @@ impl<const N: usize> Ring<N> {
         const { assert!(N > 0, "a tracker keeps one increment at least") };
         Self {
             items: Vec::new(),
+            more: [Excess::NONE; N],
             oldest: 0,
             begins_ms: 0,
+            drove: [0; 2],
         }
     }
 
@@ -31,35 +37,44 @@ impl<const N: usize> Ring<N> {
         *self = Self::new();
     }
 
-    /// Adds the newest increment and the stamp at which it begins. Returns the oldest entry if it is overwritten.
-    pub fn push(&mut self, newest: Step, begins_ms: u32) -> Option<Step> {
+    /// Adds the newest increment, what the robot drove in it, and the stamp at which it begins. Returns the oldest entry if it is overwritten.
+    pub fn push(&mut self, newest: Step, drove: [u32; 2], begins_ms: u32) -> Option<Step> {
         let last = match self.oldest.checked_sub(1) {
-            Some(before) => self.items.get_mut(before),
-            None => self.items.last_mut(),
+            Some(before) => before,
+            None => self.items.len().wrapping_sub(1),
         };
-        if let Some(last) = last
-            && newest.stamp_ms.wrapping_sub(self.begins_ms) <= TOGETHER_MS
-            && let Some(both) = last.and(&newest)
+        if newest.stamp_ms.wrapping_sub(self.begins_ms) <= TOGETHER_MS
+            && let (Some(last), Some(more)) = (self.items.get_mut(last), self.more.get_mut(last))
         {
-            *last = both;
-            return None;
+            let [length, turns] = self.drove;
+            let [by_length, by_turns] = drove;
+            let all = [
+                length.saturating_add(by_length),
+                turns.saturating_add(by_turns),
+            ];
+            if let Some(both) = last.and(&newest, all) {
+                (*last, *more) = both;
+                self.drove = all;
+                return None;
+            }
         }
+        self.drove = drove;
         self.begins_ms = begins_ms;
         let Err(newest) = self.items.push(newest) else {
             return None;
         };
         let oldest = self.items.get_mut(self.oldest)?;
         let left = core::mem::replace(oldest, newest);
+        *self.more.get_mut(self.oldest)? = Excess::NONE;
         let next = self.oldest.wrapping_add(1);
         self.oldest = if next < N { next } else { 0 };
         Some(left)
     }
 
-    /// Returns the movements from the oldest to the newest.
-    pub fn iter(&self) -> impl Iterator<Item = &Step> {
-        let later = self.items.get(..self.oldest).unwrap_or_default();
-        let first = self.items.get(self.oldest..).unwrap_or_default();
-        first.iter().chain(later)
+    /// Returns the movements from the oldest to the newest, with what was driven in addition.
+    pub fn iter(&self) -> impl Iterator<Item = (&Step, Excess)> {
+        let all = self.items.iter().zip(self.more);
+        all.clone().skip(self.oldest).chain(all.take(self.oldest))
     }
 }
 
@@ -76,7 +91,6 @@ mod tests {
             y_q8: 2,
             turn: 3,
             stamp_ms,
-            more: [0; 2],
         };
         let mut ring = Ring::<5>::new();
         let mut expected = VecDeque::new();
@@ -87,12 +101,12 @@ mod tests {
             } else {
                 None
             };
-            assert_eq!(ring.push(of(stamp), stamp.wrapping_sub(9)), left);
-            let kept: List<Step> = ring.iter().copied().collect();
+            assert_eq!(ring.push(of(stamp), [0; 2], stamp.wrapping_sub(9)), left);
+            let kept: List<Step> = ring.iter().map(|(step, _)| *step).collect();
             assert_eq!(kept, expected.iter().copied().collect::<List<_>>());
         }
         ring.clear();
         assert_eq!(ring.iter().count(), 0);
-        assert_eq!(ring.push(of(1), 0), None);
+        assert_eq!(ring.push(of(1), [0; 2], 0), None);
     }
 }

@@ -353,7 +353,7 @@ fn part_of_an_arc_has_its_share_of_the_length() {
         };
         let step = Increment::of(ahead, left, turn, [0, 10]).unwrap().step;
         for after in 1..=10u32 {
-            let found = f64::from(step.driven_part([after, 10])[0]) / 256e6;
+            let found = f64::from(step.driven_part(Excess::NONE, [after, 10])[0]) / 256e6;
             let exact = f64::from(after) / 10.0;
             assert!(
                 found >= exact && found <= exact * 1.08 + 1e-8,
@@ -591,7 +591,7 @@ fn short_increments_are_kept_as_one() {
             let step = Increment::of(ahead, 0.0, 1e-3, [k * period_ms, (k + 1) * period_ms])
                 .unwrap()
                 .step;
-            live.add(&step, step.driven(), period_ms, &tracker.noise);
+            live.add(&step, step.driven(Excess::NONE), period_ms, &tracker.noise);
         }
         // The noise is that of all that was driven, to and fro.
         let [late_noise, live_noise] = [&late, &live].map(Way::noise_of_path);

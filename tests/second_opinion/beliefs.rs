@@ -119,7 +119,11 @@ pub fn drawn(rng: &mut Rng) -> ReportForm {
             1 => [rng.log_within(1e-3, 30.0), rng.log_within(1e-3, 30.0)],
             _ => [0.0; 2],
         },
-        aside: if rng.chance(0.3) { 0.0 } else { rng.within(0.0, 1.1) },
+        aside: if rng.chance(0.3) {
+            0.0
+        } else {
+            rng.within(0.0, 1.1)
+        },
     }
 }
 

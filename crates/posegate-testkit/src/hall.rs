@@ -132,13 +132,16 @@ impl Believed {
                 let first = self.mean[2] + self.turn * u;
                 let (s, c) = (first + swing * share).sin_cos();
                 for wall in WALLS {
-                    let length = farthest(wall, length, swing, first, share);
                     let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
-                    let reach = along(0) * u + r * along(1).hypot(along(2)) + length;
+                    let reach = along(0) * u + r * along(1).hypot(along(2));
                     let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
-                    for [vx, vy] in CORNERS {
-                        let corner = wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy);
-                        least = least.min(TO_WALL_M - middle - corner - reach);
+                    let corner = CORNERS
+                        .map(|[vx, vy]| wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy));
+                    let corner = corner.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                    let at_rest = TO_WALL_M - middle - corner - reach;
+                    // No drive leads farther than its length.
+                    if at_rest - length < least {
+                        least = least.min(at_rest - farthest(wall, length, swing, first, share));
                     }
                 }
             }

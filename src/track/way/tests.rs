@@ -1,5 +1,6 @@
 use super::*;
 use crate::track::OdometryErrors;
+use crate::track::increment::Excess;
 use crate::track::tests::noise_of_rows;
 use core::f64::consts::TAU;
 use proptest::prelude::*;
@@ -71,8 +72,8 @@ proptest! {
         let errors = OdometryErrors { m_per_sqrt_m: 0.01, rad_per_sqrt_m: per_metre, rad_per_sqrt_rad: per_radian, ..OdometryErrors::NONE };
         let noise = Noise::of(&errors).unwrap();
         let mut way = Way { turn: heading, noise: start, ..Way::new(&noise) };
-        let increment = Step { x_q8: ahead >> shorter, y_q8: left >> shorter, turn: turn >> straighter, stamp_ms: 0, more: [0; 2] };
-        way.add(&increment, increment.driven(), ms, &noise);
+        let increment = Step { x_q8: ahead >> shorter, y_q8: left >> shorter, turn: turn >> straighter, stamp_ms: 0 };
+        way.add(&increment, increment.driven(Excess::NONE), ms, &noise);
         // 2^-8 um, times a 2^-24 turn in radians.
         let lever = |v: i64| v as f64 / 256.0 * TAU / 16_777_216.0;
         let chord = [lever(way.x), lever(way.y)];
@@ -130,9 +131,8 @@ fn a_coarse_increment_is_not_more_certain_than_fine_ones() {
                     y_q8: 128_000_000 / count,
                     turn: 0,
                     stamp_ms: 0,
-                    more: [0; 2],
                 };
-                way.add(&step, step.driven(), 1, &noise);
+                way.add(&step, step.driven(Excess::NONE), 1, &noise);
             }
             matrix(&way.noise)
         };
@@ -153,7 +153,6 @@ fn unused_noise_is_not_carried() {
         y_q8: 1 << 30,
         turn: 0,
         stamp_ms: 0,
-        more: [0; 2],
     };
     for (xx, tt) in [(0, WIDEST_TURN), (WIDEST_PLANE, 0), (i64::MAX, i64::MAX)] {
         let noise_before = PathNoise {
@@ -165,7 +164,7 @@ fn unused_noise_is_not_carried() {
             noise: noise_before,
             ..Way::new(&noise)
         };
-        way.add(&increment, increment.driven(), 1, &noise);
+        way.add(&increment, increment.driven(Excess::NONE), 1, &noise);
         assert_eq!(way.noise.tt, i64::MAX);
     }
 }
