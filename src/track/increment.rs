@@ -151,7 +151,6 @@ impl Step {
     /// If the direction of movement stays within a range `r < pi`, the length is at most the chord over `cos(r / 2)`. With
     /// `r = t + 0.014 rad` for a turn t of at most an eighth of a turn, that factor is at most `1 + 6 t^2 + 2^-12`, t in turns. The
     /// length of an arc is the chord times `(t / 2) / sin(t / 2)`, about a quarter of this above 1.
-    #[inline(never)]
     pub fn driven(&self, excess: Excess) -> [u32; 2] {
         let chord = if self.y_q8 == 0 {
             self.x_q8.unsigned_abs()

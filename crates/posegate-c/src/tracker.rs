@@ -11,7 +11,7 @@ use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
 
 /// Number of 64-bit words of a `posegate_tracker`.
-pub const POSEGATE_TRACKER_WORDS: usize = 224;
+pub const POSEGATE_TRACKER_WORDS: usize = 192;
 /// Number of increments that a tracker keeps; those that together last at most 8 ms are kept as one. A fix with a stamp before the oldest
 /// one is refused (`POSEGATE_REASON_ODOMETRY_TOO_SHORT`): see `posegate_tracker_reach`.
 pub const POSEGATE_TRACKER_INCREMENTS: usize = 64;
