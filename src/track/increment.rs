@@ -173,6 +173,7 @@ impl Step {
 
     /// Returns this movement and a later one as one, with the length and the turns that the robot drove in addition to those of an arc, of all that it
     /// `drove`. `None` if it is not the movement of an increment, or the robot drove much to and fro.
+    #[inline(never)]
     pub fn and(&self, later: &Self, drove: [u32; 2]) -> Option<(Self, Excess)> {
         // Sums below 2^61, and below 2^31.6 after the shift: the movement of 8 ms is shorter than 4 m, or the sum is refused.
         let is_short = [self, later]

@@ -251,8 +251,7 @@ impl<const N: usize> Tracker<N> {
         self.fix
             .take_if(|fix| step.stamp_ms.wrapping_sub(fix.stamp_ms) as i32 > most as i32);
         if let Some(fix) = &mut self.fix {
-            fix.way
-                .add(&step, step.driven(Excess::NONE), passed, &self.noise);
+            fix.way.add(&step, driven, passed, &self.noise);
         }
         Ok(())
     }
@@ -330,7 +329,7 @@ impl<const N: usize> Tracker<N> {
                 return Err(Reason::OdometryTooShort);
             }
             let mut since = from_ms;
-            for (increment, excess) in self.ring.iter() {
+            for (increment, excess) in (0..N).filter_map(|k| self.ring.get(k)) {
                 let passed = increment.stamp_ms.wrapping_sub(since);
                 // How long the increment lasted after the fix.
                 let after = increment.stamp_ms.wrapping_sub(report.stamp_ms);

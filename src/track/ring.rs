@@ -71,10 +71,11 @@ impl<const N: usize> Ring<N> {
         Some(left)
     }
 
-    /// Returns the movements from the oldest to the newest, with what was driven in addition.
-    pub fn iter(&self) -> impl Iterator<Item = (&Step, Excess)> {
-        let all = self.items.iter().zip(self.more);
-        all.clone().skip(self.oldest).chain(all.take(self.oldest))
+    /// Returns the k-th movement from the oldest, and what was driven in addition.
+    pub fn get(&self, k: usize) -> Option<(&Step, Excess)> {
+        let at = self.oldest.wrapping_add(k);
+        let at = if at < N { at } else { at.wrapping_sub(N) };
+        Some((self.items.get(at)?, *self.more.get(at)?))
     }
 }
 
@@ -102,11 +103,14 @@ mod tests {
                 None
             };
             assert_eq!(ring.push(of(stamp), [0; 2], stamp.wrapping_sub(9)), left);
-            let kept: List<Step> = ring.iter().map(|(step, _)| *step).collect();
+            let kept: List<Step> = (0..5)
+                .filter_map(|k| ring.get(k))
+                .map(|(step, _)| *step)
+                .collect();
             assert_eq!(kept, expected.iter().copied().collect::<List<_>>());
         }
         ring.clear();
-        assert_eq!(ring.iter().count(), 0);
+        assert_eq!((0..5).filter_map(|k| ring.get(k)).count(), 0);
         assert_eq!(ring.push(of(1), [0; 2], 0), None);
     }
 }
