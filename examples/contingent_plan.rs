@@ -1,5 +1,5 @@
 //! Executes a plan on a Cortex-M4F: rules and tables in flash, with a tag that is not seen and a slip during a drive.
-//! Runs in QEMU; `crates/posegate-host/tests/contingent_plan.rs` compares its output with the output of the same run on
+//! Runs in QEMU; `crates/posegate-plan/tests/contingent_plan.rs` compares its output with the output of the same run on
 //! the host.
 //!
 //! ```text

@@ -1,6 +1,6 @@
 //! A robot that executes the plan of `examples/sites/contingent.toml` through a script of events: the first tag is not
 //! seen, twice; the wheels slip before the dock; at the end the pose is unknown. Prints one line per step. Run by
-//! the firmware example `contingent_plan` under emulation, and by `crates/posegate-host/tests/contingent_plan.rs` on
+//! the firmware example `contingent_plan` under emulation, and by `crates/posegate-plan/tests/contingent_plan.rs` on
 //! the host, which compares the lines.
 
 use core::fmt::{Error, Write};

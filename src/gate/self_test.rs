@@ -8,7 +8,7 @@ use crate::table::Table;
 use crate::table::parts;
 
 /// A small proven table of facets with borders of every kind: image edges, distance, obliqueness and a turned goal
-/// (`crates/posegate-host/tests/golden_tables.rs` makes it).
+/// (`crates/posegate-site/tests/golden_tables.rs` makes it).
 static FACETS: &[u8] = include_bytes!("self_test.posegate").as_slice();
 /// The same success set in cells.
 static CELLS: &[u8] = include_bytes!("self_test_grid.posegate").as_slice();

@@ -163,6 +163,9 @@ fn rounding_of_short_increments() {
     });
 }
 
+/// How far off the end is, the entry with what was driven besides, its exact end, and the bounds of all that was driven.
+type Tried = (f64, (Step, Excess), [f64; 2], [u32; 2]);
+
 /// Short increments that the ring keeps as one, whose roundings all err to the same side. What was driven is counted for each.
 #[test]
 fn rounding_of_increments_kept_as_one() {
@@ -183,7 +186,7 @@ fn rounding_of_increments_kept_as_one() {
                 let units = random.log_within(1.0, longest).round();
                 let turn = random.log_within(1.0, 1e6).round() * random.sign();
                 let (sin, cos) = heading.sin_cos();
-                let mut best: Option<(f64, (Step, Excess), [f64; 2], [u32; 2])> = None;
+                let mut best: Option<Tried> = None;
                 for sides in [
                     [0.499, 0.499],
                     [0.499, -0.499],

@@ -1,4 +1,4 @@
-"""Compares the lens models and windows of crates/posegate-host/examples/lenses.rs (JSON lines on stdin) with OpenCV's projections."""
+"""Compares the lens models and windows of crates/posegate-site/examples/lenses.rs (JSON lines on stdin) with OpenCV's projections."""
 
 import json
 import sys

@@ -1,6 +1,6 @@
 """Paves one visibility set with codac: the volume of the inner boxes, and the processor time.
 
-The case of `crates/posegate-host/examples/paving.rs`: a tag of 20 cm, 2 m before the goal and 0.3 m above the camera. Yaw is scaled so
+The case of `crates/posegate-site/examples/paving.rs`: a tag of 20 cm, 2 m before the goal and 0.3 m above the camera. Yaw is scaled so
 that a degree counts as 2 cm, as the resolution does. Called by `cargo xtask paving` with the smallest box in metres.
 """
 

@@ -2,8 +2,8 @@
 
 use crate::failure::Failure;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, ValueHint};
-use posegate_host::files::{self, FileError, Files, Input, NamedInput, Output, OutputFolder};
-use posegate_host::printable::printable_lines;
+use posegate_files::files::{self, FileError, Files, Input, NamedInput, Output, OutputFolder};
+use posegate_files::printable::printable_lines;
 use std::any::TypeId;
 use std::ffi::OsString;
 

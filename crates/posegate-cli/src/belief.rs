@@ -1,9 +1,9 @@
 //! Arguments for the uncertainty of a pose and for the cost of views.
 
 use crate::site_input::Failure;
-use posegate_host::files::{Files, Input};
-use posegate_host::log::covariance;
-use posegate_host::place::{Cost, Gaussian, GaussianError};
+use posegate_files::files::{Files, Input};
+use posegate_place::{Cost, Gaussian, GaussianError};
+use posegate_replay::covariance;
 
 /// The uncertainty of the pose: three standard deviations, or a covariance file.
 #[derive(clap::Args)]

@@ -2,10 +2,10 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate::chain::StartAssumption;
-use posegate_host::draw::chain_picture;
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::log::factor_text;
-use posegate_host::plan::{ChainReport, PlanError, StepKind, evaluate};
+use posegate_files::files::{Files, Input, Output};
+use posegate_plan::{ChainReport, PlanError, StepKind, evaluate};
+use posegate_replay::factor_text;
+use posegate_show::draw::chain_picture;
 use serde_json::json;
 
 /// Evaluates a chain of the site file: each step's set against its task's success set

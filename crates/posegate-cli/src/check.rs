@@ -2,8 +2,8 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site_and_text};
 use posegate::bake::{BakeInput, check};
-use posegate_host::doctor::{Warning, decision_costs, examine};
-use posegate_host::files::{Files, Input};
+use posegate_files::files::{Files, Input};
+use posegate_show::doctor::{Warning, decision_costs, examine};
 use serde_json::{Value, json};
 
 /// Checks a site file: everything is validated, nothing is built

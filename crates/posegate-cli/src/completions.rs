@@ -1,7 +1,7 @@
 //! `posegate completions`: writes the file with which a shell completes commands.
 
 use crate::site_input::{Outcome, answer};
-use posegate_host::files::{Files, Output};
+use posegate_files::files::{Files, Output};
 
 /// Writes completions of this command line for a shell
 #[derive(clap::Args)]

@@ -2,8 +2,8 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task};
 use posegate::shape::Sight;
-use posegate_host::files::{Files, Input};
-use posegate_host::log::{Columns, estimates};
+use posegate_files::files::{Files, Input};
+use posegate_replay::{Columns, estimates};
 use serde_json::{Map, Value, json};
 
 /// Reports for each pose whether it is in a task's success set

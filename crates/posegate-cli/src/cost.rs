@@ -3,11 +3,11 @@
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
 use clap::{ArgMatches, Args, Command, FromArgMatches};
-use posegate_host::files::{Files, Input};
-use posegate_host::log::covariance;
-use posegate_host::place::{
+use posegate_files::files::{Files, Input};
+use posegate_place::{
     Approximate, CostError, ExpectedCost, Gaussian, GaussianError, Quadrature, expected_cost,
 };
+use posegate_replay::covariance;
 use serde_json::{Map, Value, json};
 
 /// Computes the expected cost of seeing a task's tag from a Gaussian pose-set at the task's goal

@@ -5,14 +5,14 @@ use crate::site_input::{
     Failure, Outcome, answer, check_stated_errors, parsed, print, print_json, progress, warn,
 };
 use indicatif::ProgressBar;
-use posegate_host::cover::{
+use posegate_files::files::{Files, Input, Output};
+use posegate_plan::cover::{
     ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch,
     cover_watched, polished, written,
 };
-use posegate_host::draw::{Mounted, MountingSheet};
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::plan::{PlanError, little_slack, margin_text};
-use posegate_host::site::Site;
+use posegate_plan::{PlanError, little_slack, margin_text};
+use posegate_show::draw::{Mounted, MountingSheet};
+use posegate_site::Site;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};

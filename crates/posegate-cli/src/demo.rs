@@ -1,10 +1,10 @@
 //! `posegate demo`: the paper's case study.
 
 use crate::site_input::{Failure, Outcome, answer, print, progress};
-use posegate_host::draw::report::{numbers, summary};
-use posegate_host::draw::study::{CaseStudy, SITE, StudyError};
-use posegate_host::draw::{fig1_parking, fig2_chain, fig3_plan, fig3_sections, fig4_placement};
-use posegate_host::files::{Files, OutputFolder};
+use posegate_files::files::{Files, OutputFolder};
+use posegate_show::draw::report::{numbers, summary};
+use posegate_show::draw::study::{CaseStudy, SITE, StudyError};
+use posegate_show::draw::{fig1_parking, fig2_chain, fig3_plan, fig3_sections, fig4_placement};
 
 /// Writes the paper's case study: pictures, tables and numbers
 #[derive(clap::Args)]

@@ -1,9 +1,9 @@
 //! `posegate doctor`: draws what a site's cameras see, and reports likely mistakes.
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site};
-use posegate_host::doctor::{Findings, Look, TagFinding, Warning, examine};
-use posegate_host::draw::{MinSlack, site_pictures};
-use posegate_host::files::{Files, Input, OutputFolder};
+use posegate_files::files::{Files, Input, OutputFolder};
+use posegate_show::doctor::{Findings, Look, TagFinding, Warning, examine};
+use posegate_show::draw::{MinSlack, site_pictures};
 use serde_json::{Value, json};
 
 /// Draws every tag and camera with its axes, lists which camera sees which tag, and warns of likely mistakes

@@ -1,9 +1,9 @@
 //! `posegate draw`: draws pictures of a task.
 
 use crate::site_input::{Failure, Outcome, answer, site};
-use posegate_host::draw::{DrawError, Subject, task_image, task_plan, task_sections};
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::log::{Columns, estimates};
+use posegate_files::files::{Files, Input, Output};
+use posegate_replay::{Columns, estimates};
+use posegate_show::draw::{DrawError, Subject, task_image, task_plan, task_sections};
 
 /// Draws a task: its success set heading by heading, its floor plan, or its camera's image
 #[derive(clap::Args)]

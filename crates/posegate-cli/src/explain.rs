@@ -2,7 +2,7 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Reason;
-use posegate_host::site::similar;
+use posegate_site::similar;
 use serde_json::json;
 
 /// Explains what a reason for a denial means and what to do about it

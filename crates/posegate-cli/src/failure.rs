@@ -3,10 +3,10 @@
 use miette::{Diagnostic, LabeledSpan, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 use posegate::bake::BakeError;
 use posegate::verify::BuildError;
-use posegate_host::excerpt::Excerpt;
-use posegate_host::files::{FileError, Input};
-use posegate_host::printable::{printable, printable_lines};
-use posegate_host::site::SiteError;
+use posegate_files::excerpt::Excerpt;
+use posegate_files::files::{FileError, Input};
+use posegate_files::printable::{printable, printable_lines};
+use posegate_site::SiteError;
 use std::fmt;
 use std::io::Write;
 use std::process::ExitCode;

@@ -3,7 +3,7 @@
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site};
 use posegate::bake::{self, BakeInput};
 use posegate::verify::family;
-use posegate_host::files::{Files, Input};
+use posegate_files::files::{Files, Input};
 use serde_json::json;
 
 /// Shows how the set from which a tag is seen well enough grows with the allowed error
@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     }
     let site = site(files, &arguments.site)?;
     let id = site.tags.get(&arguments.tag).map(|tag| tag.tag.id);
-    let looks = |task: &&posegate_host::site::Task| {
+    let looks = |task: &&posegate_site::Task| {
         let seen = task.success.shape.visibility();
         task.success.shape.error_limit().is_some() && seen.map(|view| view.tag.id) == id
     };

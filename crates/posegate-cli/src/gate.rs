@@ -8,8 +8,8 @@ use posegate::pose::Pose;
 use posegate::recordings::Evaluator;
 use posegate::set::{Growth, PoseSet, RadiusSquared};
 use posegate::table::Table;
-use posegate_host::files::{Files, Input};
-use posegate_host::log::{
+use posegate_files::files::{Files, Input};
+use posegate_replay::{
     Columns, Row, clock_ms, coordinates, estimates, factor, factor_text, reports,
 };
 use serde_json::{Value, json};

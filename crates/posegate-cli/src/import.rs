@@ -3,9 +3,9 @@
 use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
 use clap::builder::PossibleValuesParser;
 use posegate::shape::Pose3Deg;
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::printable::printable;
-use posegate_host::site::{Convention, DockDirection, Format, Import, ImportError, Imported};
+use posegate_files::files::{Files, Input, Output};
+use posegate_files::printable::printable;
+use posegate_site::{Convention, DockDirection, Format, Import, ImportError, Imported};
 use serde_json::json;
 use std::ffi::OsString;
 

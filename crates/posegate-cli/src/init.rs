@@ -1,8 +1,8 @@
 //! `posegate init`: writes a sample site file.
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json};
-use posegate_host::files::{Files, Output};
-use posegate_host::site::SAMPLE;
+use posegate_files::files::{Files, Output};
+use posegate_site::SAMPLE;
 
 /// Writes a commented sample site file
 #[derive(clap::Args)]

@@ -1,8 +1,8 @@
 //! `posegate inscribe`: a box inside a success set.
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task, warn};
-use posegate_host::files::{Files, Input};
-use posegate_host::inscribe::inscribed_box;
+use posegate_files::files::{Files, Input};
+use posegate_site::inscribe::inscribed_box;
 use serde_json::json;
 
 /// Finds a large box of poses (x, y, yaw) about the goal that is proven inside a task's success set

@@ -1,13 +1,13 @@
 //! `posegate learn`: learns error bounds and inflation factors, and tests outcomes against a claim.
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, warn};
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::learn::{
+use posegate_files::files::{Files, Input, Output};
+use posegate_learn::{
     BoundsSettings, Detection, Detections, ErrorModel, GroupReport, InflationModel,
     InflationReport, InflationSettings, LearnError, RunSource, Runs, ScoredEstimates, by_age_json,
     learn_bounds, learn_inflation, outcomes, test_outcomes,
 };
-use posegate_host::site::{Site, Task, TaskKind};
+use posegate_site::{Site, Task, TaskKind};
 use serde_json::{Value, json};
 
 mod check;

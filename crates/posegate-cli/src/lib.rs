@@ -1,4 +1,4 @@
-//! The command line: arguments and printing. The work is done in `posegate-host`.
+//! The command line: arguments and printing. The work is done in the crates `posegate-site`, `-plan`, `-place`, `-learn`, `-replay` and `-show`.
 //!
 //! Entry points: [`program`] runs a command line. [`calls`] has what other languages call directly, with the same words for
 //! the same errors.
@@ -6,7 +6,7 @@
 #![deny(missing_docs)]
 
 use clap::{Parser, Subcommand};
-use posegate_host::guard::guarded;
+use posegate_files::guard::guarded;
 use std::ffi::OsString;
 use std::process::ExitCode;
 

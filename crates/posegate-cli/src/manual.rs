@@ -1,7 +1,7 @@
 //! `posegate man`: writes manual pages.
 
 use crate::site_input::{Failure, Outcome, answer, print};
-use posegate_host::files::{Files, OutputFolder};
+use posegate_files::files::{Files, OutputFolder};
 
 /// Writes manual pages, one for each command
 #[derive(clap::Args)]

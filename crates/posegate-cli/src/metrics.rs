@@ -1,12 +1,12 @@
 //! `posegate metrics`: compares an estimated trajectory with a reference.
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
-use posegate_host::files::{Files, Input};
-use posegate_host::log::metrics::{
+use posegate_files::files::{Files, Input};
+use posegate_replay::metrics::{
     self, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,
     correct_rate, in_set, relative,
 };
-use posegate_host::log::trajectories::{Named, Poses, read};
+use posegate_replay::trajectories::{Named, Poses, read};
 use serde_json::{Map, Value, json};
 
 /// Compares an estimated trajectory with a reference: ATE, RPE, Correct Rate

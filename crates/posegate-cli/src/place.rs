@@ -4,16 +4,16 @@ use crate::belief::{UncertaintyArgs, Weights};
 use crate::sheet;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
 use posegate::shape::{Family, Pose3Deg, Tag, Tolerance};
-use posegate_host::doctor::stated_error;
-use posegate_host::draw::{Column, Mounted, MountingSheet, placement_picture};
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::learn::ErrorModel;
-use posegate_host::place::{
+use posegate_files::files::{Files, Input, Output};
+use posegate_files::printable::fixed;
+use posegate_learn::ErrorModel;
+use posegate_place::{
     Candidate, LearntCost, Method, Objective, PlaceError, Placed, Placement, PlacementProblem,
     PosePrior, Space, Task, ViewBound, candidates, compare, place, ranges,
 };
-use posegate_host::printable::fixed;
-use posegate_host::site::{Site, pose_line};
+use posegate_show::doctor::stated_error;
+use posegate_show::draw::{Column, Mounted, MountingSheet, placement_picture};
+use posegate_site::{Site, pose_line};
 use serde_json::{Value, json};
 
 /// Finds the place of a task's tag with the least expected cost of seeing it, or by another objective
@@ -505,7 +505,7 @@ fn space(arguments: &Arguments, site: &Site, moved_task: &Task) -> Result<Space,
             "for example --free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360",
         )
     })?;
-    let refused = |error: posegate_host::place::SpaceError| {
+    let refused = |error: posegate_place::SpaceError| {
         Failure::usage(
             error.to_string(),
             "see `posegate place --help` for --free and --wall",

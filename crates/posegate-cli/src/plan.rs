@@ -2,13 +2,13 @@
 
 use crate::chain::{failure, sentences};
 use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on, warn};
-use posegate_host::draw::{chain_picture, success_of};
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::plan::{
+use posegate_files::files::{Files, Input, Output};
+use posegate_plan::{
     Options, Plan, PlanError, PlanResult, Status, crossing_notes, little_slack, margin_text,
     plan_near,
 };
-use posegate_host::site::Site;
+use posegate_show::draw::{chain_picture, success_of};
+use posegate_site::Site;
 use std::collections::BTreeMap;
 
 /// Finds the cheapest chain of looks and drives after which a work task is certain to succeed
@@ -163,7 +163,7 @@ fn costs(arguments: &Arguments, files: &Files) -> Result<BTreeMap<(String, Strin
         return Ok(BTreeMap::new());
     };
     let (text, name) = files.read(path)?;
-    posegate_host::plan::costs(text.as_slice(), &name).map_err(|error| {
+    posegate_plan::costs(text.as_slice(), &name).map_err(|error| {
         Failure::usage(
             error.to_string(),
             "the file has a header `from,to,cost` and one line per drive",

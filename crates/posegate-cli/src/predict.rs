@@ -2,8 +2,8 @@
 
 use crate::learn::refused;
 use crate::site_input::{Outcome, answer, print, print_json, warn};
-use posegate_host::files::{Files, Input};
-use posegate_host::learn::{ErrorModel, InflationModel, Model, conditions, places};
+use posegate_files::files::{Files, Input};
+use posegate_learn::{ErrorModel, InflationModel, Model, conditions, places};
 use serde_json::{Value, json};
 
 /// Evaluates a learnt model at places or for estimates

@@ -7,9 +7,9 @@ pub use self::bag::{body, failure, open};
 pub use self::input::{Recorded, topics};
 
 use crate::site_input::Failure;
-use posegate_host::files::Input;
-use posegate_host::log::recording::FrameNames;
-use posegate_host::site::Site;
+use posegate_files::files::Input;
+use posegate_replay::recording::FrameNames;
+use posegate_site::Site;
 
 /// Which parts of a recording are read.
 #[derive(clap::Args)]

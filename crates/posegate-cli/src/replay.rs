@@ -17,11 +17,11 @@ use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::set::CrossTerms;
 use posegate::table::Table;
-use posegate_host::draw::replay_picture;
-use posegate_host::files::{Files, Output};
-use posegate_host::log::recording::TagLocalizer;
-use posegate_host::log::replay::{PlayError, Replay, ReplayConfig, play};
-use posegate_host::site::{Site, Task};
+use posegate_files::files::{Files, Output};
+use posegate_replay::recording::TagLocalizer;
+use posegate_replay::replay::{PlayError, Replay, ReplayConfig, play};
+use posegate_show::draw::replay_picture;
+use posegate_site::{Site, Task};
 use serde_json::{Map, Value, json};
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {

@@ -1,8 +1,8 @@
 //! `posegate report`: writes a site as one HTML page.
 
 use crate::site_input::{Failure, Outcome, answer, progress, site, warn};
-use posegate_host::files::{Files, Input, NamedInput, Output};
-use posegate_host::page::{Contents, PageInput, page};
+use posegate_files::files::{Files, Input, NamedInput, Output};
+use posegate_show::page::{Contents, PageInput, page};
 use serde_json::Value;
 
 /// Writes a site as one HTML page in which the firmware's core decides on an estimate that the reader drags
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         placements,
         pictures,
     };
-    let refused = |error: posegate_host::page::PageError| {
+    let refused = |error: posegate_show::page::PageError| {
         Failure::usage(
             format!("{}: {error}", arguments.site.display()),
             "see `posegate report --help`",

@@ -3,7 +3,7 @@
 use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Seal;
 use posegate::seal::seal;
-use posegate_host::files::{Files, Input, Output};
+use posegate_files::files::{Files, Input, Output};
 use serde_json::json;
 
 /// Seals a linked firmware, so that the controller can check its own code

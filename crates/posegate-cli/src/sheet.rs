@@ -1,8 +1,8 @@
 //! Writes mounting sheets.
 
 use crate::site_input::Failure;
-use posegate_host::draw::{MountingSheet, mounting_sheet, mounting_sheet_html};
-use posegate_host::files::{Files, Output};
+use posegate_files::files::{Files, Output};
+use posegate_show::draw::{MountingSheet, mounting_sheet, mounting_sheet_html};
 
 /// Writes a mounting sheet: HTML if the file's name ends with `.html`, else SVG.
 pub fn write(files: &Files, path: &Output, sheet: &MountingSheet<'_>) -> Result<(), Failure> {

@@ -3,12 +3,12 @@
 use crate::site_input::{
     Failure, Outcome, answer, print, print_json, progress_with_rate, register, site,
 };
-use posegate_host::draw::site_routes_picture;
-use posegate_host::files::{Files, Input, Output, OutputFolder};
-use posegate_host::plan::Options;
-use posegate_host::site_build::{
+use posegate_files::files::{Files, Input, Output, OutputFolder};
+use posegate_plan::Options;
+use posegate_plan::site_build::{
     self, BuildOptions, Inventory, MergeChecks, Recipe, Shard, SiteBuildError,
 };
+use posegate_show::draw::site_routes_picture;
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::Path;

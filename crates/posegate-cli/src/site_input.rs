@@ -2,9 +2,9 @@
 
 pub use crate::failure::{Failure, Outcome, answer};
 pub use crate::terminal::{json_line, print, print_json, progress, progress_with_rate, warn};
-use posegate_host::doctor::{IMPOSSIBLE_ERROR, stated_errors};
-use posegate_host::files::{Files, Input};
-use posegate_host::site::{Site, Task};
+use posegate_files::files::{Files, Input};
+use posegate_show::doctor::{IMPOSSIBLE_ERROR, stated_errors};
+use posegate_site::{Site, Task};
 
 /// Reads and checks a site file.
 pub fn site(files: &Files, input: &Input) -> Result<Site, Failure> {

@@ -9,11 +9,11 @@ use posegate::verify::{
     BuildError, Coverage, ExpectedTable, Proof, VerifyError, build as build_table, coverage,
     verify, volume,
 };
-use posegate_host::controller_cost::{self, Level};
-use posegate_host::doctor::{Warning, examine};
-use posegate_host::files::{Files, Input, Output};
-use posegate_host::printable::printable_json;
-use posegate_host::site::{Core, Site, TableSpec, Task};
+use posegate_files::files::{Files, Input, Output};
+use posegate_files::printable::printable_json;
+use posegate_show::doctor::{Warning, examine};
+use posegate_site::controller_cost::{self, Level};
+use posegate_site::{Core, Site, TableSpec, Task};
 use serde_json::{Value, json};
 use std::time::Instant;
 

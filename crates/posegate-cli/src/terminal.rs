@@ -2,8 +2,8 @@
 
 use crate::failure::{Failure, to_stderr};
 use indicatif::{ProgressBar, ProgressStyle};
-use posegate_host::files;
-use posegate_host::printable::{printable_json, printable_lines};
+use posegate_files::files;
+use posegate_files::printable::{printable_json, printable_lines};
 use serde_json::Value;
 use std::fmt::Display;
 

@@ -1,6 +1,6 @@
 //! The contract of the command line: exit codes, places in files, no partly written files.
 
-use posegate_host::site::SAMPLE;
+use posegate_site::SAMPLE;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 

@@ -1,12 +1,12 @@
 //! Covers are optimal and valid. On small sites `plan` tries every subset of the candidates, and no subset that serves is
 //! cheaper. The written site serves with and without each tag. The answer is equal for any number of threads.
 
-use posegate_host::cover::{
+use posegate_plan::cover::{
     Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Watch, cover, cover_watched,
     polished, written,
 };
-use posegate_host::plan::{Options, PlanError, Prepared};
-use posegate_host::site::Site;
+use posegate_plan::{Options, PlanError, Prepared};
+use posegate_site::Site;
 use rayon::prelude::*;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -4,8 +4,8 @@
 use posegate_testkit::commands;
 
 use commands::Folder;
-use posegate_host::printable::is_printable;
-use posegate_host::site::SAMPLE;
+use posegate_files::printable::is_printable;
+use posegate_site::SAMPLE;
 use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 

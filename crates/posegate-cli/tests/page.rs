@@ -1,8 +1,8 @@
 //! The page of a site is one file that fetches nothing, shows every task, and contains the core as built from the source. Text of a
 //! site file is text in the page, never markup. (`./ci.sh browser` opens the page.)
 
-use posegate_host::page::{CORE, Contents, PageError, PageInput, page};
-use posegate_host::site::{SAMPLE, Site};
+use posegate_show::page::{CORE, Contents, PageError, PageInput, page};
+use posegate_site::{SAMPLE, Site};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::process::Command;

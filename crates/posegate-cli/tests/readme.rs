@@ -75,7 +75,7 @@ fn documented_site_files_are_valid() {
         .iter()
         .find(|block| block.contains("[task.dock]"))
         .unwrap();
-    let site = posegate_host::site::Site::parse(site, "docs/host.md").unwrap();
+    let site = posegate_site::Site::parse(site, "docs/host.md").unwrap();
     assert!(site.table_spec(site.task("dock").unwrap()).is_some());
 }
 

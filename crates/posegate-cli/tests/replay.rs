@@ -4,7 +4,7 @@ use posegate_testkit::bags;
 
 use bags::{Bag, Compression, Pose};
 use posegate::shape::SuccessSet;
-use posegate_host::site::Site;
+use posegate_site::Site;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

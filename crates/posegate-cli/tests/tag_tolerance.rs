@@ -5,9 +5,9 @@
 //! exceed the bound at any pose of a success set S_l(r), nor in any look of a chain or a plan. The bound is not much
 //! larger than the largest error that is found.
 
-use posegate_host::learn::{BoundsSettings, Detections, ErrorModel, learn_bounds};
-use posegate_host::place::{LearntCost, Task, ViewBound, ViewCost};
-use posegate_host::site::Site;
+use posegate_learn::{BoundsSettings, Detections, ErrorModel, learn_bounds};
+use posegate_place::{LearntCost, Task, ViewBound, ViewCost};
+use posegate_site::Site;
 use posegate_testkit::counts;
 use posegate_testkit::nature::{Random, Vector, World};
 use serde_json::Value;

@@ -354,7 +354,7 @@ impl PyTracker {
             Ok(tracked) => {
                 let pose = tracked.report.belief.mean();
                 found.set_item("stamp_ms", tracked.report.stamp_ms)?;
-                let pose = pose.map(posegate_host::log::coordinates);
+                let pose = pose.map(posegate_replay::coordinates);
                 found.set_item("pose", pose.ok().map(<(f64, f64, f64)>::from))?;
             }
             Err(reason) => found.set_item("reason", reason.name())?,

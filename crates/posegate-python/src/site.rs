@@ -6,7 +6,7 @@ use crate::table::{PyTable, built};
 use crate::threads::on_all_cores;
 use numpy::{IntoPyArray, PyArray1};
 use posegate_cli::calls;
-use posegate_host::site::Site;
+use posegate_site::Site;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;

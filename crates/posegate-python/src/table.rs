@@ -14,7 +14,7 @@ use posegate::report::PoseEstimate;
 use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_cli::calls::{self, Refusal};
-use posegate_host::log::factor;
+use posegate_replay::factor;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;

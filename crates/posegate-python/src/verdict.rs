@@ -2,7 +2,7 @@
 
 use crate::error::refused_argument;
 use posegate::gate::{Reason, Verdict};
-use posegate_host::log::{coordinates, factor};
+use posegate_replay::{coordinates, factor};
 use pyo3::prelude::*;
 
 /// Returns the names of the reasons by their codes; 0 is a permit, which has no reason.

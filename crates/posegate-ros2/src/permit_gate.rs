@@ -16,7 +16,7 @@ use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
 use posegate::set::{Growth, Inflation, Uncertainty};
 use posegate::task::Risk;
 use posegate::track::{Increment, Tracker, TrackerSettings};
-use posegate_host::log::remembers;
+use posegate_replay::remembers;
 
 /// The number of increments of the odometry that are kept for late fixes: 2.5 s at 50 Hz.
 const INCREMENTS: usize = 128;

@@ -1,14 +1,14 @@
 //! Converts messages with a pose to estimates of the robot's base. Without DDS.
 //!
 //! [`Poses`] takes the types of the parameter `pose_type`. The place of the pose on the robot and the site's origin
-//! are applied by the function of `posegate replay` ([`posegate_host::log::recording::LivePoses`]).
+//! are applied by the function of `posegate replay` ([`posegate_replay::recording::LivePoses`]).
 
 use crate::message::{
     Odometry, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, TfMessage, Time,
 };
 use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
-use posegate_host::log::recording::{
+use posegate_replay::recording::{
     BodyFrames, FrameNames, LivePose, LivePoses, LiveTransform, RecordingError,
 };
 use std::collections::BTreeMap;

@@ -9,7 +9,7 @@ use posegate::report::FrameId;
 use posegate::set::{Aging, Trust};
 use posegate::table::{Table, TableError};
 use posegate::track::TrackerSettings;
-use posegate_host::log::detector::{Detector, DetectorError};
+use posegate_replay::detector::{Detector, DetectorError};
 use std::path::PathBuf;
 
 mod reader;

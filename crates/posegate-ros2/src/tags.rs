@@ -1,6 +1,6 @@
 //! Converts detections of tags to poses: one, or two if a tag is seen head-on. Without DDS.
 //!
-//! The geometry is in [`posegate_host::log::detector`]. [`Tags`] keeps the camera that the camera info describes, and
+//! The geometry is in [`posegate_replay::detector`]. [`Tags`] keeps the camera that the camera info describes, and
 //! the result of the last detections as text.
 
 use crate::message::{
@@ -9,8 +9,8 @@ use crate::message::{
 use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
 use posegate::set::{Estimate, Uncertainty};
-use posegate_host::log::corners::{Fix, MountedCamera, is_ambiguous};
-use posegate_host::log::detector::{self, Detector, FoundTag};
+use posegate_replay::corners::{Fix, MountedCamera, is_ambiguous};
+use posegate_replay::detector::{self, Detector, FoundTag};
 
 /// The result of one message of detections.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,7 @@
 use damage::{Random, damage};
 use posegate::bake::BakeInput;
 use posegate::report::Heading;
-use posegate_host::site::Site;
+use posegate_site::Site;
 use posegate_ros2::arguments::Command;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{AprilTagDetection, AprilTagDetectionArray, CameraInfo, Header};

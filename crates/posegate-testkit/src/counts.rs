@@ -17,6 +17,13 @@ pub fn cases(all: u64) -> u64 {
     if is_deep() { all } else { (all / 20).max(1) }
 }
 
+/// Returns the number of iterations of a test: `all`, or the smaller number `interpreted` under Miri, which is slow.
+#[must_use]
+#[allow(dead_code)] // Some tests are not run under Miri.
+pub const fn rounds(all: u32, interpreted: u32) -> u32 {
+    if cfg!(miri) { interpreted } else { all }
+}
+
 /// Returns all cases in a deep job, and in the fast suite one of them, another one on each day of the year.
 #[allow(dead_code)] // Some tests have numbers of cases.
 pub fn one_a_day<T: Copy>(all: &[T]) -> Vec<T> {

@@ -4,7 +4,7 @@
 use crate::oracle::Rng;
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::verify::build;
-use posegate_host::site::Site;
+use posegate_site::Site;
 use std::f64::consts::PI;
 
 /// The success set: a robot of 0.8 m by 0.6 m in a hall of 4 m by 4 m.

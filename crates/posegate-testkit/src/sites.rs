@@ -2,7 +2,7 @@
 
 use posegate::bake::{BakeInput, Rows, TableSpec, grid, write_grid};
 use posegate::verify::ExpectedTable;
-use posegate_host::site::{SAMPLE, Site};
+use posegate_site::{SAMPLE, Site};
 
 /// Returns the sample site.
 pub fn sample() -> Site {

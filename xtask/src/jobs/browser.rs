@@ -18,7 +18,7 @@ pub fn browser(given: &Arguments) -> Result {
     need::command("chromium", "chromium")?;
     let python = need::python("browser-venv", "playwright", "playwright")?;
     wasm(given)?;
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example plant")
+    cmd("cargo build --release -p posegate-cli -p posegate-site --bin posegate --example plant")
         .run()?;
     let program = release("posegate");
     let posegate = || program_at(&program);

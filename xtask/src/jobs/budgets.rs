@@ -17,7 +17,7 @@ const COUNTS: [&str; 3] = ["count_instructions", "count_gate", "count_tracker"];
 pub fn budgets(given: &Arguments) -> Result {
     let mut report = Report::default();
     // In one command, so that both have the same features.
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example budgets")
+    cmd("cargo build --release -p posegate-cli -p posegate-site --bin posegate --example budgets")
         .run()?;
     let host = program_at(&release("examples/budgets")).print_code()?;
     report.require(host == 0, "host");
@@ -62,6 +62,6 @@ pub fn counts(_: &Arguments) -> Result {
 /// Prints estimates per second through the gate, and megabytes of a bag per second of one core. Checks that memory does not
 /// grow with the bag (1 GB against 100 MB, in a temporary folder).
 pub fn replay_speed(_: &Arguments) -> Result {
-    cmd("cargo build --release -p posegate-host --example replay_speed").run()?;
+    cmd("cargo build --release -p posegate-replay --example replay_speed").run()?;
     program_at(&release("examples/replay_speed")).print()
 }

@@ -9,7 +9,7 @@ use serde_json::Value;
 /// Measures how much of a visibility set is proven, how fast, and codac's paving of the same set. The argument is the smallest box
 /// of codac's in metres; 0.02 is the resolution of Posegate's, and takes minutes.
 pub fn paving(given: &Arguments) -> Result {
-    cmd("cargo run --release -p posegate-host --example paving").print()?;
+    cmd("cargo run --release -p posegate-site --example paving").print()?;
     let python = need::python("paving-python", "codac", "codac")?;
     program_at(&python)
         .arg("tests/support/paving_codac.py")
@@ -21,7 +21,7 @@ pub fn paving(given: &Arguments) -> Result {
 /// of 1,000 random points of each lens, and how far a point of a window is outside the image.
 pub fn lenses(_: &Arguments) -> Result {
     let python = need::python("lenses-venv", "cv2, numpy", "opencv-python-headless numpy")?;
-    cmd("cargo build --release -p posegate-host --example lenses").run()?;
+    cmd("cargo build --release -p posegate-site --example lenses").run()?;
     let lines = program_at(&release("examples/lenses")).read()?;
     program_at(&python)
         .arg("tests/support/lenses.py")
@@ -35,7 +35,7 @@ pub fn placement(given: &Arguments) -> Result {
     let (runs, iterations) = (given.or(0, "20"), given.or(1, "1000"));
     let python = need::python("scipy-venv", "scipy", "scipy")?;
     cmd(
-        "cargo build --release -p posegate-cli -p posegate-host --bin posegate --example placement",
+        "cargo build --release -p posegate-cli -p posegate-place --bin posegate --example placement",
     )
     .run()?;
     let example = release("examples/placement");

@@ -32,7 +32,7 @@ const PROGRAMS: [&str; 5] = [
 const BUILT: [(&str, &str); 2] = [
     ("cargo run --release -- ", "posegate"),
     (
-        "cargo run --release -p posegate-host --example drive_bag -- ",
+        "cargo run --release -p posegate-replay --example drive_bag -- ",
         "drive_bag",
     ),
 ];
@@ -64,7 +64,7 @@ pub fn docs(_: &Arguments) -> Result {
     // Its lines are the README's.
     program_at(&tested("examples/may_dock")).run()?;
     // Its command on the pages is replaced below, but its features must be enough.
-    cmd("cargo check -p posegate-host --example drive_bag").run()?;
+    cmd("cargo check -p posegate-replay --example drive_bag").run()?;
     let mut pages = files::files_ending("docs", ".md")?;
     pages.retain(|page| !page.ends_with(OF_PYTHON));
     pages.insert(0, "README.md".into());
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn commands_are_those_of_shell_blocks() {
-        let page = "```sh\nposegate demo -o x   # a comment\n\n./ci.sh docs\ncargo run --release -- check s.toml\ncargo run --release -p posegate-host --example drive_bag -- a b\ncargo build -p posegate-c\n```\n```toml\nx = 1\n```\n";
+        let page = "```sh\nposegate demo -o x   # a comment\n\n./ci.sh docs\ncargo run --release -- check s.toml\ncargo run --release -p posegate-replay --example drive_bag -- a b\ncargo build -p posegate-c\n```\n```toml\nx = 1\n```\n";
         let found = commands(page).unwrap().unwrap();
         assert_eq!(found.len(), 4);
         assert_eq!(found[0].trim(), "posegate demo -o x");

@@ -51,7 +51,7 @@ const NEEDED: [&str; 5] = [
     "include/posegate.h",
     "crates/posegate-c/include/posegate.h",
     "crates/posegate-c/examples/c/docking_gate.c",
-    "crates/posegate-host/src/page/core.wasm",
+    "crates/posegate-show/src/page/core.wasm",
 ];
 /// What packages have of the files at the top of the repository: a package, and files, or folders that end in `/`. They are copied
 /// when the packages are made: links would break if a repository is unpacked without them.

@@ -13,13 +13,13 @@ use crate::shell::{Result, cmd, program_at};
 pub fn planning(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;
-    cmd("cargo test --release -p posegate-host --test planning -- --nocapture").json_of_both()?;
+    cmd("cargo test --release -p posegate-plan --test planning -- --nocapture").json_of_both()?;
     let mut report = Report::default();
-    let host = cmd("cargo run --release -p posegate-host --example planning --")
+    let host = cmd("cargo run --release -p posegate-show --example planning --")
         .args(given.path(0))
         .print_code()?;
     report.require(host == 0, "host");
-    ran(cmd("cargo test -p posegate-host --test contingent_plan"), 1)?;
+    ran(cmd("cargo test -p posegate-plan --test contingent_plan"), 1)?;
     let built = board::build_all(
         Level::Fast,
         &CORES.map(|(target, _)| target),
@@ -34,13 +34,13 @@ pub fn planning(given: &Arguments) -> Result {
 /// Chooses the fewest tags for a warehouse of 100 docks and 2,000 candidates, to a proven gap. Plans are made again on the written site,
 /// and executed by the judge of the planning job. Small sites are compared with all subsets by `test`.
 pub fn cover(_: &Arguments) -> Result {
-    cmd("cargo run --release -p posegate-host --example cover").print()
+    cmd("cargo run --release -p posegate-show --example cover").print()
 }
 
 /// Measures the tables and proofs of sites from 10 to 100,000 endpoints and for several nodes, with plots if files for them are named. The
-/// model for what is not measured is in crates/posegate-host/examples/scale.rs.
+/// model for what is not measured is in crates/posegate-show/examples/scale.rs.
 pub fn scale(given: &Arguments) -> Result {
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example scale")
+    cmd("cargo build --release -p posegate-cli -p posegate-show --bin posegate --example scale")
         .run()?;
     let plots = (0..given.all().len()).filter_map(|index| given.path(index));
     program_at(&release("examples/scale"))

@@ -162,7 +162,7 @@ pub fn of_board(
     Ok(figures)
 }
 
-const FIGURES: &str = "crates/posegate-host/src/controller_cost/figures.txt";
+const FIGURES: &str = "crates/posegate-site/src/controller_cost/figures.txt";
 const COLUMNS: &str = "# What a gate in C takes, made by POSEGATE_BLESS=1 ./ci.sh costs. Flash and stack in bytes, calls in instructions of examples/c/robot.
 # core level parts flash_of_gate flash_of_tracker stack_of_init stack_of_step stack_of_tracked init odometry fix late_fix step change
 ";

@@ -30,7 +30,7 @@ pub fn slurm(given: &Arguments) -> Result {
         )
         .into());
     }
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate --example plant")
+    cmd("cargo build --release -p posegate-cli -p posegate-site --bin posegate --example plant")
         .run()?;
     let folder = Scratch::new()?;
     let plant = program_at(&release("examples/plant"))

@@ -140,7 +140,7 @@ pub fn accuracy(given: &Arguments) -> Result {
 /// Checks that every pose of a table is in its success set, for random success sets. Arguments: sets, and samples per set. 1000 1000
 /// is the deep job's, of which the fast suite tries a part; 1000 100000 takes hours.
 pub fn sets(given: &Arguments) -> Result {
-    cmd("cargo test --release -p posegate-host --test success_sets -- --nocapture")
+    cmd("cargo test --release -p posegate-site --test success_sets -- --nocapture")
         .env("POSEGATE_SETS", given.or(0, "1000"))
         .env("POSEGATE_SAMPLES", given.or(1, "100000"))
         .json()?;

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 /// The committed module.
-const COMMITTED: &str = "crates/posegate-host/src/page/core.wasm";
+const COMMITTED: &str = "crates/posegate-show/src/page/core.wasm";
 const MOST_BYTES: u64 = 150_000;
 
 /// Builds the module. It imports nothing (a panic that can be reached would be an import), and is small.

@@ -16,7 +16,7 @@ fn walk(name: &str, command: &Command, found: &mut Vec<String>) {
         let role = Role::of(argument);
         assert!(
             kind != TypeId::of::<PathBuf>() && kind != TypeId::of::<std::ffi::OsString>(),
-            "{name} {}: give it the type of its role, of posegate_host::files",
+            "{name} {}: give it the type of its role, of posegate_files::files",
             argument.get_id()
         );
         if let Some(role) = role {

@@ -2,8 +2,8 @@
 
 use super::{from_recording, refused, warn_of_cut_runs};
 use crate::site_input::{Failure, Outcome, answer, print, print_json, warn};
-use posegate_host::files::{Files, Input};
-use posegate_host::learn::{
+use posegate_files::files::{Files, Input};
+use posegate_learn::{
     BoundCheck, Change, CheckReport, CheckSettings, Detections, Model, RegionCheck, check_bounds,
 };
 use serde_json::{Value, json};

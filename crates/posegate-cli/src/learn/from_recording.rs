@@ -3,12 +3,12 @@
 use crate::recording::{Options, Reading, Recorded, failure, topics};
 use crate::site_input::{Failure, site, warn};
 use posegate::confidence::radius_squared;
-use posegate_host::files::{Files, Input};
-use posegate_host::log::KnownTags;
-use posegate_host::log::corners::MountedCamera;
-use posegate_host::log::recording::format_of;
-use posegate_host::log::tables::{Played, Table};
-use posegate_host::site::Site;
+use posegate_files::files::{Files, Input};
+use posegate_replay::KnownTags;
+use posegate_replay::corners::MountedCamera;
+use posegate_replay::recording::format_of;
+use posegate_replay::tables::{Played, Table};
+use posegate_site::Site;
 use std::io::Read;
 
 /// The confidence of the ellipsoids with which poses are computed from corners.

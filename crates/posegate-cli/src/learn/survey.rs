@@ -2,8 +2,8 @@
 
 use super::refused;
 use crate::site_input::{Outcome, answer, print, print_json, site};
-use posegate_host::files::{Files, Input};
-use posegate_host::learn::{OffsetReport, Surveyed, SurveyedSite, looks, survey};
+use posegate_files::files::{Files, Input};
+use posegate_learn::{OffsetReport, Surveyed, SurveyedSite, looks, survey};
 use serde_json::{Value, json};
 
 /// Finds docks and tags that are not where the site file places them, from logs of dockings

@@ -1,9 +1,9 @@
 //! What the detections of `posegate learn bounds` were taken with.
 
 use crate::site_input::{Failure, site};
-use posegate_host::files::{Files, Input};
-use posegate_host::learn::TakenWith;
-use posegate_host::site::Site;
+use posegate_files::files::{Files, Input};
+use posegate_learn::TakenWith;
+use posegate_site::Site;
 
 /// The camera and the tags of the data. A site whose camera, mount or tag differs refuses the model.
 #[derive(clap::Args)]

@@ -2,11 +2,11 @@
 
 use super::Reading;
 use crate::site_input::Failure;
-use posegate_host::files::{FileError, Files, Input};
-use posegate_host::log::recording::{
+use posegate_files::files::{FileError, Files, Input};
+use posegate_files::printable::printable;
+use posegate_replay::recording::{
     BAD_FOLDER, Bag, BagFile, BodyFrames, Recording, RecordingError, Role, Wanted, files_of,
 };
-use posegate_host::printable::printable;
 
 /// The topic of static transforms.
 const STATIC: &str = "/tf_static";

@@ -3,15 +3,15 @@
 use super::Reading;
 use super::bag;
 use crate::site_input::Failure;
-use posegate_host::files::{FileError, Files, Opened};
-use posegate_host::log::corners::MountedCamera;
-use posegate_host::log::recording::{
+use posegate_files::files::{FileError, Files, Opened};
+use posegate_files::printable::printable;
+use posegate_replay::corners::MountedCamera;
+use posegate_replay::recording::{
     BAD_FOLDER, Bag, BagFile, BodyFrames, Format, ReaderDiagnostics, Recording, Role, TagLocalizer,
     Text, Wanted, files_of, format_of,
 };
-use posegate_host::log::replay::{Clock, Part};
-use posegate_host::log::{Columns, KnownTags, Trajectory, estimates, trajectories};
-use posegate_host::printable::printable;
+use posegate_replay::replay::{Clock, Part};
+use posegate_replay::{Columns, KnownTags, Trajectory, estimates, trajectories};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};

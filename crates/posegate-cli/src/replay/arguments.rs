@@ -5,9 +5,9 @@ use crate::recording::{Options, Reading};
 use crate::site_input::Failure;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
-use posegate_host::files::{Input, Output};
-use posegate_host::log::replay::{Clock, Thresholds};
-use posegate_host::site::Site;
+use posegate_files::files::{Input, Output};
+use posegate_replay::replay::{Clock, Thresholds};
+use posegate_site::Site;
 
 /// The largest number of true poses of a topic that are kept.
 const MOST_TRUE: usize = 1 << 17;

@@ -7,9 +7,9 @@ use crate::site_input::{Failure, warn};
 use posegate::confidence::radius_squared;
 use posegate::gate::InvalidParameter;
 use posegate::set::{Aging, Inflation, RadiusSquared};
-use posegate_host::files::Files;
-use posegate_host::learn::{ByAge, InflationModel, by_age_json};
-use posegate_host::log::recording::Text;
+use posegate_files::files::Files;
+use posegate_learn::{ByAge, InflationModel, by_age_json};
+use posegate_replay::recording::Text;
 use serde_json::{Value, json};
 use std::io::Read;
 

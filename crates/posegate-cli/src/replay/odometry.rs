@@ -5,14 +5,14 @@ use crate::recording::{body, failure, open, topics};
 use crate::site_input::Failure;
 use posegate::set::{RadiusSquared, Trust};
 use posegate::track::{OdometryErrors, TrackerSettings};
-use posegate_host::files::{Files, Input};
-use posegate_host::log::recording::{
+use posegate_files::files::{Files, Input};
+use posegate_files::printable::printable;
+use posegate_replay::recording::{
     Format, FrameNames, Item, Kind, ReaderDiagnostics, Recording, Role, Wanted, format_of,
 };
-use posegate_host::log::replay::{Odometry, OdometryPose, odometry_csv};
-use posegate_host::log::trajectories;
-use posegate_host::printable::printable;
-use posegate_host::site::Site;
+use posegate_replay::replay::{Odometry, OdometryPose, odometry_csv};
+use posegate_replay::trajectories;
+use posegate_site::Site;
 
 /// Reads the odometry; `None` without --odom.
 pub fn odometry(

@@ -2,9 +2,9 @@
 
 use super::Arguments;
 use crate::site_input::{Failure, json_line};
-use posegate_host::files::{Draft, Files, Output, unprinted};
-use posegate_host::log::replay::{Channels, Row};
-use posegate_host::log::tables::ESTIMATES;
+use posegate_files::files::{Draft, Files, Output, unprinted};
+use posegate_replay::replay::{Channels, Row};
+use posegate_replay::tables::ESTIMATES;
 use serde_json::Value;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -5,10 +5,10 @@ use super::odometry::no_edge;
 use crate::recording::{Recorded, topics};
 use crate::site_input::{Failure, print};
 use posegate::gate::Reason;
-use posegate_host::log::Trajectory;
-use posegate_host::log::recording::{ReaderDiagnostics, SkipReason};
-use posegate_host::log::replay::{Clock, NOT_FRESH, Replay};
-use posegate_host::printable::printable;
+use posegate_files::printable::printable;
+use posegate_replay::Trajectory;
+use posegate_replay::recording::{ReaderDiagnostics, SkipReason};
+use posegate_replay::replay::{Clock, NOT_FRESH, Replay};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Site files and `posegate import`: what they import, print and refuse.
 
 use super::{OFFSET, TURN, bundle_file, field_file};
-use posegate_host::site::Site;
+use posegate_site::Site;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -147,7 +147,7 @@ fn table_of_imported_tags_covers_the_imported_files() {
         "docks.yaml",
         "docks:\n  front: {type: charger, pose: [0.0, 0.0, 0.0]}\n",
     );
-    let manual = posegate_host::site::SAMPLE;
+    let manual = posegate_site::SAMPLE;
     let begin = manual.find("[tag.t7]").unwrap();
     let end = begin + manual[begin..].find("\n\n").unwrap();
     let imported = |file: &str, pose: &str| {
@@ -211,7 +211,7 @@ fn documented_imports_are_valid() {
         "tags.yaml",
         &bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
     );
-    let lines = posegate_host::site::SAMPLE.lines();
+    let lines = posegate_site::SAMPLE.lines();
     let sample: Vec<&str> = lines.filter_map(|line| line.strip_prefix("#   ")).collect();
     let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/host.md"))
         .unwrap();

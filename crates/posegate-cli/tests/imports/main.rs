@@ -2,7 +2,7 @@
 //! prints agree, and a table's claim covers the bytes of every imported file.
 
 use posegate::shape::Pose3Deg;
-use posegate_host::site::{Convention, Format, Import, SiteTag};
+use posegate_site::{Convention, Format, Import, SiteTag};
 
 mod entry_points;
 

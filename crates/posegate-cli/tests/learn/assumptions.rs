@@ -5,7 +5,7 @@ use crate::distribution::{Distribution, Random, SQUARES};
 use crate::inflation::estimates;
 use crate::{Share, in_regions};
 use posegate::confidence::radius_squared;
-use posegate_host::learn::{
+use posegate_learn::{
     BoundsSettings, Detection, Detections, ErrorModel, InflationModel, InflationSettings, Scored,
     ScoredEstimates, learn_bounds, learn_inflation,
 };

@@ -2,7 +2,7 @@
 
 use crate::Share;
 use crate::distribution::{Distribution, HEAD_ON, Random, SQUARES};
-use posegate_host::learn::{
+use posegate_learn::{
     BoundsSettings, Detections, ErrorModel, LearnError, clopper_pearson, learn_bounds,
 };
 use posegate_testkit::counts;

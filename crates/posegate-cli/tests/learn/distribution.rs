@@ -1,6 +1,6 @@
 //! Synthetic views with a known distribution of errors.
 
-use posegate_host::learn::{Detection, Detections, RunSource, Runs};
+use posegate_learn::{Detection, Detections, RunSource, Runs};
 
 /// Pseudo-random numbers (splitmix64).
 pub struct Random(pub u64);

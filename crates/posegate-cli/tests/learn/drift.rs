@@ -1,7 +1,7 @@
 //! `learn check`: valid models are not contradicted, however often they are tested. Changes are found, dated and named.
 
 use crate::distribution::{Distribution, Random, SQUARES};
-use posegate_host::learn::{
+use posegate_learn::{
     BoundsSettings, Change, CheckReport, CheckSettings, Detection, Detections, ErrorModel, Runs,
     acceptance, check_bounds, learn_bounds,
 };

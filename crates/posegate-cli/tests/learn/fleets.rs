@@ -2,7 +2,7 @@
 
 use crate::distribution::Random;
 use posegate::confidence::radius_squared;
-use posegate_host::learn::{
+use posegate_learn::{
     InflationModel, InflationSettings, LearnError, Scored, ScoredEstimates, acceptance,
     learn_inflation,
 };

@@ -3,8 +3,8 @@
 use crate::command::{lines, run, write};
 use crate::distribution::{Distribution, Random};
 use crate::in_regions;
-use posegate_host::learn::{BoundsSettings, ErrorModel, learn_bounds};
-use posegate_host::site::SAMPLE;
+use posegate_learn::{BoundsSettings, ErrorModel, learn_bounds};
+use posegate_site::SAMPLE;
 use std::fmt::Write;
 
 /// Errors are a few centimetres, and a metre more with a probability that falls with psi and rises with the distance.

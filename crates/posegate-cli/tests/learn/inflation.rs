@@ -3,7 +3,7 @@
 use crate::Share;
 use crate::distribution::Random;
 use posegate::confidence::radius_squared;
-use posegate_host::learn::{
+use posegate_learn::{
     InflationModel, InflationSettings, LearnError, Scored, ScoredEstimates, learn_inflation,
 };
 

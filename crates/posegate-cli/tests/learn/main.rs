@@ -16,7 +16,7 @@ mod recorded;
 mod site;
 mod survey;
 
-use posegate_host::learn::{Detections, ErrorModel, acceptance};
+use posegate_learn::{Detections, ErrorModel, acceptance};
 
 /// A count of hits in a number of trials.
 #[derive(Clone, Copy, Debug, Default)]

@@ -2,7 +2,7 @@
 
 use crate::command::{lines, run, write};
 use crate::distribution::SQUARES;
-use posegate_host::site::SAMPLE;
+use posegate_site::SAMPLE;
 use serde_json::json;
 use std::fmt::Write;
 

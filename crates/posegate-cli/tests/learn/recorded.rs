@@ -3,7 +3,7 @@
 use crate::Share;
 use crate::distribution::Random;
 use posegate::confidence::radius_squared;
-use posegate_host::learn::{
+use posegate_learn::{
     BoundsSettings, Detections, InflationReport, InflationSettings, LearnError, Scored,
     ScoredEstimates, acceptance, learn_bounds, learn_inflation,
 };

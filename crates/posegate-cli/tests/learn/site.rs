@@ -1,8 +1,8 @@
 //! Learnt error models in site files.
 
 use crate::distribution::{Distribution, Random, SQUARES};
-use posegate_host::learn::{BoundsSettings, ErrorModel, learn_bounds};
-use posegate_host::site::{SAMPLE, Site};
+use posegate_learn::{BoundsSettings, ErrorModel, learn_bounds};
+use posegate_site::{SAMPLE, Site};
 
 fn model() -> ErrorModel {
     let settings = BoundsSettings {

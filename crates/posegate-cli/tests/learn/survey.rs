@@ -2,7 +2,7 @@
 
 use crate::command::{lines, run, write};
 use crate::distribution::Random;
-use posegate_host::learn::{Look, OffsetReport, Surveyed, SurveyedSite, acceptance, survey};
+use posegate_learn::{Look, OffsetReport, Surveyed, SurveyedSite, acceptance, survey};
 use std::fmt::Write;
 
 /// Four docks along a wall, each with its own tag in the wall. Neighbouring docks see the tags too.

@@ -4,7 +4,7 @@ use super::{Folder, boxes, rewrite, sha256, two_shards};
 use posegate::bake::BakeInput;
 use posegate::table::{Table, checksum};
 use posegate::verify::build;
-use posegate_host::site::Site;
+use posegate_site::Site;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

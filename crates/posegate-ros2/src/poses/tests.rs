@@ -204,7 +204,7 @@ fn transforms_of_one_robot_give_its_pose() {
 #[test]
 fn place_and_origin_of_the_site_are_used() {
     let path = site();
-    let site = posegate_host::site::Site::read(&path).unwrap();
+    let site = posegate_site::Site::read(&path).unwrap();
     fs::remove_file(&path).unwrap();
     let settings = PoseSettings {
         kind: PoseType::Odometry,

@@ -9,9 +9,9 @@ use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate::table::Table;
 use posegate::track::{OdometryErrors, TrackerSettings};
-use posegate_host::log::detector::{Detector, DetectorSettings};
-use posegate_host::log::recording::{BodyFrames, FrameNames};
-use posegate_host::site::Site;
+use posegate_replay::detector::{Detector, DetectorSettings};
+use posegate_replay::recording::{BodyFrames, FrameNames};
+use posegate_site::Site;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -10,7 +10,7 @@ use crate::settings::NodeSettings;
 use posegate::bake::BakeInput;
 use posegate::gate::{Gate, Reason};
 use posegate::report::{FrameId, Report};
-use posegate_host::site::Site;
+use posegate_site::Site;
 
 const SITE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/tags.toml");
 const START: i128 = 1_800_000_000_000_000_000;
