@@ -1,7 +1,7 @@
-//! On these pages: **firmware** starts with [`gate::Gate`], **programs on a PC** start with [`Site`] of `posegate-host`.
+//! On these pages: **firmware** starts with [`gate::Gate`], **programs on a PC** start with [`Site`] of `posegate-site`.
 //!
 // Overrides links of the README on these pages: of two definitions of a link the first counts.
-//! [`Site`]: ../posegate_host/site/struct.Site.html
+//! [`Site`]: ../posegate_site/struct.Site.html
 //! [assumptions]: crate::gate::assumptions
 //! [estimates]: #pages-and-examples
 //! [recorded]: #pages-and-examples
@@ -37,7 +37,7 @@
 //! Without `std` this is the core for a motion controller: `no_std`, no heap, no float on the decision path. Without one of the features that
 //! are on by default firmware is smaller, and the gate denies more, never less (`./ci.sh costs`).
 //!
-//! Related packages: `posegate-host` (site files, plans, placement of tags, learning, replay), `posegate-cli` (the program
+//! Related packages: `posegate-site` (site files), `-plan`, `-place`, `-learn`, `-replay` and `-show` for the tools of the same names, `posegate-cli` (the program
 //! `posegate`) and `posegate-c` (the C boundary, `include/posegate.h`).
 //!
 //! # Pages and examples

@@ -2,7 +2,8 @@
 //!
 //! A site file states the tasks of a robot and the poses from which each of them succeeds; [`SAMPLE`] is a commented
 //! example. Numbers are kept as written: metres, pixels, and degrees if a name ends in `_deg`. A file with a fault is
-//! refused; the error states the position of the fault and how to fix it ([`SiteError`]).
+//! refused; the error states the position of the fault and how to fix it ([`SiteError`]). The gate ([`posegate::gate::Gate`]), its
+//! tables and their proofs are in the package `posegate`.
 //!
 //! ```
 //! use posegate_site::{SAMPLE, Site};

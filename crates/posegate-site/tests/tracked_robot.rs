@@ -246,13 +246,13 @@ impl Evidence<'_> {
                 pose[2] + turned,
             ];
         }
-        // Until the permission ends it drives straight at the wall, with any turn.
+        // Until the permission ends it drives along its axis towards the wall, with any turn.
         let shares = [-1.0, -0.5, 0.0, 0.5, 1.0].into_iter();
-        let farthest = shares.map(|share| {
+        let ends = shares.map(|share| {
             let [x, y] = tip([pose[0], pose[1], pose[2] + share * swing]);
-            wall[0] * x + wall[1] * y
+            wall[0] * x + wall[1] * y + hall::farthest(wall, reach, swing, [pose[2], share])
         });
-        farthest.fold(f64::NEG_INFINITY, f64::max) + reach - TO_WALL_M
+        ends.fold(f64::NEG_INFINITY, f64::max) - TO_WALL_M
     }
 
     /// The largest distance of the robot beyond any wall at the end of the permission, metres.

@@ -70,8 +70,11 @@ pub struct Believed {
     pub y: [f64; 3],
 }
 
-/// Returns how far a drive leads along a direction at most, of those tried: from a heading to one that differs by `share` of the swing.
-fn farthest([x, y]: [f64; 2], length: f64, swing: f64, first: f64, share: f64) -> f64 {
+/// Returns how far a drive leads along a direction at most, of those tried, ahead or back along the robot's axis of the moment: from a heading to one that
+/// differs by `share` of the swing. `length` is the longest way, metres, `swing` the largest turn, radians, at an even rate or less. Each drive that is tried is
+/// possible: the robot turns to a heading, keeps it, and turns to its last heading.
+#[must_use]
+pub fn farthest([x, y]: [f64; 2], length: f64, swing: f64, [first, share]: [f64; 2]) -> f64 {
     let from = first - y.atan2(x);
     if swing == 0.0 {
         return length * from.cos().abs();
@@ -120,8 +123,7 @@ impl Believed {
     }
 
     /// Returns the least distance of the robot's corners from a wall over the set after a drive, metres; negative beyond a wall.
-    /// `length` is the longest way in metres, ahead or back along the robot's axis of the moment, `swing` the largest turn in radians, at an even rate or less. Each
-    /// drive that is tried is possible: the robot turns to a heading, keeps it, and turns to its last heading.
+    /// The robot drives as in [`farthest`].
     #[must_use]
     pub fn room(&self, length: f64, swing: f64) -> f64 {
         let mut least = f64::INFINITY;
@@ -141,7 +143,7 @@ impl Believed {
                     let at_rest = TO_WALL_M - middle - corner - reach;
                     // No drive leads farther than its length.
                     if at_rest - length < least {
-                        least = least.min(at_rest - farthest(wall, length, swing, first, share));
+                        least = least.min(at_rest - farthest(wall, length, swing, [first, share]));
                     }
                 }
             }

@@ -52,7 +52,7 @@ pub fn docs(_: &Arguments) -> Result {
     for packages in [
         "-p posegate",
         // Without the program, whose document would replace that of the library.
-        "-p posegate -p posegate-host -p posegate-c --features posegate/std,posegate/defmt",
+        "-p posegate -p posegate-files -p posegate-learn -p posegate-site -p posegate-replay -p posegate-place -p posegate-plan -p posegate-show -p posegate-c --features posegate/std,posegate/defmt",
     ] {
         cmd(&format!("cargo doc --no-deps {packages}"))
             .env("RUSTDOCFLAGS", "-D warnings")
@@ -98,9 +98,9 @@ fn check_front_pages(report: &mut Report) -> Result {
     let folder = target_folder().join("doc");
     for (page, module, item) in [
         ("posegate", "gate/", "struct.Gate.html"),
-        ("posegate", "../posegate_host/site/", "struct.Site.html"),
-        ("posegate_host", "site/", "struct.Site.html"),
-        ("posegate_host", "../posegate/gate/", "struct.Gate.html"),
+        ("posegate", "../posegate_site/", "struct.Site.html"),
+        ("posegate_site", "", "struct.Site.html"),
+        ("posegate_site", "../posegate/gate/", "struct.Gate.html"),
     ] {
         let page = folder.join(page).join("index.html");
         let html = files::read(&page)?;

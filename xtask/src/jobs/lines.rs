@@ -10,11 +10,17 @@ use std::path::{Path, PathBuf};
 /// Rooms, ceilings and paths.
 const FILE: &str = "xtask/lines.txt";
 /// Folders of which every file belongs to one room.
-const FOLDERS: [&str; 8] = [
+const FOLDERS: [&str; 14] = [
     "src",
     "crates/posegate-c/src",
     "crates/posegate-cli/src",
-    "crates/posegate-host/src",
+    "crates/posegate-files/src",
+    "crates/posegate-learn/src",
+    "crates/posegate-place/src",
+    "crates/posegate-plan/src",
+    "crates/posegate-replay/src",
+    "crates/posegate-show/src",
+    "crates/posegate-site/src",
     "crates/posegate-python/src",
     "crates/posegate-ros2/src",
     "crates/posegate-testkit/src",

@@ -53,7 +53,7 @@ pub fn mutants(given: &Arguments) -> Result {
     let mut passes = vec!["mutants.out"];
     if !list("mutants.out", "missed")?.is_empty() {
         pass(
-            "--iterate --features std --test-package posegate --test-package posegate-host -- --test grid_walk --test vectors --test facet_faults --test sight",
+            "--iterate --features std --test-package posegate --test-package posegate-site -- --test grid_walk --test vectors --test facet_faults --test sight",
         )?;
         passes.push("mutants.out.old");
     }

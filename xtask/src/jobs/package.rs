@@ -8,7 +8,18 @@ use crate::shell::{Cmd, Result, cmd, program_at};
 use std::path::{Path, PathBuf};
 
 /// The crates that are published, each after those that it needs.
-const CRATES: [&str; 4] = ["posegate", "posegate-host", "posegate-c", "posegate-cli"];
+const CRATES: [&str; 10] = [
+    "posegate",
+    "posegate-files",
+    "posegate-learn",
+    "posegate-site",
+    "posegate-replay",
+    "posegate-place",
+    "posegate-plan",
+    "posegate-show",
+    "posegate-c",
+    "posegate-cli",
+];
 const MOST_BYTES: u64 = 1_300_000;
 /// What the library's package may contain: files, and folders that end in `/`.
 const LIBRARY: &[&str] = &[
@@ -55,8 +66,14 @@ const NEEDED: [&str; 5] = [
 ];
 /// What packages have of the files at the top of the repository: a package, and files, or folders that end in `/`. They are copied
 /// when the packages are made: links would break if a repository is unpacked without them.
-const SHARED: [(&str, &[&str]); 3] = [
-    ("posegate-host", &LICENCES),
+const SHARED: [(&str, &[&str]); 9] = [
+    ("posegate-files", &LICENCES),
+    ("posegate-learn", &LICENCES),
+    ("posegate-site", &LICENCES),
+    ("posegate-replay", &LICENCES),
+    ("posegate-place", &LICENCES),
+    ("posegate-plan", &LICENCES),
+    ("posegate-show", &LICENCES),
     ("posegate-cli", &LICENCES),
     (
         "posegate-c",
@@ -409,7 +426,7 @@ mod tests {
             version_of("posegate-0.1.0.crate", "posegate"),
             Some("0.1.0")
         );
-        assert_eq!(version_of("posegate-host-0.1.0.crate", "posegate"), None);
+        assert_eq!(version_of("posegate-site-0.1.0.crate", "posegate"), None);
     }
 
     #[test]

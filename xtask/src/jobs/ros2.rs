@@ -118,7 +118,7 @@ pub fn nav2(given: &Arguments) -> Result {
 fn programs() -> Result {
     let manifest = format!("{CRATE}/Cargo.toml");
     in_target(cmd("cargo build --locked --release --manifest-path").arg(manifest)).run()?;
-    cmd("cargo build --release -p posegate-cli -p posegate-host --bin posegate")
+    cmd("cargo build --release -p posegate-cli -p posegate-replay --bin posegate")
         .words("--example drive_bag")
         .run()
 }

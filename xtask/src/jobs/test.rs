@@ -65,7 +65,8 @@ pub fn peers(_: &Arguments) -> Result {
 
 /// Runs the tests with random cases with all of their cases; the fast suite runs a part of them.
 pub fn deep(_: &Arguments) -> Result {
-    cmd("cargo test --release -p posegate -p posegate-host --features posegate/std --lib")
+    cmd("cargo test --release -p posegate --features posegate/std --lib")
+        .words("-p posegate-files -p posegate-learn -p posegate-site -p posegate-replay -p posegate-place -p posegate-plan -p posegate-show")
         .words("--test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot --test driven_robot")
         .words("--test cheapest_chains --test other_tags --test pose_set_proofs --test stricter_sets --test worst_pose")
         .words("--test large_sites --test table_faults")

@@ -9,11 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Programs that take longest. They begin first, so that no core waits for one at the end.
-const SLOW: [&str; 6] = [
+const SLOW: [&str; 7] = [
+    "posegate-cli test cover",
     "posegate-cli test learn",
     "posegate-cli test tag_tolerance",
-    "posegate-host test other_tags",
-    "posegate-host lib posegate_host",
+    "posegate-replay test other_tags",
+    "posegate-place lib posegate_place",
     "posegate-boards test interrupt_gate",
     "posegate-cli test page",
 ];
