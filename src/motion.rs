@@ -26,7 +26,8 @@ use crate::set::Growth;
 /// The largest speeds of a robot, in its own frame.
 ///
 /// They bound every possible movement of the robot, not only the commanded one: a controller that limits the speed to
-/// 0.3 m/s and overshoots by a tenth has a bound of 0.33 m/s.
+/// 0.3 m/s and overshoots by a tenth has a bound of 0.33 m/s. They are those of the point whose pose is reported: no speed across the axis is true of
+/// a point on the axle of a differential drive whose wheels do not slip sideways. A point L metres ahead of the axle moves sideways by L times the turn rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionBounds {
@@ -79,6 +80,16 @@ impl MotionBounds {
             speed_q10: u32::try_from(speed).ok()?,
             side_q10: u32::try_from(across).ok()?,
             turn_q16: up(turn_rad_s, &TURN)?,
+        })
+    }
+
+    /// Returns bounds from the largest speed in any direction, m/s, and the largest turn rate, rad/s, as [`MotionBounds::new`].
+    #[must_use]
+    pub fn in_any_direction(speed_m_s: f64, turn_rad_s: f64) -> Option<Self> {
+        let along = Self::new(speed_m_s, 0.0, turn_rad_s)?;
+        Some(Self {
+            side_q10: along.speed_q10,
+            ..along
         })
     }
 
@@ -174,6 +185,13 @@ mod tests {
         assert_eq!(bounds.within(u32::MAX), most);
         assert_eq!(bounds.within(0), Growth::NONE);
         assert_eq!(MotionBounds::STANDS_STILL.within(u32::MAX), Growth::NONE);
+        let any = MotionBounds::in_any_direction(1.0, 1.0)
+            .unwrap()
+            .within(250);
+        let along = bounds.within(250);
+        let [length, turn] = [along.translation_um(), along.yaw_q24()].map(i32::unsigned_abs);
+        assert_eq!(any, Growth::new(length, turn));
+        assert_eq!(along, Growth::along(length, 0, turn));
     }
 
     #[test]

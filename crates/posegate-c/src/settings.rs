@@ -82,7 +82,8 @@ pub struct posegate_source {
     /// The largest speed along the robot's axis, m/s, in either direction. Every possible movement counts, also without a
     /// command.
     pub along_m_s: f64,
-    /// The largest speed across the robot's axis, m/s, in either direction.
+    /// The largest speed across the robot's axis, m/s, in either direction, of the point whose pose is reported. 0 is true of a point on
+    /// the axle of a differential drive whose wheels do not slip sideways; a point L metres ahead of the axle needs L times the turn rate.
     pub across_m_s: f64,
     /// The largest turn rate, rad/s, in either direction.
     pub turn_rad_s: f64,

@@ -179,7 +179,7 @@ fn movement(arguments: &Arguments) -> Result<Growth, Failure> {
 
 /// Returns the bounds of a robot's movement: m/s, degrees/s.
 pub fn motion(speed: f64, rate: f64) -> Result<MotionBounds, Failure> {
-    MotionBounds::new(speed, 0.0, rate.to_radians()).ok_or_else(|| {
+    MotionBounds::in_any_direction(speed, rate.to_radians()).ok_or_else(|| {
         Failure::usage(
             format!("--max-speed {speed} --max-yaw-rate {rate} are not speeds of a robot"),
             "give numbers from 0 to 1000 m/s and from 0 to 1400 degrees/s",

@@ -364,7 +364,7 @@ impl PyTracker {
 }
 
 fn motion(py: Python<'_>, speed: f64, rate: f64) -> PyResult<MotionBounds> {
-    MotionBounds::new(speed, 0.0, rate).ok_or_else(|| {
+    MotionBounds::in_any_direction(speed, rate).ok_or_else(|| {
         refused_argument(
             py,
             format!("max_speed {speed} and max_yaw_rate {rate} are not speeds of a robot"),

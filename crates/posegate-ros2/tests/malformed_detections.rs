@@ -4,12 +4,12 @@
 use damage::{Random, damage};
 use posegate::bake::BakeInput;
 use posegate::report::Heading;
-use posegate_site::Site;
 use posegate_ros2::arguments::Command;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{AprilTagDetection, AprilTagDetectionArray, CameraInfo, Header};
 use posegate_ros2::permit_gate::{Origin, PermitGate};
 use posegate_ros2::settings::NodeSettings;
+use posegate_site::Site;
 use rustdds::no_key::{DeserializerAdapter, SerializerAdapter};
 use rustdds::{CDRDeserializerAdapter, CDRSerializerAdapter, RepresentationIdentifier};
 

@@ -464,11 +464,16 @@ impl Reader<'_> {
             return Err(SettingsError::NoMotionBounds);
         };
         // A robot that is stated not to move at all needs the parameter `stands_still`.
-        let across = across.unwrap_or(0.0);
-        if along + across + turn == 0.0 {
+        if along + across.unwrap_or(0.0) + turn == 0.0 {
             return Err(SettingsError::NoMotionBounds);
         }
-        MotionBounds::new(along, across, turn.to_radians()).ok_or_else(|| {
+        let turn = turn.to_radians();
+        // What is not stated is not taken for none.
+        let bounds = match across {
+            Some(across) => MotionBounds::new(along, across, turn),
+            None => MotionBounds::in_any_direction(along, turn),
+        };
+        bounds.ok_or_else(|| {
             self.invalid(
                 "max_speed",
                 "speeds up to 1000 m/s and turn rates up to 1375 degrees/s",

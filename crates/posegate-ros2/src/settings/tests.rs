@@ -58,7 +58,7 @@ fn parameters_become_settings() {
     assert_eq!((gate.response_ms, gate.maximum_age_ms), (290, 1_000));
     assert_eq!(
         gate.sources[0].motion,
-        MotionBounds::new(0.3, 0.0, 30f64.to_radians()).unwrap()
+        MotionBounds::in_any_direction(0.3, 30f64.to_radians()).unwrap()
     );
     assert_eq!(
         gate.sources[0].trust.inflation,
@@ -69,6 +69,12 @@ fn parameters_become_settings() {
         CrossTerms::YawUnknown(_)
     ));
     assert!(!moving.site_is_checked && moving.tracker.is_none());
+    let along =
+        settings("--ros-args -p max_speed:=0.3 -p max_speed_across:=0.0 -p max_yaw_rate_deg:=30.0");
+    assert_eq!(
+        along.unwrap().bounds,
+        MotionBounds::new(0.3, 0.0, 30f64.to_radians()).unwrap()
+    );
     let still = settings(STILL).unwrap();
     assert_eq!(still.bounds, MotionBounds::STANDS_STILL);
 }
