@@ -112,7 +112,7 @@
 /**
  * Number of 64-bit words of a `posegate_tracker`.
  */
-#define POSEGATE_TRACKER_WORDS 224U
+#define POSEGATE_TRACKER_WORDS 192U
 
 /**
  * Number of increments that a tracker keeps; those that together last at most 8 ms are kept as one. A fix with a stamp before the oldest
@@ -1075,7 +1075,8 @@ typedef struct posegate_source {
      */
     double along_m_s;
     /**
-     * The largest speed across the robot's axis, m/s, in either direction.
+     * The largest speed across the robot's axis, m/s, in either direction, of the point whose pose is reported. 0 is true of a point on
+     * the axle of a differential drive whose wheels do not slip sideways; a point L metres ahead of the axle needs L times the turn rate.
      */
     double across_m_s;
     /**
