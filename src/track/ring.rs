@@ -7,10 +7,10 @@ use heapless::Vec;
 #[derive(Debug)]
 pub(super) struct Ring<const N: usize> {
     /// From `oldest` to the end, then from the start.
-    items: Vec<Step, N>,
+    items: Vec<Step, N, u32>,
     /// What the robot drove in addition in each.
     more: [Excess; N],
-    oldest: usize,
+    oldest: u32,
     /// The stamp at which the newest entry begins.
     begins_ms: u32,
     /// The length and the turns that the robot drove in the newest entry, as [`Step::driven`].
@@ -39,7 +39,7 @@ impl<const N: usize> Ring<N> {
 
     /// Adds the newest increment, what the robot drove in it, and the stamp at which it begins. Returns the oldest entry if it is overwritten.
     pub fn push(&mut self, newest: Step, drove: [u32; 2], begins_ms: u32) -> Option<Step> {
-        let last = match self.oldest.checked_sub(1) {
+        let last = match (self.oldest as usize).checked_sub(1) {
             Some(before) => before,
             None => self.items.len().wrapping_sub(1),
         };
@@ -63,17 +63,18 @@ impl<const N: usize> Ring<N> {
         let Err(newest) = self.items.push(newest) else {
             return None;
         };
-        let oldest = self.items.get_mut(self.oldest)?;
+        let at = self.oldest as usize;
+        let oldest = self.items.get_mut(at)?;
         let left = core::mem::replace(oldest, newest);
-        *self.more.get_mut(self.oldest)? = Excess::NONE;
+        *self.more.get_mut(at)? = Excess::NONE;
         let next = self.oldest.wrapping_add(1);
-        self.oldest = if next < N { next } else { 0 };
+        self.oldest = if (next as usize) < N { next } else { 0 };
         Some(left)
     }
 
     /// Returns the k-th movement from the oldest, and what was driven in addition.
     pub fn get(&self, k: usize) -> Option<(&Step, Excess)> {
-        let at = self.oldest.wrapping_add(k);
+        let at = (self.oldest as usize).wrapping_add(k);
         let at = if at < N { at } else { at.wrapping_sub(N) };
         Some((self.items.get(at)?, *self.more.get(at)?))
     }

@@ -122,56 +122,55 @@ impl Believed {
         })
     }
 
-    /// Returns the least distance of the robot's corners from a wall over the set after a drive, metres; negative beyond a wall.
+    /// Returns the least distance of the robot's corners from any wall over the set after a drive, metres; negative beyond a wall.
     /// The robot drives as in [`farthest`].
     #[must_use]
     pub fn room(&self, length: f64, swing: f64) -> f64 {
+        let rooms = WALLS.map(|wall| self.room_before(wall, length, swing));
+        rooms.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    fn room_before(&self, wall: [f64; 2], length: f64, swing: f64) -> f64 {
+        let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
+        let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
         let mut least = f64::INFINITY;
         for k in -20..=20 {
             let u = (f64::from(k) / 20.0 * std::f64::consts::FRAC_PI_2).sin();
             let r = (1.0 - u * u).max(0.0).sqrt();
+            let reach = along(0) * u + r * along(1).hypot(along(2));
             for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
                 let first = self.mean[2] + self.turn * u;
                 let (s, c) = (first + swing * share).sin_cos();
-                for wall in WALLS {
-                    let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
-                    let reach = along(0) * u + r * along(1).hypot(along(2));
-                    let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
-                    let corner = CORNERS
-                        .map(|[vx, vy]| wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy));
-                    let corner = corner.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                    let at_rest = TO_WALL_M - middle - corner - reach;
-                    // No drive leads farther than its length.
-                    if at_rest - length < least {
-                        least = least.min(at_rest - farthest(wall, length, swing, [first, share]));
-                    }
+                let corners = CORNERS
+                    .map(|[vx, vy]| wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy));
+                let corner = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                let at_rest = TO_WALL_M - middle - corner - reach;
+                // No drive leads farther than its length.
+                if at_rest - length < least {
+                    least = least.min(at_rest - farthest(wall, length, swing, [first, share]));
                 }
             }
         }
         least
     }
 
-    /// Moves the estimate along a direction until the distance is `room`. `None` if there is no such place.
+    /// Moves the estimate along a direction until the distance is `room`, by 3 m at most. `None` if there is no such place.
     #[must_use]
     pub fn placed(mut self, direction: f64, room: f64, length: f64, swing: f64) -> Option<Self> {
-        let at = |set: &mut Self, way: f64| {
-            let (s, c) = direction.sin_cos();
-            (set.mean[0], set.mean[1]) = (c * way, s * way);
-            set.room(length, swing)
-        };
-        if at(&mut self, 0.0) < room {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, 3.0);
-        for _ in 0..18 {
-            let middle = 0.5 * (low + high);
-            if at(&mut self, middle) >= room {
-                low = middle;
-            } else {
-                high = middle;
+        let (s, c) = direction.sin_cos();
+        (self.mean[0], self.mean[1]) = (0.0, 0.0);
+        let mut way = 3.0_f64;
+        for wall in WALLS {
+            let left = self.room_before(wall, length, swing) - room;
+            if left < 0.0 {
+                return None;
+            }
+            let towards = wall[0] * c + wall[1] * s;
+            if towards > 0.0 {
+                way = way.min(left / towards);
             }
         }
-        at(&mut self, low);
+        (self.mean[0], self.mean[1]) = (c * way, s * way);
         Some(self)
     }
 }
