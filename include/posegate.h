@@ -10,9 +10,9 @@
  *
  * What a gate + tracker of a robot that drives takes, without its table, and a 100 Hz cycle of it (./ci.sh costs; `posegate table cost` reports
  * it for your table, with the bound of a cycle):
- *   Cortex-M4F: flash 36 + 17 kB (boxes, -Os) to 77 + 22 kB (all shapes, -O3), stack 2,704 B, 13,562 instructions
- *   Cortex-M0+: flash 39 + 19 kB (boxes, -Os) to 79 + 23 kB (all shapes, -O3), stack 2,992 B, 40,196 instructions
- *   RV32IMC: flash 48 + 22 kB (boxes, -Os) to 100 + 32 kB (all shapes, -O3), stack 2,608 B, 17,297 instructions
+ *   Cortex-M4F: flash 38 + 18 kB (boxes, -Os) to 79 + 23 kB (all shapes, -O3), stack 2,776 B, 14,344 instructions
+ *   Cortex-M0+: flash 40 + 19 kB (boxes, -Os) to 82 + 25 kB (all shapes, -O3), stack 3,064 B, 42,841 instructions
+ *   RV32IMC: flash 49 + 23 kB (boxes, -Os) to 102 + 33 kB (all shapes, -O3), stack 2,688 B, 18,142 instructions
  *
  * C99 and C++11. Link libposegate_c.a after your own objects, with -Wl,--gc-sections; examples/c has
  * recipes for Make and CMake.
