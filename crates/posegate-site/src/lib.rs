@@ -62,7 +62,6 @@ pub mod language {}
 mod error;
 mod families;
 mod import;
-pub mod inscribe;
 mod json;
 mod keys;
 mod learnt;

@@ -1,6 +1,7 @@
 //! Fig. 3 of the paper: the pose-sets inside S_l (seeing the tag) and S_w (docking).
 
 use super::answers::{row_heading, words};
+use super::inscribed::{InscribedBox, inscribed_box};
 use super::legend::{Sample, legend, verdict};
 use super::multiple::Row;
 use super::palette;
@@ -9,7 +10,6 @@ use super::report::chain;
 use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
 use super::svg::{Font, Picture, Style};
 use posegate::shape::{Shape, Visibility};
-use posegate_site::inscribe::{InscribedBox, inscribed_box};
 
 const WIDTH: f64 = 660.0;
 const HEIGHT: f64 = 1534.0;

@@ -48,6 +48,7 @@ mod floor;
 mod growth;
 mod hall;
 pub(crate) mod ingredients;
+mod inscribed;
 mod legend;
 mod letters;
 mod localization;

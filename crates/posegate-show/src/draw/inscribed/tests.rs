@@ -1,5 +1,5 @@
 use super::*;
-use crate::{SAMPLE, Site};
+use posegate_site::{SAMPLE, Site};
 
 fn of(task: &str, yaw_deg: Option<f64>) -> Option<(InscribedBox, SuccessSet)> {
     let site = Site::parse(SAMPLE, "site.toml").unwrap();
@@ -17,8 +17,6 @@ fn largest_box_in_a_box_is_that_box() {
     assert!(near(found.x, [-0.08, 0.08], 1.1e-4), "{found:?}");
     assert!(near(found.y, [-0.06, 0.06], 1.1e-4), "{found:?}");
     assert!(near(found.yaw_deg, [-4.0, 4.0], 0.011), "{found:?}");
-    let [xy, yaw] = found.tolerances();
-    assert!((0.0598..=0.06).contains(&xy) && yaw <= 4f64.to_radians());
 }
 
 /// Corners, faces and the centre are in the set by an independent code path. A box that is longer at a face is

@@ -1,17 +1,5 @@
-//! A box inside a success set: intervals of x, y and yaw that another program can check, such as the tolerances of a goal checker.
-//!
-//! A box ([`InscribedBox`]) is the paper's task space region. All of its poses are proven to be in the set, by the
-//! same intervals that prove tables.
-//!
-//! ```
-//! use posegate_site::inscribe::inscribed_box;
-//! use posegate_site::{SAMPLE, Site};
-//!
-//! let site = Site::parse(SAMPLE, "site.toml")?;
-//! let found = inscribed_box(&site.task("see-t7")?.success, Some(2.0)).expect("the goal is inside");
-//! assert!(found.yaw_deg == [-2.0, 2.0] && found.x[0] < -1.0);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+//! A box inside a success set: the paper's task space region. All of its poses are proven to be in the set, by the same
+//! intervals that prove tables.
 
 use posegate::certify::{Block, Prover};
 use posegate::shape::SuccessSet;
@@ -25,19 +13,6 @@ pub struct InscribedBox {
     pub y: [f64; 2],
     /// `[lo, hi]`, degrees: multiples of 0.01 degrees.
     pub yaw_deg: [f64; 2],
-}
-
-impl InscribedBox {
-    /// Returns the largest distance from the goal, in metres, and the largest yaw, in radians, such that every pose
-    /// within both is in the box: values for Nav2's `xy_goal_tolerance` and `yaw_goal_tolerance`.
-    #[must_use]
-    pub fn tolerances(&self) -> [f64; 2] {
-        let least = |ends: [f64; 2]| (-ends[0]).min(ends[1]);
-        [
-            least(self.x).min(least(self.y)),
-            least(self.yaw_deg).to_radians(),
-        ]
-    }
 }
 
 /// The ends of a box, as distances from the goal: x and y in 0.1 mm, yaw in 0.01 degrees; lower end first.
@@ -72,7 +47,6 @@ const REFINED: usize = 4;
 ///
 /// The box cannot be enlarged at any one of its faces by more than the resolution; other boxes may be larger. Takes some
 /// thousand proofs of blocks: milliseconds for a box, seconds for a view past walls.
-#[must_use]
 pub fn inscribed_box(success: &SuccessSet, yaw_deg: Option<f64>) -> Option<InscribedBox> {
     let prover = Prover::new(success);
     let holds = |reach: &Reach| prover.is_inside(&block(reach));
