@@ -3,7 +3,7 @@
 //!
 //! At start the firmware checks its own code and itself. Then the reports of a schedule follow, one per cycle, and the
 //! interlock follows the gate. In its idle time the firmware checks code and table. It has no protection that the crate
-//! does not offer. It must be sealed after linking (`posegate seal`), otherwise its gate is latched.
+//! does not offer. It must be sealed after linking (`posegate table seal`), otherwise its gate is latched.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 /// Firmware has no meaning on a host; this lets `cargo test --all-features` build there.

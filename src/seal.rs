@@ -1,4 +1,4 @@
-//! Seals firmware files: the work of `posegate seal` after linking.
+//! Seals firmware files: the work of `posegate table seal` after linking.
 //!
 //! The *image* is the content that the file loads into flash: every loadable segment that has bytes, by its load
 //! address, from the lowest to the highest. A linker may leave some bytes between two segments to align the

@@ -255,7 +255,7 @@ reasons! {
         "Service: flash the table again and verify it. If it comes back, the flash is failing, or something writes to it.";
     CodeDamaged "code_damaged" Service
         "The program's own bytes are not those that were sealed, or it was never sealed: the check at start or the scrub found another checksum."
-        "Service: if the firmware was never sealed, seal it (`posegate seal`); else the flash is failing: flash the firmware again.";
+        "Service: if the firmware was never sealed, seal it (`posegate table seal`); else the flash is failing: flash the firmware again.";
     MemoryDamaged "memory_damaged" Service
         "A word of the gate's memory differs from its complement, its settings are not what they were, or the program did not go its proper way."
         "Service: reset the controller; if it comes again, replace it.";

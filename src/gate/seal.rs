@@ -4,7 +4,7 @@ use super::{Reason, Scrub, ScrubProgress};
 use crate::table::checksum;
 use core::hint::black_box;
 
-/// A record in the firmware's own flash. After linking, the host (`posegate seal`) fills it in so that the
+/// A record in the firmware's own flash. After linking, the host (`posegate table seal`) fills it in so that the
 /// whole image, this record included, has the CRC-32C [`Seal::SUM`].
 ///
 /// ```

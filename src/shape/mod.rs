@@ -187,15 +187,6 @@ impl Shape {
         }
     }
 
-    /// Returns the error limit in the shape if there is exactly one.
-    #[must_use]
-    pub fn error_limit(&self) -> Option<&ErrorLimit> {
-        only(self.simple().into_iter().filter_map(|set| match set {
-            Self::Bounded { limit, .. } => Some(limit),
-            _ => None,
-        }))
-    }
-
     /// Returns `true` if no view keeps the error within its limit; tolerances can cause this.
     #[must_use]
     pub fn never_within_error(&self) -> bool {

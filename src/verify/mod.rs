@@ -43,7 +43,6 @@
 
 mod coverage;
 mod facets;
-mod family;
 mod sight;
 #[cfg(test)]
 mod tests;
@@ -51,7 +50,6 @@ mod volume;
 
 pub use self::coverage::{Coverage, GroupCoverage, coverage};
 pub use self::facets::UnprovenFacet;
-pub use self::family::{Member, family};
 pub use self::volume::{Volume, volume};
 
 use crate::bake::{self, BakeError, BakeInput, Effort, FacetPlan, Layout};

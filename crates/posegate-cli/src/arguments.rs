@@ -7,6 +7,25 @@ use posegate_files::printable::printable_lines;
 use std::any::TypeId;
 use std::ffi::OsString;
 
+/// Commands of earlier versions, with what to type instead.
+const EARLIER: [(&str, &str); 6] = [
+    (
+        "completions",
+        "type `posegate --completions SHELL`, which prints them",
+    ),
+    ("doctor", "type `posegate check SITE --draw DIR`"),
+    (
+        "family",
+        "change `r` in the site file, and type `posegate table build SITE --task TASK --dry-run --json`, which prints the set's volume",
+    ),
+    (
+        "inscribe",
+        "type `posegate contains SITE --task TASK --box`",
+    ),
+    ("man", "type `posegate --man DIR`"),
+    ("seal", "type `posegate table seal FIRMWARE`"),
+];
+
 /// What a command does with a file that an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
@@ -52,8 +71,17 @@ fn with_hints(command: Command) -> Command {
 /// Parses a command line and declares its files. Returns `None` if help or the version was requested and printed.
 ///
 /// # Errors
-/// A command line that clap refuses, or an output that is also an input.
+/// A command of an earlier version, a command line that clap refuses, or an output that is also an input.
 pub fn parsed(words: &[OsString]) -> Result<Option<(crate::Arguments, Files)>, Failure> {
+    let earlier = EARLIER
+        .iter()
+        .find(|(name, _)| words.get(1).is_some_and(|word| word == name));
+    if let Some((name, instead)) = earlier {
+        crate::failure::to_stderr(&format!(
+            "`posegate {name}` does not exist any more: {instead}"
+        ));
+        return Err(Failure::printed());
+    }
     let matches = match command().try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if error.use_stderr() => return Err(refused(&error)),

@@ -2,20 +2,28 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site_and_text};
 use posegate::bake::{BakeInput, check};
-use posegate_files::files::{Files, Input};
-use posegate_show::doctor::{Warning, decision_costs, examine};
+use posegate_files::files::{Files, Input, OutputFolder};
+use posegate_show::doctor::{Findings, Look, Warning, decision_costs, examine};
+use posegate_show::draw::{MinSlack, site_pictures};
 use serde_json::{Value, json};
 
 /// Checks a site file: everything is validated, nothing is built
 ///
-/// Ends with the warnings of `posegate doctor`: likely mistakes in tags, candidates, cameras and tasks, with the line of
-/// the file. If the site has a `[controller]`, they name each task on whose table a step of the gate may take more cycles than
+/// Ends with warnings of likely mistakes in tags, candidates, cameras and tasks, with the line of the file. If the site has a `[controller]`, they name each task on whose table a step of the gate may take more cycles than
 /// the controller has. Warnings do not change the exit code.
+///
+/// --draw shows what the site file says: every tag and camera with its axes. A tag's x axis comes out of its face, and z is up;
+/// a camera looks along its x axis. It also lists which camera sees which tag from which goal.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  posegate check site.toml")]
+#[command(
+    after_help = "Example:\n  posegate check site.toml\n  posegate check site.toml --draw check-out"
+)]
 pub struct Arguments {
     /// The site file; `-` for standard input
     site: Input,
+    /// Draw every tag and camera into this folder (SVG); it is created if it does not exist
+    #[arg(long, value_name = "DIR")]
+    draw: Option<OutputFolder>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -42,9 +50,18 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             (name, shape, site.chosen_table(task))
         })
         .collect();
-    let mut warnings = examine(&site).warnings;
+    let findings = examine(&site);
+    let mut warnings = findings.warnings.clone();
     let costs = decision_costs(&site);
     warnings.extend(costs.map_err(|(name, error)| Failure::table(&arguments.site, &name, error))?);
+    let named = |(name, text): (String, String)| (name, text.into_bytes());
+    let pictures: Option<Vec<_>> = arguments
+        .draw
+        .is_some()
+        .then(|| site_pictures(&site).into_iter().map(named).collect());
+    if let (Some(folder), Some(pictures)) = (&arguments.draw, &pictures) {
+        files.write_into(folder, pictures)?;
+    }
     if arguments.json {
         let tasks: Vec<_> = tasks
             .iter()
@@ -58,7 +75,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             .map(|warning| fact(warning, &text))
             .collect();
         let candidates = site.candidates.len();
-        let summary = json!({"valid": true, "candidates": candidates, "warnings": warnings, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
+        let mut summary = json!({"valid": true, "candidates": candidates, "warnings": warnings, "cameras": cameras, "tags": tags, "goals": goals, "tasks": tasks, "epsilon": site.epsilon});
+        if let Some(pictures) = pictures {
+            let names = pictures.iter().map(|(name, _)| name);
+            summary["pictures"] = names.cloned().collect();
+        }
         print_json(&summary)?;
     } else {
         print(&format_args!(
@@ -80,6 +101,14 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
                 " (no table: its set has no bound; add `expected`, or an extent)"
             };
             print(&format_args!("  {name}: {shape}{table}"))?;
+        }
+        if let (Some(folder), Some(pictures)) = (&arguments.draw, &pictures) {
+            print_views(&findings)?;
+            print(&format_args!(
+                "{} pictures in {}",
+                pictures.len(),
+                folder.display()
+            ))?;
         }
         // The candidates of one row have one line and, often, one warning.
         let same_cause = |a: &Warning, b: &Warning| {
@@ -118,4 +147,69 @@ fn fact(warning: &Warning, text: &str) -> Value {
         "about": warning.about,
         "help": warning.help,
     })
+}
+
+/// Prints the directions of tags and cameras, and which camera sees which tag from which goal.
+fn print_views(findings: &Findings) -> Result<(), Failure> {
+    let wide = |names: &mut dyn Iterator<Item = usize>| names.max().unwrap_or(0);
+    let names = wide(&mut findings.tags.iter().map(|tag| tag.name.chars().count())).max(4);
+    print(&format_args!(
+        "{:names$}  {:>5}  {:>9}  {:>7}  {:>8}  seen from the goal of",
+        "tag", "id", "faces deg", "up deg", "height m"
+    ))?;
+    for tag in &findings.tags {
+        let [faces, up] = tag.faces_deg;
+        print(&format_args!(
+            "{:names$}  {:>5}  {faces:>9.1}  {up:>7.1}  {:>8.3}  {}",
+            tag.name,
+            tag.tag.id,
+            tag.tag.pose.z,
+            tag.looks.first().map_or("no task".into(), look)
+        ))?;
+        for other in tag.looks.iter().skip(1) {
+            print(&format_args!("{:1$}  {2}", "", names + 37, look(other)))?;
+        }
+    }
+    for camera in &findings.cameras {
+        let [looks, up] = camera.looks_deg;
+        print(&format_args!(
+            "camera {}: looks to {looks:.1} deg of the robot, {up:.1} deg up, {:.3} m high",
+            camera.name, camera.mount.z
+        ))?;
+    }
+    for task in &findings.tasks {
+        let inside = if task.at_goal.slack >= 0.0 {
+            "in its set"
+        } else {
+            "NOT in its set"
+        };
+        print(&format_args!(
+            "task {}: its goal is {inside}, least slack {}",
+            task.name,
+            slack(&task.at_goal)
+        ))?;
+    }
+    Ok(())
+}
+
+fn look(look: &Look) -> String {
+    let seen = if look.least.slack >= 0.0 {
+        "seen"
+    } else {
+        "not seen"
+    };
+    format!(
+        "{} by {}: {seen}, slack {}",
+        look.task,
+        look.camera,
+        slack(&look.least)
+    )
+}
+
+fn slack(least: &MinSlack) -> String {
+    if least.slack.is_finite() {
+        format!("{:+.3} ({})", least.slack, least.name)
+    } else {
+        format!("({})", least.name)
+    }
 }

@@ -7,8 +7,8 @@ use crate::site_input::{
 use indicatif::ProgressBar;
 use posegate_files::files::{Files, Input, Output};
 use posegate_plan::cover::{
-    ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Polished, Stage, Watch,
-    cover_watched, polished, written,
+    ChosenTag, Cover, CoverError, CoverOptions, Incumbent, Method, Stage, Watch, cover_watched,
+    written,
 };
 use posegate_plan::{PlanError, little_slack, margin_text};
 use posegate_show::draw::{Mounted, MountingSheet};
@@ -55,10 +55,6 @@ pub struct Arguments {
     /// Largest number of labels that the search for one plan evaluates
     #[arg(long, default_value_t = 100_000)]
     limit: usize,
-    /// Then move each chosen tag by up to this distance on its wall (or in its own plane), to where the allowed
-    /// errors are largest
-    #[arg(long, value_name = "METRES")]
-    polish: Option<f64>,
     /// Write a mounting sheet of the chosen tags: A4 pages as HTML if the file's name ends with .html, else as SVG
     #[arg(long)]
     sheet: Option<Output>,
@@ -96,14 +92,6 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         most_risk: arguments.most_risk,
         limit: arguments.limit,
     };
-    if let Some(reach) = arguments.polish
-        && !(reach > 0.0 && reach <= 100.0)
-    {
-        return Err(Failure::usage(
-            format!("--polish {reach}: the distance must be above 0 and at most 100 metres"),
-            "give a length such as 0.2",
-        ));
-    }
     let wrong = |error| failure(&arguments.site, error);
     let interrupt = Interrupt::new();
     let searched = with_bars(|tick, show| {
@@ -118,14 +106,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         };
         cover_watched(&site, &order, &watch)
     });
-    let mut found = searched.map_err(wrong)?;
-    if let (Some(reach), true) = (arguments.polish, found.serves_all()) {
-        let polish =
-            |tick: Tick<'_>, _: ShowLine<'_>| polished(&text, &name, &found, &order, reach, tick);
-        found = with_bars(polish)
-            .map_err(wrong)?
-            .ok_or_else(|| unread(&name, &name))?;
-    }
+    let found = searched.map_err(wrong)?;
     if let (Some(path), true) = (&arguments.output, found.serves_all()) {
         let target = path.display().to_string();
         let text = written(&text, &target, &found).ok_or_else(|| unread(&name, &target))?;
@@ -213,9 +194,9 @@ fn progress_line(incumbent: &Incumbent) -> String {
 }
 
 /// Runs `work` with one progress bar per stage, or a line of text if stderr is not a terminal.
-fn with_bars<T>(
-    work: impl FnOnce(Tick<'_>, ShowLine<'_>) -> Result<T, CoverError>,
-) -> Result<T, CoverError> {
+fn with_bars(
+    work: impl FnOnce(Tick<'_>, ShowLine<'_>) -> Result<Cover, CoverError>,
+) -> Result<Cover, CoverError> {
     let is_seen = std::io::stderr().is_terminal();
     let message: Mutex<String> = Mutex::default();
     let shown: Mutex<Option<(Stage, ProgressBar)>> = Mutex::new(None);
@@ -228,7 +209,6 @@ fn with_bars<T>(
             Stage::Reach => "reach",
             Stage::Rounds => "rounds",
             Stage::Check => "checking",
-            Stage::Polish => "polish",
         };
         if shown.as_ref().is_none_or(|(known, _)| *known != stage) {
             if let Some((_, bar)) = shown.take() {
@@ -289,18 +269,6 @@ fn print_cover(found: &Cover, site: &Site) -> Result<(), Failure> {
             pose.yaw_deg,
             chosen.cost
         );
-        if let Some(Polished {
-            moved: [left, up],
-            reserve: [before, after],
-        }) = chosen.polished
-        {
-            line += &format!("; errors may be {after:.2} times as large");
-            if [left, up] != [0.0, 0.0] {
-                line += &format!(
-                    " ({before:.2} before it was moved by {left:.3} m along its y and {up:.3} m along its z)"
-                );
-            }
-        }
         for (what, tasks) in [
             ("without it no plan for", &chosen.needed_by),
             ("without it no second plan for", &chosen.second_of),

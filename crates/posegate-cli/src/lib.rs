@@ -15,20 +15,16 @@ mod belief;
 pub mod calls;
 mod chain;
 mod check;
-mod completions;
 mod contains;
 mod cost;
 mod cover;
 mod demo;
-mod doctor;
 mod draw;
 mod explain;
 mod failure;
-mod family;
 mod gate;
 mod import;
 mod init;
-mod inscribe;
 mod learn;
 mod manual;
 mod metrics;
@@ -38,7 +34,6 @@ mod predict;
 mod recording;
 mod replay;
 mod report;
-mod seal;
 mod sheet;
 mod site;
 mod site_input;
@@ -54,11 +49,19 @@ mod terminal;
 #[command(
     name = "posegate",
     version,
-    after_help = "Example:\n  posegate demo -o demo-out\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage, or standard output that cannot be written (without a message if its reader has ended); 3 internal."
+    arg_required_else_help = true,
+    args_conflicts_with_subcommands = true,
+    after_help = "Example:\n  posegate demo -o demo-out\n  posegate --completions bash > ~/.local/share/bash-completion/completions/posegate\n\nExit codes: 0 done; 1 the answer is no (a denial, a failed proof); 2 bad input or usage, or standard output that cannot be written (without a message if its reader has ended); 3 internal."
 )]
 struct Arguments {
+    /// Print the file with which this shell completes commands
+    #[arg(long, value_name = "SHELL", exclusive = true)]
+    completions: Option<clap_complete::Shell>,
+    /// Write manual pages, one for each command, into this folder
+    #[arg(long, value_name = "DIR", exclusive = true)]
+    man: Option<posegate_files::files::OutputFolder>,
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
@@ -78,19 +81,13 @@ enum Command {
     Learn(learn::Command),
     Predict(predict::Arguments),
     Replay(Box<replay::Arguments>),
-    Seal(seal::Arguments),
-    Family(family::Arguments),
-    Inscribe(inscribe::Arguments),
     Cost(cost::Arguments),
     Place(place::Arguments),
     #[command(subcommand)]
     Site(site::Command),
     Draw(draw::Arguments),
-    Doctor(doctor::Arguments),
     Report(report::Arguments),
     Explain(explain::Arguments),
-    Completions(completions::Arguments),
-    Man(manual::Arguments),
     Demo(demo::Arguments),
 }
 
@@ -107,7 +104,17 @@ fn run(words: &[OsString]) -> failure::Outcome {
         return Ok(ExitCode::SUCCESS);
     };
     let files = &files;
-    match &arguments.command {
+    if let Some(shell) = arguments.completions {
+        return manual::completions(shell);
+    }
+    if let Some(folder) = &arguments.man {
+        return manual::pages(folder, files);
+    }
+    // Without a command, clap prints the help, and this line is not reached.
+    let Some(command) = &arguments.command else {
+        return Err(failure::Failure::printed());
+    };
+    match command {
         Command::Init(arguments) => init::run(arguments, files),
         Command::Check(arguments) => check::run(arguments, files),
         Command::Import(arguments) => import::run(arguments, files),
@@ -121,18 +128,12 @@ fn run(words: &[OsString]) -> failure::Outcome {
         Command::Learn(command) => learn::run(command, files),
         Command::Predict(arguments) => predict::run(arguments, files),
         Command::Replay(arguments) => replay::run(arguments, files),
-        Command::Seal(arguments) => seal::run(arguments, files),
-        Command::Family(arguments) => family::run(arguments, files),
-        Command::Inscribe(arguments) => inscribe::run(arguments, files),
         Command::Cost(arguments) => cost::run(arguments, files),
         Command::Place(arguments) => place::run(arguments, files),
         Command::Site(command) => site::run(command, files),
         Command::Draw(arguments) => draw::run(arguments, files),
-        Command::Doctor(arguments) => doctor::run(arguments, files),
         Command::Report(arguments) => report::run(arguments, files),
         Command::Explain(arguments) => explain::run(arguments),
-        Command::Completions(arguments) => completions::run(arguments, files),
-        Command::Man(arguments) => manual::run(arguments, files),
         Command::Demo(arguments) => demo::run(arguments, files),
     }
 }

@@ -1,18 +1,19 @@
-//! `posegate man`: writes manual pages.
+//! Completions of shells and manual pages, both made of the command line itself.
 
 use crate::site_input::{Failure, Outcome, answer, print};
-use posegate_files::files::{Files, OutputFolder};
+use posegate_files::files::{self, Files, OutputFolder};
 
-/// Writes manual pages, one for each command
-#[derive(clap::Args)]
-#[command(after_help = "Example:\n  posegate man -o man && man man/posegate-table-build.1")]
-pub struct Arguments {
-    /// The folder to write to; it is created if it does not exist
-    #[arg(short, long)]
-    output: OutputFolder,
+/// Prints the file with which a shell completes commands.
+pub fn completions(shell: clap_complete::Shell) -> Outcome {
+    let mut text = Vec::new();
+    let mut command = crate::arguments::command();
+    clap_complete::generate(shell, &mut command, "posegate", &mut text);
+    files::print(&text)?;
+    Ok(answer(true))
 }
 
-pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
+/// Writes a manual page for each command.
+pub fn pages(folder: &OutputFolder, files: &Files) -> Outcome {
     let mut command = crate::arguments::command().name("posegate");
     command.build();
     let mut open = vec![(String::from("posegate"), command)];
@@ -31,11 +32,11 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             .map_err(|error| Failure::internal(error.to_string()))?;
         pages.push((format!("{name}.1"), text));
     }
-    files.write_into(&arguments.output, &pages)?;
+    files.write_into(folder, &pages)?;
     print(&format_args!(
         "{} pages in {}",
         pages.len(),
-        arguments.output.display()
+        folder.display()
     ))?;
     Ok(answer(true))
 }

@@ -29,7 +29,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let site = site(files, &arguments.site)?;
     let chosen = task(&site, &arguments.task)?;
     let table = table(arguments, files, &site, chosen)?;
-    arguments.check()?;
+    arguments.recorded.check()?;
     let radius =
         Table::parse(&table).map_err(|error| super::gate::not_a_table("the table", error))?;
     let radius_squared = f64::from(radius.radius_squared().q16()) / 65536.0;
@@ -63,7 +63,6 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         bounded: arguments.bounded(),
         world: &arguments.recorded.frame,
         clock: arguments.clock(input.clock),
-        thresholds: arguments.thresholds(),
         examined: !arguments.fast,
     };
     let mut replay = Replay::new(&setup, input.track.take()).map_err(parameter)?;

@@ -1,4 +1,4 @@
-//! `posegate table`: builds, shows, proves and exports tables.
+//! `posegate table`: builds, shows, proves and exports tables, and seals the firmware that has them.
 
 use crate::gate::not_a_table;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
@@ -17,7 +17,9 @@ use posegate_site::{Core, Site, TableSpec, Task};
 use serde_json::{Value, json};
 use std::time::Instant;
 
-/// Builds, shows, proves and exports tables
+mod seal;
+
+/// Builds, shows, proves and exports tables; seals firmware
 #[derive(clap::Subcommand)]
 pub enum Command {
     /// Builds the table of a task's success set, proves it, and writes it
@@ -41,6 +43,7 @@ pub enum Command {
         after_help = "Example:\n  posegate table cost dock.posegate --tracker --core cortex-m4f"
     )]
     Cost(Cost),
+    Seal(seal::Arguments),
 }
 
 #[derive(clap::Args)]
@@ -141,6 +144,7 @@ pub struct Cost {
 pub fn run(command: &Command, files: &Files) -> Outcome {
     match command {
         Command::Cost(arguments) => cost(arguments, files),
+        Command::Seal(arguments) => seal::run(arguments, files),
         Command::Build(arguments) => build(arguments, files),
         Command::Info(arguments) => info(arguments, files),
         Command::Verify(arguments) => check(arguments, files),

@@ -292,7 +292,7 @@ fn error_with_hostile_names_is_printable() {
             "-o",
             &format!("nowhere/{HOSTILE}"),
         ],
-        &["seal", "bad.csv", "-o", HOSTILE],
+        &["table", "seal", "bad.csv", "-o", HOSTILE],
         &["site", "merge", HOSTILE],
         &["init", HOSTILE, "--nonsense"],
     ] {
@@ -327,7 +327,7 @@ fn answer_with_hostile_names_is_printable_and_valid_json() {
     for (index, line) in [
         &["check", "names.toml"][..],
         &["check", &site],
-        &["doctor", "names.toml", "-o", "doctor"],
+        &["check", "names.toml", "--draw", "drawn"],
         &[
             "table",
             "build",
@@ -396,9 +396,9 @@ fn answer_with_hostile_names_is_printable_and_valid_json() {
         "table.h".into(),
         "table.rs".into(),
     ];
-    for entry in std::fs::read_dir(folder.path().join("doctor")).unwrap() {
+    for entry in std::fs::read_dir(folder.path().join("drawn")).unwrap() {
         files.push(format!(
-            "doctor/{}",
+            "drawn/{}",
             entry.unwrap().file_name().to_str().unwrap()
         ));
     }

@@ -180,20 +180,22 @@ fn written_into(leaf: &str, line: &str) -> (String, Vec<String>) {
     let before = folder.snapshot();
     let output = folder.run(&filled(leaf, line, &[]));
     assert_eq!(output.status.code(), Some(0), "{line}: {output:?}");
-    let root = if leaf == "site merge" {
-        "built"
-    } else {
-        "out-output"
+    let all = arguments(leaf, line);
+    let written = all.iter().find(|(_, role)| *role == Role::OutputFolder);
+    let root = match leaf {
+        "site merge" => "built".to_string(),
+        _ => format!("out-{}", written.unwrap().0),
     };
     let is_new = |(path, bytes): &(PathBuf, Vec<u8>)| {
-        path.starts_with(root) && bytes != b"folder" && !before.contains_key(path)
+        path.starts_with(&root) && bytes != b"folder" && !before.contains_key(path)
     };
     let after: Snapshot = folder.snapshot();
     let names = after.into_iter().filter(is_new).map(|(path, _)| {
-        let name = path.strip_prefix(root).unwrap();
+        let name = path.strip_prefix(&root).unwrap();
         name.to_str().unwrap().to_string()
     });
-    (root.into(), names.collect())
+    let names = names.collect();
+    (root, names)
 }
 
 #[test]
@@ -242,14 +244,14 @@ fn no_file_in_an_output_folder_replaces_an_input() {
 }
 
 #[test]
-fn doctor_picture_does_not_replace_the_site() {
-    let (_, names) = written_into("doctor", "doctor {site} -o {output}");
+fn picture_of_check_does_not_replace_the_site() {
+    let (_, names) = written_into("check", "check {site} --draw {draw}");
     for name in names {
         let folder = Folder::new();
         fs::rename(folder.path().join("site.toml"), folder.path().join(&name)).unwrap();
         refused(
             &folder,
-            &["doctor", &name, "-o", "."].map(String::from),
+            &["check", &name, "--draw", "."].map(String::from),
             &name,
         );
     }
@@ -320,15 +322,15 @@ fn redirected_input_is_not_replaced() {
     assert!(!String::from_utf8_lossy(&done.stderr).contains("same file"));
 }
 
-/// `seal` works in place without -o. An -o with the same file is refused.
+/// `table seal` works in place without -o. An -o with the same file is refused.
 #[test]
 fn seal_replaces_its_input_only_without_output_option() {
     let folder = Folder::new();
-    assert!(folder.run(&["seal", "firmware"]).status.success());
+    assert!(folder.run(&["table", "seal", "firmware"]).status.success());
     refused(
         &folder,
-        &["seal", "firmware", "-o", "firmware"].map(String::from),
-        "seal",
+        &["table", "seal", "firmware", "-o", "firmware"].map(String::from),
+        "table seal",
     );
 }
 

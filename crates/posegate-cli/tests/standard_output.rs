@@ -32,7 +32,7 @@ fn lines() -> Vec<Vec<String>> {
         "table --help",
         "help table build",
         "explain --json",
-        "man --help",
+        "--completions bash",
     ];
     all.extend(alone.map(|line| line.split(' ').map(String::from).collect()));
     all

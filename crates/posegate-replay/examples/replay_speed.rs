@@ -13,7 +13,7 @@ use posegate::gate::{Restart, Settings, Source};
 use posegate::motion::MotionBounds;
 use posegate::set::CrossTerms;
 use posegate_replay::recording::{Bag, Recording, Role, Wanted};
-use posegate_replay::replay::{Clock, Part, Replay, ReplayConfig, Thresholds, play};
+use posegate_replay::replay::{Clock, Part, Replay, ReplayConfig, play};
 use posegate_site::Site;
 use std::convert::Infallible;
 use std::error::Error;
@@ -243,7 +243,6 @@ fn replayed(path: &Path, examined: bool) -> Done<ExitCode> {
         bounded: None,
         world: "map",
         clock: Some(Clock::Logged),
-        thresholds: Thresholds::default(),
         examined,
     };
     let mut replay = Replay::new(&setup, None).map_err(|error| format!("{error:?}"))?;

@@ -7,14 +7,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
-/// All leaves of the tree of commands, each followed by its arguments that name files: `COMMAND` and `COMMAND ARGUMENT ROLE`. A test of the
+/// The program itself and all leaves of the tree of commands, each followed by its arguments that name files: `COMMAND` and `COMMAND ARGUMENT ROLE`. A test of the
 /// program compares it with the tree.
 const LIST: &str = include_str!("../../../tests/data/file_arguments.txt");
 
 /// A command line of each leaf. Names in braces are arguments of the list. Every option that names a file is in one of the lines.
-pub const LINES: [(&str, &str); 37] = [
+pub const LINES: [(&str, &str); 33] = [
+    ("posegate", "--man {man}"),
     ("init", "init {file}"),
-    ("check", "check {site}"),
+    ("check", "check {site} --draw {draw}"),
     (
         "import",
         "import {file} --format wpilib --size 0.1651 --family tag36h11 -o {output}",
@@ -31,6 +32,7 @@ pub const LINES: [(&str, &str); 37] = [
         "table export",
         "table export {table} --format c -o {output}",
     ),
+    ("table seal", "table seal {firmware} -o {output}"),
     ("gate", "gate {table} --estimates {estimates}"),
     ("chain", "chain {site} --name back-to-dock -o {output}"),
     (
@@ -72,9 +74,6 @@ pub const LINES: [(&str, &str); 37] = [
         "replay",
         "replay {site} {log} --task dock --inflation-model {inflation_model}",
     ),
-    ("seal", "seal {firmware} -o {output}"),
-    ("family", "family {site} --tag t7 --r 0.02"),
-    ("inscribe", "inscribe {site} --task dock"),
     (
         "cost",
         "cost {site} --task see-t7 --covariance-file {covariance_file}",
@@ -96,14 +95,11 @@ pub const LINES: [(&str, &str); 37] = [
         "draw",
         "draw {site} --task dock --table {table} --estimates {estimates} -o {output}",
     ),
-    ("doctor", "doctor {site} -o {output}"),
     (
         "report",
         "report {site} --placement see-t7={placement} --picture {picture} -o {output}",
     ),
     ("explain", "explain"),
-    ("completions", "completions bash -o {output}"),
-    ("man", "man -o {output}"),
 ];
 
 /// Returns the exit code of a leaf's lines. `place` searches a region where no place sees the tag, because that is quick.
@@ -299,7 +295,7 @@ size = 0.1651
 file = "model.toml"
 "#;
 
-/// A localization task whose set has an error model, for `family`, and one that sees nothing from its goal, for `place`.
+/// A localization task whose set has an error model, and one that sees nothing from its goal, for `place`.
 const SEE_WELL: &str = r#"
 [error_model.simple]
 translation = [0.01, 0.0, 0.0, 0.0]

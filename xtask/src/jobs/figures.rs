@@ -43,8 +43,8 @@ pub fn figures(given: &Arguments) -> Result {
         .arg(folder.join("see-bay-image.svg"))
         .print()?;
     posegate()
-        .words(&format!("doctor {SITE} -o"))
-        .arg(folder.join("doctor"))
+        .words(&format!("check {SITE} --draw"))
+        .arg(folder.join("check"))
         .run()?;
     posegate()
         .words("plan examples/sites/paper-chain.toml --from back-to-dock --to dock -o")

@@ -4,11 +4,13 @@
 use super::*;
 use std::path::PathBuf;
 
-/// All leaves of the tree of commands, each followed by its arguments that name files.
+/// The program itself and all leaves of the tree of commands, each followed by its arguments that name files.
 const LIST: &str = include_str!("../../../../tests/data/file_arguments.txt");
 
 fn walk(name: &str, command: &Command, found: &mut Vec<String>) {
-    if !command.has_subcommands() {
+    if name.is_empty() {
+        found.push("posegate".into());
+    } else if !command.has_subcommands() {
         found.push(name.into());
     }
     for argument in command.get_arguments() {

@@ -6,7 +6,7 @@ use crate::site_input::Failure;
 use posegate::motion::MotionBounds;
 use posegate::set::{CrossTerms, Inflation, SplitWeight, Trust};
 use posegate_files::files::{Input, Output};
-use posegate_replay::replay::{Clock, Thresholds};
+use posegate_replay::replay::Clock;
 use posegate_site::Site;
 
 /// The largest number of true poses of a topic that are kept.
@@ -20,7 +20,7 @@ const MOST_TRUE: usize = 1 << 17;
 /// split and compressed. It is read as a stream; its faults are counted and reported.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  posegate replay site.toml drive.mcap --task dock --topic /amcl_pose --cross-terms yaw-unknown --json\n  posegate replay site.toml estimates.csv --task dock --inflation 4 -o replay.svg --mcap verdicts.mcap\n\nRules that are compared with the gate, and the sources of their limits:\n  distance  position within --distance of the goal (Nav2: docking_threshold, 0.05 m)\n  sigma     deviations of x, y, yaw below --sigma and --sigma-yaw-deg (Nav2's docking threshold and undock_angular_tolerance)\n  ellipse   3-sigma error ellipse: long radius below --ellipse, lateral radius below --ellipse-lateral (Autoware's localization_error_monitor, 1.5 m and 0.3 m)\n  ate       everything if the recording's RMSE is below --ate, else nothing\n\nExit code 1: the gate permitted an estimate whose true pose was outside of the success set."
+    after_help = "Example:\n  posegate replay site.toml drive.mcap --task dock --topic /amcl_pose --cross-terms yaw-unknown --json\n  posegate replay site.toml estimates.csv --task dock --inflation 4 -o replay.svg --mcap verdicts.mcap\n\nRules that are compared with the gate, and the sources of their limits:\n  distance  position within 0.05 m of the goal (Nav2: docking_threshold)\n  sigma     deviations of x and y below 0.05 m, of yaw below 0.05 rad (Nav2's docking threshold and undock_angular_tolerance)\n  ellipse   3-sigma error ellipse: long radius below 1.5 m, lateral radius below 0.3 m (Autoware's localization_error_monitor)\n  ate       everything if the recording's RMSE is below 0.05 m, else nothing\n\nExit code 1: the gate permitted an estimate whose true pose was outside of the success set."
 )]
 pub struct Arguments {
     /// The site file
@@ -111,27 +111,6 @@ pub struct Arguments {
     /// The camera whose detections are read; required if the site has several
     #[arg(long)]
     pub camera: Option<String>,
-    /// Limit of the rule `distance`, metres
-    #[arg(long, default_value_t = 0.05)]
-    pub distance: f64,
-    /// Limit of the rule `sigma`, metres
-    #[arg(long, default_value_t = 0.05)]
-    pub sigma: f64,
-    /// Limit of the rule `sigma`, degrees [default: 0.05 rad]
-    #[arg(long)]
-    pub sigma_yaw_deg: Option<f64>,
-    /// Limit of the rule `ellipse` on the long radius, metres
-    #[arg(long, default_value_t = 1.5)]
-    pub ellipse: f64,
-    /// Limit of the rule `ellipse` on the lateral radius, metres
-    #[arg(long, default_value_t = 0.3)]
-    pub ellipse_lateral: f64,
-    /// Size of the ellipse in sigmas
-    #[arg(long, default_value_t = 3.0)]
-    pub ellipse_scale: f64,
-    /// Limit of the rule `ate`, metres
-    #[arg(long, default_value_t = 0.05)]
-    pub ate: f64,
     /// Only decide: no margins, no worst poses, no Stanford diagram
     #[arg(long)]
     pub fast: bool,
@@ -240,49 +219,12 @@ impl Arguments {
         }
     }
 
-    /// Checks the limits of the rules. An invalid limit would silently permit nothing, or everything.
-    ///
-    /// # Errors
-    /// A limit is not a finite number above 0, or a time is NaN.
-    pub fn check(&self) -> Result<(), Failure> {
-        for (name, value) in [
-            ("--distance", Some(self.distance)),
-            ("--sigma", Some(self.sigma)),
-            ("--sigma-yaw-deg", self.sigma_yaw_deg),
-            ("--ellipse", Some(self.ellipse)),
-            ("--ellipse-lateral", Some(self.ellipse_lateral)),
-            ("--ellipse-scale", Some(self.ellipse_scale)),
-            ("--ate", Some(self.ate)),
-        ] {
-            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
-                return Err(Failure::usage(
-                    format!("{name} {value} is not a limit"),
-                    "give a number above 0",
-                ));
-            }
-        }
-        self.recorded.check()
-    }
-
     /// Returns the gate's clock; `defined` is the clock that the recording's format defines.
     pub fn clock(&self, defined: Option<Clock>) -> Option<Clock> {
         match self.clock {
             ClockName::Auto => defined,
             ClockName::Logged => Some(Clock::Logged),
             ClockName::Stamps => Some(Clock::Stamps),
-        }
-    }
-
-    /// Returns the limits of the rules.
-    pub fn thresholds(&self) -> Thresholds {
-        Thresholds {
-            distance_m: self.distance,
-            sigma_m: self.sigma,
-            sigma_yaw_rad: self.sigma_yaw_deg.map_or(0.05, f64::to_radians),
-            ellipse_scale: self.ellipse_scale,
-            ellipse_m: self.ellipse,
-            ellipse_lateral_m: self.ellipse_lateral,
-            ate_m: self.ate,
         }
     }
 }

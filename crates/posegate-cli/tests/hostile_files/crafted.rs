@@ -249,7 +249,7 @@ fn endless_input_is_refused() {
         "learn inflation /dev/zero --epsilon 0.9 -o out.toml",
         "learn outcomes /dev/zero --epsilon 0.9",
         "predict /dev/zero --at estimates.csv",
-        "seal /dev/zero -o out.elf",
+        "table seal /dev/zero -o out.elf",
         "report dock.toml --placement see-t7=/dev/zero -o out.html",
         "cost dock.toml --task see-t7 --covariance-file /dev/zero",
         "plan docks.toml --to dock-1 --costs /dev/zero",

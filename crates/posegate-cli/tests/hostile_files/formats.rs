@@ -196,7 +196,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
                 "cost {} --task see-t7 --sigma-x 0.1 --sigma-y 0.1 --sigma-yaw-deg 1",
                 "table verify dock.posegate {}",
                 "site build {} --tables-only --shard 1/2 -o out",
-                "doctor {} -o out",
+                "check {} --draw out",
             ],
         ),
         format(
@@ -419,7 +419,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             Binary,
             "mutant.elf",
             vec![elf()],
-            &["seal {} -o out.elf", "seal {} --json"],
+            &["table seal {} -o out.elf", "table seal {} --json"],
         ),
         format(
             "parts of a site build",

@@ -117,8 +117,6 @@ pub enum Stage {
     Rounds,
     /// The plans on the site with the chosen tags: one step per task.
     Check,
-    /// Small moves of the chosen tags: one step per tag.
-    Polish,
 }
 
 /// A chosen tag.
@@ -137,20 +135,6 @@ pub struct ChosenTag {
     /// The tasks that have a plan without the tag, but none that survives the loss of another tag. Computed only if
     /// plans must survive a lost tag.
     pub second_of: Vec<String>,
-    /// The result of the polish; `None` if it was not requested, or if no plan looks at the tag.
-    pub polished: Option<Polished>,
-}
-
-/// The move of a chosen tag.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Polished {
-    /// Displacement from the candidate's place, along its own y and z axes, metres.
-    pub moved: [f64; 2],
-    /// The reserve before the move, and on the complete polished site. The reserve is the largest factor for the
-    /// errors of all starts and all looks with which each task that looks at the tag still has a plan. Such a plan
-    /// uses only the chosen tags that the task's plan looked at. 0 if there is no such plan, else at least 1. Searched in
-    /// steps of 2 %, rounded down; the search ends above 4.
-    pub reserve: [f64; 2],
 }
 
 /// A work task and the plan that serves it.

@@ -61,81 +61,21 @@ impl Face {
         })
     }
 
-    /// Returns the offset from the nearest place to a pose, metres; `None` if that place is on a keep-out.
-    fn off(&self, pose: &Pose3Deg) -> Option<[f64; 3]> {
+    /// Returns `true` if the place nearest to a pose is not on a keep-out.
+    fn is_clear(&self, pose: &Pose3Deg) -> bool {
         let off = |space: &Space| {
             let on = space.nearest(pose);
             [pose.x - on.x, pose.y - on.y, pose.z - on.z]
         };
         let [clear, any] = [0, 1].map(|k| off(&self.spaces[k]));
-        near(clear, any).then_some(clear)
+        clear.iter().zip(any).all(|(a, b)| (a - b).abs() < 1e-6)
     }
-}
-
-/// Returns `true` if two offsets are equal.
-fn near(a: [f64; 3], b: [f64; 3]) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6)
 }
 
 /// Returns the name of a wall if a tag, including its border, lies on one of the wall's keep-outs.
 pub fn on_a_keep_out<'a>(site: &'a Site, tag: &SiteTag) -> Option<&'a str> {
     let mut walls = carriers(site, tag).filter(|wall| !wall.keep_outs.is_empty());
-    let clear = |wall: &Wall| Face::of(wall, tag)?.off(&tag.tag.pose);
-    let wall = walls.find(|wall| clear(wall).is_none());
+    let clear = |wall: &Wall| Face::of(wall, tag).is_some_and(|face| face.is_clear(&tag.tag.pose));
+    let wall = walls.find(|wall| !clear(wall));
     wall.map(|wall| wall.name.as_str())
-}
-
-/// The places to which a tag may be moved.
-pub(super) struct Place<'a> {
-    site: &'a Site,
-    /// The face on which it is mounted, and its offset from the face.
-    face: Option<(Face, [f64; 3])>,
-    tag: &'a SiteTag,
-}
-
-impl<'a> Place<'a> {
-    /// Returns `None` if the tag is mounted on a wall, but not completely on one face, or on a keep-out. Such a tag
-    /// is not moved.
-    pub fn of(site: &'a Site, tag: &'a SiteTag) -> Option<Self> {
-        let mut walls = carriers(site, tag).peekable();
-        if walls.peek().is_none() {
-            let free = Self {
-                site,
-                face: None,
-                tag,
-            };
-            return Some(free);
-        }
-        walls.find_map(|wall| {
-            let face = Face::of(wall, tag)?;
-            let off = face.off(&tag.tag.pose)?;
-            let away = off.iter().map(|by| by * by).sum::<f64>();
-            (libm::sqrt(away) <= ON_A_WALL).then_some(Self {
-                site,
-                face: Some((face, off)),
-                tag,
-            })
-        })
-    }
-
-    /// Returns `true` if the tag may be mounted at a pose next to other tags. It must stay on its face; a tag without
-    /// a face must be above the floor and clear of all walls. It may only overlap tags that it overlapped before.
-    pub fn holds<'t>(&self, pose: Pose3Deg, others: impl Iterator<Item = &'t SiteTag>) -> bool {
-        let mut moved = self.tag.clone();
-        moved.tag.pose = pose;
-        let half = 0.5 * edge(self.tag);
-        let stays = match &self.face {
-            Some((face, from)) => face.off(&pose).is_some_and(|now| near(now, *from)),
-            None => {
-                let away = |wall: &Wall| {
-                    wall.distance([pose.x, pose.y]) > half
-                        || pose.z + half < wall.z[0]
-                        || pose.z - half > wall.z[1]
-                };
-                pose.z >= half && self.site.walls.iter().all(away)
-            }
-        };
-        let clear = |other: &SiteTag| !overlap(&moved, other) || overlap(self.tag, other);
-        stays && others.into_iter().all(clear)
-    }
 }

@@ -254,7 +254,6 @@ impl<'a> Choice<'a> {
             looked_at_by: vec![],
             needed_by: vec![],
             second_of: vec![],
-            polished: None,
         };
         let oracles = self.served.iter().chain(&self.gone);
         Ok(Cover {

@@ -45,8 +45,6 @@ impl ChosenTag {
             "looked_at_by": self.looked_at_by,
             "needed_by": self.needed_by,
             "second_of": self.second_of,
-            "moved": self.polished.map(|polished| polished.moved),
-            "reserve": self.polished.map(|polished| polished.reserve),
         })
     }
 }

@@ -19,12 +19,11 @@
 //! ```
 
 pub use self::answer::{
-    ChosenTag, Cover, CoverOptions, Incumbent, Method, Polished, Stage, TaskCoverage, Watch,
+    ChosenTag, Cover, CoverOptions, Incumbent, Method, Stage, TaskCoverage, Watch,
 };
 pub use self::clearance::{on_a_keep_out, overlap};
 pub use self::cover::{cover, cover_watched};
 pub use self::error::CoverError;
-pub use self::polish::polished;
 pub use self::written::written;
 
 #[doc = include_str!("language.md")]
@@ -42,7 +41,6 @@ mod master;
 mod missing;
 mod mounted;
 mod oracle;
-mod polish;
 mod tags;
 mod value;
 mod written;

@@ -24,7 +24,7 @@ pub fn written(text: &str, file_name: &str, cover: &Cover) -> Option<String> {
 }
 
 /// Returns a site file's text with the chosen tags and without candidates.
-pub(super) fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
+fn with_tags(text: &str, tags: &[ChosenTag]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut within = false;
     for line in text.split_inclusive('\n') {

@@ -12,7 +12,7 @@
 //! use posegate::report::FrameId;
 //! use posegate::set::{Aging, Trust};
 //! use posegate_replay::recording::Text;
-//! use posegate_replay::replay::{Part, Replay, ReplayConfig, Thresholds, play};
+//! use posegate_replay::replay::{Part, Replay, ReplayConfig, play};
 //! # const SITE: &str = include_str!("../../../../examples/sites/dock.toml");
 //! # const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
 //! # let site = posegate_site::Site::parse(SITE, "dock.toml")?;
@@ -41,7 +41,6 @@
 //!     bounded: Some([0.02, 0.01]),
 //!     world: "map",
 //!     clock: None,
-//!     thresholds: Thresholds::default(),
 //!     examined: true,
 //! };
 //! let mut replay = Replay::new(&config, None)?;
@@ -124,8 +123,6 @@ pub struct ReplayConfig<'a> {
     /// The clock. `None` selects the recorded times. It selects the stamps if there are no recorded times, or if
     /// nearly all of the first estimates show that the two clocks differ.
     pub clock: Option<Clock>,
-    /// The thresholds of other rules.
-    pub thresholds: Thresholds,
     /// `true` to compute margins and worst poses: a few dozen more decisions for each estimate. Otherwise the verdict
     /// is that of the gate's own step, and the Stanford diagram is empty.
     pub examined: bool,
@@ -185,7 +182,7 @@ impl<'a> Replay<'a> {
             next: 0,
             last_now_ms: 0,
             findings: Findings::default(),
-            rules: Rules::new(setup.thresholds, setup.success.goal),
+            rules: Rules::new(setup.success.goal),
             counts: tally::Counts::default(),
             timeline: Timeline::default(),
             stanford: Stanford::default(),
@@ -629,12 +626,6 @@ impl<'a> Replay<'a> {
         self.carry.as_ref().map(|carry| &carry.odometry)
     }
 
-    /// Returns the limits of the rules that are compared with the gate.
-    #[must_use]
-    pub const fn thresholds(&self) -> &Thresholds {
-        &self.setup.thresholds
-    }
-
     /// Returns the age up to which the gate uses an estimate, seconds.
     #[must_use]
     pub fn maximum_age_s(&self) -> f64 {
@@ -650,7 +641,7 @@ impl<'a> Replay<'a> {
     /// Returns the permits of the gate's verdicts, of its permission, and of the rules in [`RULES`].
     #[must_use]
     pub fn tallies(&self) -> [(&'static str, Tally); 6] {
-        self.counts.tallies(&self.setup.thresholds)
+        self.counts.tallies()
     }
 
     /// Returns the number of estimates whose verdict is a permit, and of all estimates.

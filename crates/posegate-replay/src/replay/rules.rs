@@ -1,6 +1,6 @@
 //! Rules that are in use without a gate.
 //!
-//! | rule | permits if | default |
+//! | rule | permits if | limit |
 //! |---|---|---|
 //! | `distance` | the estimate is within a distance of the goal | 0.05 m: `docking_threshold` of Nav2's `SimpleChargingDock`, whose `isDocked` checks only this |
 //! | `sigma` | the deviations of x, y and yaw are below a limit each | 0.05 m and 0.05 rad: no project ships such limits; these are Nav2's docking threshold and its `undock_angular_tolerance` |
@@ -33,39 +33,37 @@ pub struct Thresholds {
     pub ate_m: f64,
 }
 
-impl Default for Thresholds {
-    fn default() -> Self {
-        Self {
-            distance_m: 0.05,
-            sigma_m: 0.05,
-            sigma_yaw_rad: 0.05,
-            ellipse_scale: 3.0,
-            ellipse_m: 1.5,
-            ellipse_lateral_m: 0.3,
-            ate_m: 0.05,
-        }
-    }
+impl Thresholds {
+    /// The limits that are in use today.
+    pub const IN_USE: Self = Self {
+        distance_m: 0.05,
+        sigma_m: 0.05,
+        sigma_yaw_rad: 0.05,
+        ellipse_scale: 3.0,
+        ellipse_m: 1.5,
+        ellipse_lateral_m: 0.3,
+        ate_m: 0.05,
+    };
 }
 
 /// The rules for a goal.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
-    thresholds: Thresholds,
     goal: PoseDeg,
 }
 
 impl Rules {
-    /// Returns the rules with these limits.
+    /// Returns the rules for a goal.
     #[must_use]
-    pub const fn new(thresholds: Thresholds, goal: PoseDeg) -> Self {
-        Self { thresholds, goal }
+    pub const fn new(goal: PoseDeg) -> Self {
+        Self { goal }
     }
 
     /// Returns the results of the rules in [`RULES`](super::RULES) for an estimate with its recorded covariance. `None` if a rule
     /// needs a covariance and there is none. NaN permits nothing.
     #[must_use]
     pub fn of(&self, row: &Row) -> [Option<bool>; 3] {
-        let limits = &self.thresholds;
+        let limits = Thresholds::IN_USE;
         let [x, y, yaw] = row.pose;
         let distance = libm::hypot(x - self.goal.x, y - self.goal.y) < limits.distance_m;
         let Some(Uncertainty::Gaussian([[xx, xy, _], [_, yy, _], [_, _, tt]])) = row.recorded

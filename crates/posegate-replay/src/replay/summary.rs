@@ -1,13 +1,13 @@
 //! The summary of a replay, as JSON.
 
 use super::tally::{Range, named};
-use super::{Clock, Region, Replay};
+use super::{Clock, Region, Replay, Thresholds};
 use posegate::gate::Reason;
 use serde_json::{Map, Value, json};
 
 pub(super) fn summary(replay: &Replay<'_>) -> Value {
     let counts = &replay.counts;
-    let thresholds = replay.setup.thresholds;
+    let thresholds = Thresholds::IN_USE;
     let rules: Map<String, Value> = replay
         .tallies()
         .iter()

@@ -190,11 +190,11 @@ impl Counts {
         (count > 0).then(|| self.squares.map(|sum| libm::sqrt(sum / count as f64)))
     }
 
-    pub fn tallies(&self, thresholds: &Thresholds) -> [(&'static str, Tally); 6] {
+    pub fn tallies(&self) -> [(&'static str, Tally); 6] {
         let [distance, sigma, ellipse] = self.rules;
         // Without a truth the rule cannot judge.
         let ate = self.rmse().map_or(Tally::default(), |[rmse, _]| {
-            self.verdicts.of_all(rmse < thresholds.ate_m)
+            self.verdicts.of_all(rmse < Thresholds::IN_USE.ate_m)
         });
         [
             ("gate", self.verdicts),

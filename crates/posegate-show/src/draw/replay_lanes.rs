@@ -153,7 +153,7 @@ pub(super) fn lanes(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top:
     top = interlock(picture, replay, axis, top);
     top = reasons(picture, replay, axis, top);
     top += APART;
-    let limits = limits(replay.thresholds());
+    let limits = limits(&Thresholds::IN_USE);
     for (rule, (name, limit)) in ["distance", "sigma", "ellipse"]
         .iter()
         .zip(limits)

@@ -168,7 +168,7 @@ fn descriptions(built: &Built, share: &Path) -> Result {
     let (_, program) = built.files.first().ok_or("no program was built")?;
     let manual = share.join("man/man1");
     files::make_folder(&manual)?;
-    program_at(program).words("man -o").arg(&manual).run()?;
+    program_at(program).words("--man").arg(&manual).run()?;
     let pages = files::files_ending(&manual, ".1")?;
     cmd("gzip -9n").args(&pages).unlogged().run()?;
     for (shell, path) in [
@@ -178,12 +178,11 @@ fn descriptions(built: &Built, share: &Path) -> Result {
     ] {
         let path = share.join(path);
         files::make_folder(path.parent().unwrap_or(&path))?;
-        program_at(program)
-            .words("completions")
+        let text = program_at(program)
+            .words("--completions")
             .arg(shell)
-            .arg("-o")
-            .arg(&path)
-            .run()?;
+            .read()?;
+        files::write(&path, &text)?;
     }
     Ok(())
 }

@@ -37,7 +37,7 @@ fn each_rule_checks_only_its_own_limits() {
         y: 2.0,
         yaw_deg: 0.0,
     };
-    let rules = Rules::new(Thresholds::default(), goal);
+    let rules = Rules::new(goal);
     let small = diagonal([1e-4; 3]);
     assert_eq!(
         rules.of(&row([1.03, 2.03, 3.0], small)),
@@ -86,7 +86,7 @@ fn zero_covariance_passes_and_nan_does_not() {
         y: 0.0,
         yaw_deg: 0.0,
     };
-    let rules = Rules::new(Thresholds::default(), goal);
+    let rules = Rules::new(goal);
     assert_eq!(
         rules.of(&row([0.0; 3], diagonal([0.0; 3]))),
         [Some(true); 3]

@@ -1,4 +1,4 @@
-//! `posegate seal`: writes a checksum of a firmware's code into the firmware.
+//! `posegate table seal`: writes a checksum of a firmware's code into the firmware.
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json};
 use posegate::gate::Seal;
@@ -11,7 +11,9 @@ use serde_json::json;
 /// Fills in the record `static SEAL: Seal = Seal::UNSEALED` of the firmware, after linking and before
 /// flashing. The file is changed in place, or written to another file with -o. Sealing again changes nothing.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  posegate seal target/thumbv7em-none-eabihf/release/firmware")]
+#[command(
+    after_help = "Example:\n  posegate table seal target/thumbv7em-none-eabihf/release/firmware"
+)]
 pub struct Arguments {
     /// The linked firmware, an ELF file
     firmware: Input,
