@@ -352,7 +352,7 @@ mod firmware {
                         black_box(bytes),
                         black_box(&belief),
                         Trust::FULL,
-                        movement,
+                        &movement,
                     )
                 };
                 let cost = counter.count(opinion)?.0;

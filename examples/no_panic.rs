@@ -276,7 +276,7 @@ mod controller {
                 });
                 black_box(opinion(bytes, black_box(&belief), trust));
                 let moved = Growth::new(black_box(0), black_box(0));
-                black_box(opinion_after(bytes, black_box(&belief), trust, moved));
+                black_box(opinion_after(bytes, black_box(&belief), trust, &moved));
             }
             gate(bytes);
             chain(bytes, estimate, covariance, radius);

@@ -112,11 +112,16 @@ impl MotionBounds {
         }
     }
 
+    /// Returns `true` if the robot does not move: no speed is above 0.
+    pub(crate) const fn stands_still(&self) -> bool {
+        self.speed_q10 | self.turn_q16 == 0
+    }
+
     /// Returns the largest movement within a time in milliseconds: the radius of its positions, how far they lead across the robot's axis, and the turn to
     /// either side.
     #[must_use]
     pub const fn within(&self, ms: u32) -> Growth {
-        if self.speed_q10 | self.turn_q16 == 0 {
+        if self.stands_still() {
             return Growth::NONE;
         }
         let length = wide(self.speed_q10, ms).wrapping_add((1 << 10) - 1) >> 10;

@@ -69,7 +69,7 @@ impl Count {
             return false;
         }
         self.permits += 1;
-        let second = opinion_after(table.bytes(), &case.belief, case.trust, case.movement);
+        let second = opinion_after(table.bytes(), &case.belief, case.trust, &case.movement);
         if second != INSIDE {
             self.unconfirmed += 1;
             if self.reported < 2 {

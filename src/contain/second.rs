@@ -85,13 +85,13 @@ const OUTSIDE: u32 = !INSIDE;
 #[inline(never)]
 #[must_use]
 pub fn opinion(table: &[u8], belief: &PoseEstimate, trust: Trust) -> u32 {
-    opinion_after(table, belief, trust, Growth::NONE)
+    opinion_after(table, belief, trust, &Growth::NONE)
 }
 
 /// As [`opinion`], of the estimate's pose-set grown by a movement.
 #[inline(never)]
 #[must_use]
-pub fn opinion_after(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth) -> u32 {
+pub fn opinion_after(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: &Growth) -> u32 {
     if is_inside(table, belief, trust, movement) == Some(true) {
         INSIDE
     } else {
@@ -99,7 +99,7 @@ pub fn opinion_after(table: &[u8], belief: &PoseEstimate, trust: Trust, movement
     }
 }
 
-fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: Growth) -> Option<bool> {
+fn is_inside(table: &[u8], belief: &PoseEstimate, trust: Trust, movement: &Growth) -> Option<bool> {
     let question = Question {
         belief,
         trust,

@@ -330,7 +330,7 @@ impl Settings<'_> {
     /// clock are whole milliseconds, both rounded down.
     #[must_use]
     pub fn movement(&self, motion: MotionBounds, age_ms: u32) -> Growth {
-        if motion == MotionBounds::STANDS_STILL {
+        if motion.stands_still() {
             return Growth::NONE;
         }
         let ends = age_ms
@@ -363,8 +363,7 @@ impl Settings<'_> {
                 // A flipped bit of one part changes the word.
                 frame as u32 ^ (frame >> 32) as u32,
                 source.trust.inflation.q16() ^ terms ^ source.aging.digest(),
-                speed,
-                side,
+                speed ^ side.rotate_left(16),
                 turn,
             ]
             .into_iter()

@@ -124,12 +124,17 @@ impl Growth {
         self.yaw_q24
     }
 
+    /// Returns `true` if nothing moves.
+    pub(crate) const fn is_none(self) -> bool {
+        self.translation_um | self.yaw_q24 == 0
+    }
+
     /// Returns the sum of both movements.
     #[must_use]
     #[cfg_attr(small_code, inline(never))]
     #[cfg_attr(not(small_code), inline(always))]
     pub const fn plus(self, other: Self) -> Self {
-        if other.translation_um | other.yaw_q24 == 0 {
+        if other.is_none() {
             return self;
         }
         Self::along(
@@ -176,7 +181,7 @@ impl Growth {
     /// Returns an extent grown by this.
     pub(super) fn around(self, extent: Extent) -> Extent {
         match extent {
-            Extent::Gaussian(_) if self == Self::NONE => extent,
+            Extent::Gaussian(_) if self.is_none() => extent,
             Extent::Gaussian(factor) => Extent::Grown { factor, by: self },
             Extent::Grown { factor, by } => Extent::Grown {
                 factor,

@@ -329,7 +329,7 @@ impl PoseSet {
 
     /// Adds a movement to the set, as [`PoseSet::grown`], in place.
     pub fn grow(&mut self, by: Growth) {
-        if by == Growth::NONE {
+        if by.is_none() {
             return;
         }
         match (&mut self.given, self.extent) {

@@ -6,7 +6,6 @@ use crate::gate::Source;
 use crate::gate::elsewhere::allowed_for;
 use crate::gate::evidence::{Evidence, MOST_HYPOTHESES};
 use crate::gate::permission::{Check, FlowSignature};
-use crate::motion::MotionBounds;
 use crate::report::{PoseEstimate, Report};
 use crate::set::{Growth, Trust};
 use crate::table::{self, Table};
@@ -63,11 +62,11 @@ impl Gate<'_> {
             }
             &changed
         };
-        if let Err(reason) = first_opinion(table, &report.belief, trust, movement) {
+        if let Err(reason) = first_opinion(table, &report.belief, trust, &movement) {
             return Ok(Err(reason));
         }
         for belief in evidence.others {
-            if let Err(reason) = first_opinion(table, belief, trust, movement) {
+            if let Err(reason) = first_opinion(table, belief, trust, &movement) {
                 return Ok(Err(reason));
             }
         }
@@ -101,7 +100,7 @@ impl Gate<'_> {
             &changed
         };
         let confirms = |belief: &PoseEstimate| {
-            let word = second::opinion_after(self.bytes, belief, *trust, movement);
+            let word = second::opinion_after(self.bytes, belief, *trust, &movement);
             word == second::INSIDE
         };
         if !confirms(&report.belief) {
@@ -126,7 +125,7 @@ impl Gate<'_> {
     /// until the estimate is too old, or the time since its stamp until the hold time is over, whichever is less.
     #[inline(always)]
     fn movement_by_complement(&self, report: &Report, source: &Source) -> Growth {
-        if source.motion == MotionBounds::STANDS_STILL {
+        if source.motion.stands_still() {
             return Growth::NONE;
         }
         let seen = black_box(self);
@@ -152,7 +151,7 @@ fn first_opinion(
     table: &Table<'_>,
     belief: &PoseEstimate,
     trust: &Trust,
-    movement: Growth,
+    movement: &Growth,
 ) -> Result<(), Reason> {
     let mut set = belief.pose_set(table.radius_squared(), *trust);
     // In place: the set takes more memory than the rest of the step.
@@ -160,7 +159,7 @@ fn first_opinion(
         Ok(set) => set,
         Err(impossible) => return Err((*impossible).into()),
     };
-    set.grow(movement);
+    set.grow(*movement);
     match contain::decide(table, set) {
         Decision::Inside => Ok(()),
         Decision::Outside(cause) => Err(cause.into()),
