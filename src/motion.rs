@@ -113,6 +113,7 @@ impl MotionBounds {
     }
 
     /// Returns `true` if the robot does not move: no speed is above 0.
+    #[inline(always)]
     pub(crate) const fn stands_still(&self) -> bool {
         self.speed_q10 | self.turn_q16 == 0
     }

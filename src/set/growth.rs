@@ -125,7 +125,8 @@ impl Growth {
     }
 
     /// Returns `true` if nothing moves.
-    pub(crate) const fn is_none(self) -> bool {
+    #[inline(always)]
+    pub(crate) const fn is_none(&self) -> bool {
         self.translation_um | self.yaw_q24 == 0
     }
 

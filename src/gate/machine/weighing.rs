@@ -44,9 +44,15 @@ impl Gate<'_> {
         if !(evidence.others.len() < MOST_HYPOTHESES) {
             return Ok(Err(Reason::TooManyHypotheses));
         }
-        let age_ms = self.now_ms.get()?.wrapping_sub(report.stamp_ms);
-        let movement = self.settings.movement(source.motion, age_ms);
-        let movement = movement.plus(evidence.beside);
+        let grown;
+        let movement = if source.motion.stands_still() {
+            &evidence.beside
+        } else {
+            let age_ms = self.now_ms.get()?.wrapping_sub(report.stamp_ms);
+            let driven = self.settings.movement(source.motion, age_ms);
+            grown = driven.plus(evidence.beside);
+            &grown
+        };
         let radius = table.radius_squared();
         // Most reports state neither: nothing is copied for them.
         let changed;
@@ -62,11 +68,11 @@ impl Gate<'_> {
             }
             &changed
         };
-        if let Err(reason) = first_opinion(table, &report.belief, trust, &movement) {
+        if let Err(reason) = first_opinion(table, &report.belief, trust, movement) {
             return Ok(Err(reason));
         }
         for belief in evidence.others {
-            if let Err(reason) = first_opinion(table, belief, trust, &movement) {
+            if let Err(reason) = first_opinion(table, belief, trust, movement) {
                 return Ok(Err(reason));
             }
         }
@@ -78,29 +84,31 @@ impl Gate<'_> {
         else {
             return Err(CorruptWord);
         };
-        let movement = self.movement_by_complement(report, source);
-        let Evidence {
-            beside,
-            elsewhere,
-            since_fix_ms,
-            ..
-        } = *black_box(evidence);
-        let movement = movement.plus(beside);
+        let seen = black_box(evidence);
+        let grown;
+        let movement = if source.motion.stands_still() {
+            &seen.beside
+        } else {
+            grown = self
+                .movement_by_complement(report, source)
+                .plus(seen.beside);
+            &grown
+        };
         let changed;
-        let trust = if since_fix_ms.is_none() && elsewhere == Risk::NONE {
+        let trust = if seen.since_fix_ms.is_none() && seen.elsewhere == Risk::NONE {
             &source.trust
         } else {
             // The radius from flash, as for the evaluation itself.
             let radius = table::stored_radius_squared(self.bytes);
-            let aged = source.trust_again(since_fix_ms);
-            match radius.and_then(|radius| allowed_for(elsewhere, radius, aged)) {
+            let aged = source.trust_again(seen.since_fix_ms);
+            match radius.and_then(|radius| allowed_for(seen.elsewhere, radius, aged)) {
                 Some(trust) => changed = trust,
                 None => return Ok(Err(Reason::EvaluationsDisagree)),
             }
             &changed
         };
         let confirms = |belief: &PoseEstimate| {
-            let word = second::opinion_after(self.bytes, belief, *trust, &movement);
+            let word = second::opinion_after(self.bytes, belief, *trust, movement);
             word == second::INSIDE
         };
         if !confirms(&report.belief) {
@@ -123,11 +131,8 @@ impl Gate<'_> {
 
     /// Returns the largest movement until a permission on a report ends, from the complements and in another form: within the time
     /// until the estimate is too old, or the time since its stamp until the hold time is over, whichever is less.
-    #[inline(always)]
+    #[inline(never)]
     fn movement_by_complement(&self, report: &Report, source: &Source) -> Growth {
-        if source.motion.stands_still() {
-            return Growth::NONE;
-        }
         let seen = black_box(self);
         let settings = seen.settings;
         let now = seen.now_ms.by_complement_of_opaque();
@@ -159,7 +164,9 @@ fn first_opinion(
         Ok(set) => set,
         Err(impossible) => return Err((*impossible).into()),
     };
-    set.grow(*movement);
+    if !movement.is_none() {
+        set.grow(*movement);
+    }
     match contain::decide(table, set) {
         Decision::Inside => Ok(()),
         Decision::Outside(cause) => Err(cause.into()),
