@@ -68,7 +68,9 @@ pub fn format_of(start: &[u8]) -> Format {
         let mut fields = first.split(|byte| *byte == b',');
         let time = fields.next().unwrap_or_default().trim_ascii();
         let is_whole = !time.is_empty() && time.iter().all(u8::is_ascii_digit);
-        return if is_whole && first.contains(&b',') && fields.all(number) {
+        // Twelve are the rows of a KITTI pose with commas.
+        let is_kitti = first.split(|byte| *byte == b',').count() == 12;
+        return if is_whole && first.contains(&b',') && !is_kitti && fields.all(number) {
             Format::Euroc
         } else {
             Format::Csv
@@ -102,6 +104,7 @@ mod tests {
                 Format::Euroc,
             ),
             (b"0,0.1,0.2,0.3,1,0,0,0\n", Format::Euroc),
+            (b"1,0,0,0.1,0,1,0,0.2,0,0,1,0\n", Format::Csv),
             (
                 b"timestamp, p_x, p_y, p_z, q_x, q_y, q_z, q_w\n1403636579763555584, 0.1, 0.2, 0.3, 0, 0, 0, 1\n",
                 Format::Euroc,
