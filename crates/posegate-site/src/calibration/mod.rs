@@ -241,7 +241,7 @@ fn size(
     }
 }
 
-const NO_SIZE: &str = "copy the calibration again as the program saved it; if it has no size, write `width_px` and `height_px` of the images that \
+const NO_SIZE: &str = "copy the calibration again as the program saved it, as ost.yaml of cameracalibrator; if it has no size, write `width_px` and `height_px` of the images that \
      were calibrated in the site's camera";
 
 /// Why coefficients are not those of a model.
