@@ -63,6 +63,16 @@ pub fn printable_json(json: &str) -> Cow<'_, str> {
     )
 }
 
+/// Returns a name as part of a TOML table's header: in quotes if it needs them.
+pub fn toml_key(name: &str) -> String {
+    let bare = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
+    if !name.is_empty() && name.bytes().all(bare) {
+        name.to_string()
+    } else {
+        toml_string(name)
+    }
+}
+
 /// Returns a TOML string of the text, in double quotes, printable.
 pub fn toml_string(text: &str) -> String {
     let mut out = String::from("\"");

@@ -64,6 +64,7 @@ pub fn read(text: &[u8], file: &str, times: Option<Named<'_>>) -> Result<Poses, 
         duplicates: 0,
     };
     let mut last = 0;
+    let mut w_is_last = false;
     for (index, line) in lines(text).enumerate() {
         last = index + 1;
         let line = match format {
@@ -83,10 +84,19 @@ pub fn read(text: &[u8], file: &str, times: Option<Named<'_>>) -> Result<Poses, 
                 })?;
                 pose
             }
-            Format::Euroc => match euroc(&line, file, last)? {
-                Some(pose) => pose,
-                None => continue,
-            },
+            Format::Euroc => {
+                // A header, with or without the sign of a comment.
+                let is_first = found.poses.is_empty();
+                if is_first && line.starts_with(|first: char| first == '#' || first.is_alphabetic())
+                {
+                    w_is_last |= names_w_last(&line);
+                    continue;
+                }
+                match euroc(&line, file, last, w_is_last)? {
+                    Some(pose) => pose,
+                    None => continue,
+                }
+            }
             _ => match tum(&line, file, last)? {
                 Some(pose) => pose,
                 None => continue,
@@ -194,8 +204,22 @@ fn tum(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> 
     }))
 }
 
-/// Reads a line of EuRoC's ground truth: nanoseconds, the position, the quaternion with w first; velocities and biases may follow.
-fn euroc(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> {
+/// Returns `true` if a header names the quaternion's parts in the order x, y, z, w, as OKVIS writes them.
+fn names_w_last(header: &str) -> bool {
+    let part = |name: &str| {
+        let name = name.split('[').next().unwrap_or_default();
+        name.trim()
+            .chars()
+            .last()
+            .map(|last| last.to_ascii_lowercase())
+    };
+    let parts = header.split(',').skip(4).take(4).map(part);
+    parts.eq("xyzw".chars().map(Some))
+}
+
+/// Reads a line of EuRoC's ground truth: nanoseconds, the position, the quaternion with w first unless the header says otherwise; velocities
+/// and biases may follow.
+fn euroc(line: &str, file: &str, number: usize, w_is_last: bool) -> Result<Option<Line>, TumError> {
     let spaced = line.replace(',', " ");
     let all = fields(&spaced);
     if all.is_empty() {
@@ -223,11 +247,13 @@ fn euroc(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError
         *to = field.parse().map_err(|_| wrong(*place, field))?;
     }
     finite(&values, of_pose, file, number)?;
-    let [x, y, z, qw, qx, qy, qz] = values;
+    let [x, y, z, turn @ ..] = values;
+    let [qx, qy, qz, qw] = turn;
+    let wxyz = if w_is_last { [qw, qx, qy, qz] } else { turn };
     Ok(Some(Line {
         t_s: Exact::seconds(stamp),
         position: [x, y, z],
-        wxyz: [qw, qx, qy, qz],
+        wxyz,
         places: [time.0, of_pose.get(3).map_or(1, |(place, _)| *place)],
     }))
 }
@@ -315,6 +341,29 @@ mod tests {
             }
             assert_eq!(found.poses.len(), 2);
         }
+    }
+
+    /// OKVIS writes EuRoC's columns with w last, and says so in its header.
+    #[test]
+    fn header_gives_the_order_of_the_quaternion() {
+        let row = "1500000000, 1, 2, 0, 0, 0, 0.6, 0.8, 0, 0\n";
+        for header in [
+            "timestamp, p_WS_W_x, p_WS_W_y, p_WS_W_z, q_WS_x, q_WS_y, q_WS_z, q_WS_w, v_WS_W_x, v_WS_W_y\n",
+            "\u{feff}#timestamp [ns],p_x [m],p_y [m],p_z [m],q_x [],q_y [],q_z [],q_w []\n",
+        ] {
+            let found = read(format!("{header}{row}").as_bytes(), "t", None).unwrap();
+            let [x, y, yaw] = found.poses[0].level();
+            assert_eq!((found.poses[0].t_s, x, y), (1.5, 1.0, 2.0));
+            assert!((yaw - 2.0 * 0.6f64.asin()).abs() < 1e-12, "{yaw}");
+        }
+        let header = "timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n";
+        let first = read(
+            format!("{header}1500000000,1,2,0,0.8,0,0,0.6\n").as_bytes(),
+            "t",
+            None,
+        );
+        let [.., yaw] = first.unwrap().poses[0].level();
+        assert!((yaw - 2.0 * 0.6f64.asin()).abs() < 1e-12, "{yaw}");
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Trajectories in the TUM format: `timestamp tx ty tz qx qy qz qw`, `#` begins a comment.
+//! Trajectories in the TUM format: `timestamp tx ty tz qx qy qz qw`, `#` begins a comment. The time is in seconds; ORB-SLAM3 also writes
+//! nanoseconds.
 //!
 //! ```
 //! use posegate_replay::tum::trajectory;
@@ -58,6 +59,9 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
     Ok(super::trajectories::read(text.as_bytes(), file, None)?.poses)
 }
 
+/// Times from here on are nanoseconds: those of 1973, or of the year 3 billion.
+const NANOSECONDS: f64 = 1e17;
+
 /// Eight numbers, and the character at which each begins.
 type Line = ([f64; 8], [usize; 8]);
 
@@ -67,6 +71,12 @@ pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Li
     let fields = fields(line);
     if fields.is_empty() {
         return Ok(None);
+    }
+    if let Some((column, field)) = fields.iter().find(|(_, field)| field.contains(',')) {
+        let comma = field.chars().take_while(|letter| *letter != ',').count();
+        let expected = "blanks between 8 numbers: timestamp tx ty tz qx qy qz qw; commas are EuRoC's, with whole nanoseconds: timestamp, x, y, z, \
+                        qw, qx, qy, qz";
+        return Err(fault(file, number, column + comma, "`,`".into(), expected));
     }
     if fields.len() != 8 {
         let column = fields
@@ -86,9 +96,12 @@ pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Li
                 number,
                 *column,
                 format!("`{field}`"),
-                "a finite decimal number",
+                "a finite decimal number (a header begins with #)",
             )
         })?;
+    }
+    if numbers[0] >= NANOSECONDS {
+        numbers[0] /= 1e9;
     }
     Ok(Some((numbers, places)))
 }
@@ -144,6 +157,13 @@ mod tests {
     }
 
     #[test]
+    fn large_times_are_nanoseconds() {
+        let text = "1403636579763555584.000000 1 2 3 0 0 0 1\n";
+        let found = trajectory(text, "t.txt").unwrap()[0].t_s;
+        assert!((found - 1_403_636_579.763_555_6).abs() < 1e-6, "{found}");
+    }
+
+    #[test]
     fn errors_state_file_line_and_column() {
         let good = "1 0 0 0 0 0 0 1\n";
         for (text, start) in [
@@ -153,6 +173,8 @@ mod tests {
             ("2 0 0 0 0 0 0 1 9\n", "t.txt:2:17: 9 numbers"),
             ("2 0 zero 0 0 0 0 1\n", "t.txt:2:5: `zero`"),
             ("2 0  nan 0 0 0 0 1\n", "t.txt:2:6: `nan`"),
+            ("2.5,0,0,0,0,0,0,1\n", "t.txt:2:4: `,`"),
+            ("2.5 0,0,0,0,0,0,1\n", "t.txt:2:6: `,`"),
             ("0.5 0 0 0 0 0 0 1\n", "t.txt:2:1: the time 0.5 is before"),
             (
                 "2 0 0 0 0 0 0 2\n",

@@ -182,6 +182,12 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// Returns a truth value.
+    pub(super) fn truth(&self) -> Result<bool, SiteError> {
+        serde_json::from_str(self.raw.get())
+            .map_err(|_| self.found("true or false", "true, without quotes"))
+    }
+
     /// Returns a text.
     pub(super) fn text(&self, like: &str) -> Result<&'a str, SiteError> {
         serde_json::from_str(self.raw.get())

@@ -3,7 +3,7 @@
 use super::Reading;
 use crate::site_input::Failure;
 use posegate_files::files::{FileError, Files, Input};
-use posegate_files::printable::printable;
+use posegate_files::printable::{printable, toml_key};
 use posegate_replay::recording::{
     BAD_FOLDER, Bag, BagFile, BodyFrames, Recording, RecordingError, Role, Wanted, files_of,
 };
@@ -120,12 +120,17 @@ pub fn failure(error: RecordingError) -> Failure {
             cause: source,
         }
         .into(),
+        RecordingError::ChildFrame { ref child, .. } if child.is_empty() => Failure::usage(
+            error.to_string(),
+            "the messages name no child frame: if the poses are those of the robot's base, give --child-frame base_link; else the frame's \
+             name, with its place in the site ([frame.NAME])",
+        ),
         RecordingError::ChildFrame {
             ref child,
             ref known,
             ..
         } => {
-            let child = printable(child);
+            let (child, key) = (printable(child), toml_key(child));
             let known = match known.as_str() {
                 "" => String::new(),
                 known => format!(" (known: {})", printable(known)),
@@ -133,7 +138,7 @@ pub fn failure(error: RecordingError) -> Failure {
             Failure::usage(
                 error.to_string(),
                 &format!(
-                    "add its place to the site: [frame.{child}] with x, y, z, roll_deg, pitch_deg, yaw_deg{known}; if it is the robot's base, \
+                    "add its place to the site: [frame.{key}] with x, y, z, roll_deg, pitch_deg, yaw_deg{known}; if it is the robot's base, \
                      give --child-frame {child}"
                 ),
             )

@@ -72,6 +72,9 @@ fn every_storage_gives_the_same_summary() {
         ("single/a_0.mcap", mcap(&poses)),
         ("listed/metadata.yaml", metadata(&["b_0.db3"]).into()),
         ("listed/b_0.db3", sqlite(TOPIC, &poses, false, plain)),
+        // Up to version 3 of the metadata: with the folder's name, which is another one now.
+        ("older/metadata.yaml", metadata(&["drive/b_0.db3"]).into()),
+        ("older/b_0.db3", sqlite(TOPIC, &poses, false, plain)),
         ("packed/metadata.yaml", metadata(&["b_0.db3.zstd"]).into()),
         (
             "packed/b_0.db3.zstd",
@@ -98,7 +101,7 @@ fn every_storage_gives_the_same_summary() {
     {
         assert_eq!(replayed(&case, log), expected, "{log}");
     }
-    for log in ["single", "listed", "packed/"] {
+    for log in ["single", "listed", "older", "packed/"] {
         assert_eq!(replayed(&case, log), expected, "{log}");
     }
     // A split recording: only the second file has the picture.

@@ -227,3 +227,179 @@ fn sensor_file_of_one_camera_is_read() {
         "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [458.5, 457.5, 322.0, 238.0] #fu, fv, cu, cv\ndistortion_model: radial-tangential\ndistortion_coefficients: [-0.1, 0.02, 0.0002, 0.00002]\n",
     );
 }
+
+/// A pinhole would be a guess: the coefficients may be there under a name that is not known.
+#[test]
+fn missing_coefficients_are_refused() {
+    let size = "image_width: 640\nimage_height: 480\n";
+    for rest in ["", "dist_parameters: [0.3, -0.2, 0.001, 0.002, 0.0]\n"] {
+        refused(
+            &format!("{size}{MATRIX}{rest}"),
+            &[
+                "c.yaml:1",
+                "`distortion_coefficients` is missing",
+                "[0, 0, 0, 0, 0]",
+            ],
+        );
+    }
+    // Explicitly none.
+    is_read(&format!("{size}{MATRIX}distortion_coefficients: []\n"));
+}
+
+#[test]
+fn rows_and_names_of_tutorials_are_read() {
+    assert_eq!(
+        codes(
+            "image_width: 640\nimage_height: 480\ncamera_matrix:\n- [520.5, 0.0, 322.0]\n- [0.0, 521.0, 238.5]\n- [0.0, 0.0, 1.0]\ndist_coeff:\n- [0.1, -0.2, 0.001, 0.002, 0.0]\n"
+        ),
+        ["assumed"]
+    );
+    refused(
+        "image_width: 640\nimage_height: 480\nmtx: [[520.5, 0.0], [0.0, 521.0]]\ndist: [[0.0, 0.0, 0.0, 0.0, 0.0]]\n",
+        &["c.yaml:3", "mtx has 4 numbers"],
+    );
+}
+
+/// `ros2 topic echo --flow-style`, and Python's json.dump.
+#[test]
+fn files_in_braces_are_read() {
+    is_read(
+        "{header: {stamp: {sec: 1, nanosec: 2}, frame_id: c}, height: 480, width: 640, distortion_model: plumb_bob, d: [0.1, 0.0, 0.0, 0.0, 0.0], k: [600.0, 0.0, 320.0, 0.0, 600.0, 240.0, 0.0, 0.0, 1.0]}\n---\n",
+    );
+    is_read(
+        "\u{feff}{\"image_width\": 640, \"image_height\": 480,\n \"camera_matrix\": {\"rows\": 3, \"cols\": 3, \"data\": [520, 0, 322, 0, 521, 238, 0, 0, 1]},\n \"distortion_model\": \"plumb_bob\", \"distortion_coefficients\": {\"data\": [0.1, 0, 0, 0, 0]}}\n",
+    );
+}
+
+/// CalibDB's exports: rows, or OpenCV's matrices, also of the size.
+#[test]
+fn exports_of_calibdb_are_read() {
+    let rows = r#"{"camera": "c", "avg_reprojection_error": 0.4, "camera_matrix": [[520.5, 0, 322], [0, 521, 238.5], [0, 0, 1]],
+ "distortion_coefficients": [0.1, -0.02, 0.001, 0.002, 0.0], "distortion_model": "rectilinear", "img_size": [640, 480], "keyframes": 12}"#;
+    assert_eq!(codes(rows), ["assumed"]);
+    assert_eq!(
+        codes(&rows.replace(
+            "[640, 480]",
+            r#"{"type_id": "opencv-matrix", "rows": 2, "cols": 1, "dt": "d", "data": [640, 480]}"#
+        )),
+        ["assumed"]
+    );
+    refused(
+        &rows.replace("[640, 480]", "[640]"),
+        &["c.yaml:2", "img_size has 1 numbers"],
+    );
+}
+
+#[test]
+fn size_may_be_that_of_the_site() {
+    let text = format!(
+        "{MATRIX}distortion_model: plumb_bob\ndistortion_coefficients: [0.0, 0.0, 0.0, 0.0, 0.0]\n"
+    );
+    refused(
+        &text,
+        &["`image_width` is missing", "`width_px` and `height_px`"],
+    );
+    let site = "[camera.front]\ncalibration = \"c.yaml\"\nimage = \"raw\"\nwidth_px = 640\nheight_px = 480\nmount = { x = 0.2, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n";
+    let case = Case::new(&[("site.toml", site.as_bytes()), ("c.yaml", text.as_bytes())]);
+    let checked = case.run("check site.toml --json").json(0);
+    assert_eq!(checked["warnings"][0]["code"], "assumed", "{checked}");
+    // One of both is a fault of the file.
+    let half = format!("image_width: 640\n{text}");
+    let case = Case::new(&[("site.toml", site.as_bytes()), ("c.yaml", half.as_bytes())]);
+    case.run("check site.toml")
+        .is_refused_with(&["`image_height` is missing"]);
+}
+
+#[test]
+fn chain_of_one_camera_may_have_other_keys() {
+    let chain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  intrinsics: [458.0, 457.0, 367.0, 248.0]\n  resolution: [752, 480]\n";
+    is_read(&format!("{chain}T_imu_body: [[1, 0], [0, 1]]\n\t\n"));
+    refused(
+        &format!("{chain}{}", chain.replace("cam0", "cam1")),
+        &["several cameras: `cam0`, `cam1`"],
+    );
+}
+
+#[test]
+fn photonvision_of_all_years_is_read() {
+    let old = r#"{"resolution":{"width":640.0,"height":480.0},"cameraIntrinsics":{"rows":3,"cols":3,"type":6,"data":[600.0,0.0,320.0,0.0,600.0,240.0,0.0,0.0,1.0]},"cameraExtrinsics":{"rows":1,"cols":4,"type":6,"data":[0.0,0.0,0.6,0.0]},"perViewErrors":[0.2],"standardDeviation":0.1,"isFisheye":false}"#;
+    // As plumb_bob the third one is p1, which folds the lens; as a fisheye's it is k3.
+    let plain = check(old, "--json");
+    assert!(
+        plain.code != Some(0) || plain.out.contains("lens_folds"),
+        "{}",
+        plain.out
+    );
+    is_read(&old.replace("false", "true"));
+    refused(
+        &old.replace(
+            "\"isFisheye\":false",
+            "\"lensmodel\":\"LENSMODEL_SPLINED_STERIOGRAPHIC\"",
+        ),
+        &["`lensmodel` is not a model of OpenCV"],
+    );
+    is_read(
+        &old.replace("\"isFisheye\":false", "\"lensmodel\":\"LENSMODEL_OPENCV\"")
+            .replace("cameraExtrinsics", "distCoeffs")
+            .replace("0.0,0.0,0.6,0.0", "0.1,-0.02,0.0,0.0"),
+    );
+}
+
+#[test]
+fn settings_of_orb_slam_are_read() {
+    let two = "%YAML:1.0\n\nCamera.fx: 517.5\nCamera.fy: 516.5\nCamera.cx: 318.5\nCamera.cy: 255.5\n\nCamera.k1: 0.26\nCamera.k2: -0.2\nCamera.p1: -0.005\nCamera.p2: 0.002\nCamera.k3: 0.1\nCamera.width: 640\nCamera.height: 480\nCamera.fps: 30.0\nORBextractor.nFeatures: 1000\n";
+    is_read(two);
+    let three = two.replace(
+        "Camera.width",
+        "File.version: \"1.0\"\nCamera.type: \"PinHole\"\nCamera.width",
+    );
+    let three = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2"]
+        .iter()
+        .fold(three, |text, key| {
+            text.replace(&format!("Camera.{key}"), &format!("Camera1.{key}"))
+        });
+    is_read(&three);
+    is_read(
+        &three
+            .replace("PinHole", "KannalaBrandt8")
+            .replace("Camera1.p1", "Camera1.k4")
+            .replace("Camera1.p2", "other"),
+    );
+    refused(
+        &three.replace("PinHole", "Rectified"),
+        &["c.yaml:14", "`Rectified`", "rectified image's `width_px`"],
+    );
+    refused(
+        &format!(
+            "{two}LEFT.K: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [458.0, 0, 367, 0, 457, 248, 0, 0, 1]\n"
+        ),
+        &["c.yaml:1", "a pair of cameras, rectified"],
+    );
+    refused(
+        &two.replace("Camera.p1", "Camera.q1"),
+        &["`Camera.p1` is missing", "write 0"],
+    );
+    refused(
+        &two.replace("517.5", "-517.5"),
+        &["c.yaml:3", "Camera.fx is -517.5", "above 0"],
+    );
+    refused(
+        &two.replace("Camera.width: 640\n", ""),
+        &["`Camera.width` is missing"],
+    );
+}
+
+#[test]
+fn files_of_other_kinds_say_what_to_use() {
+    refused(
+        "<?xml version=\"1.0\"?>\n<opencv_storage>\n</opencv_storage>\n",
+        &["c.yaml:1", "is XML", ".yml"],
+    );
+    refused(
+        "# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n",
+        &["INI", "ost.yaml"],
+    );
+    is_read(
+        "%YAML:1.0\n---\nmodel_type: PINHOLE_FULL\ncamera_name: c\nimage_width: 640\nimage_height: 480\ndistortion_parameters:\n   k1: 0.1\n   k2: 0.02\n   k3: 0.1\n   k4: 0.2\n   k5: 0.0\n   k6: 0.0\n   p1: 0.0001\n   p2: 0.00002\nprojection_parameters:\n   fx: 461.0\n   fy: 460.0\n   cx: 323.0\n   cy: 248.0\n",
+    );
+}

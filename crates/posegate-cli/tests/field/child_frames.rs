@@ -77,6 +77,22 @@ fn unknown_child_frame_is_refused_with_advice() {
     );
 }
 
+/// The advice is what a site and a command can have.
+#[test]
+fn advice_fits_names_with_slashes_and_empty_names() {
+    let bag = drive("robot1/antenna", AT_DOCK, false);
+    let case = Case::new(&[("site.toml", SITE.as_bytes()), ("drive.mcap", &bag)]);
+    case.run(REPLAY)
+        .is_refused_with(&["[frame.\"robot1/antenna\"]", "frame robot1/antenna"]);
+    let frame = FRAME.replace("antenna", "\"robot1/antenna\"");
+    assert_eq!(permits(&format!("{SITE}{frame}"), &bag, ""), [20, 20]);
+    let bag = drive("", [0.0; 3], false);
+    let case = Case::new(&[("site.toml", SITE.as_bytes()), ("drive.mcap", &bag)]);
+    case.run(REPLAY)
+        .is_refused_with(&["name no child frame", "--child-frame base_link"]);
+    assert_eq!(permits(SITE, &bag, "--child-frame base_link"), [20, 20]);
+}
+
 #[test]
 fn child_frame_with_a_place_gives_the_pose_of_the_base() {
     let with_frame = format!("{SITE}{FRAME}");

@@ -147,6 +147,33 @@ fn docks_of_several_frames_are_read_one_frame_at_a_time() {
     assert!(has_remark(&import(namespaced, ""), "`robot1/map`"));
 }
 
+/// Old versions of Nav2 use the server's key, new ones the plugin's.
+#[test]
+fn directions_that_differ_are_refused() {
+    let with = |value: &str| {
+        PARAMETERS.replace(
+            "      dock_plugins",
+            &format!("      dock_backwards: {value}\n      dock_plugins"),
+        )
+    };
+    refused(
+        &with("false"),
+        "",
+        &[
+            "d.yaml:4",
+            "dock_backwards says forward",
+            "remove dock_backwards",
+        ],
+    );
+    let heading = |text: &str| import(text, "")["goals"][1]["yaw_deg"].clone();
+    assert_eq!(heading(&with("true")), 180.0);
+    // In any case, as Nav2 reads it.
+    assert_eq!(
+        heading(&PARAMETERS.replace("\"backward\"", "BACKWARD")),
+        180.0
+    );
+}
+
 #[test]
 fn faults_of_parameters_are_named() {
     for (from, to, words) in [

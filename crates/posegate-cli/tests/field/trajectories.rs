@@ -99,3 +99,64 @@ fn public_trajectories_are_the_truth_and_the_recording() {
         assert_eq!(found["estimates"], 3);
     }
 }
+
+/// OKVIS has EuRoC's columns with w last, ORB-SLAM3 has TUM's with nanoseconds.
+#[test]
+fn relatives_of_the_formats_are_read() {
+    let at = 1_403_636_579_000_000_000u64;
+    let rows = |row: &dyn Fn(u64, f64) -> String| -> String {
+        (0..3u32)
+            .map(|k| row(at + 100_000_000 * u64::from(k), 0.1 * f64::from(k)))
+            .collect()
+    };
+    let tum = rows(&|t, x| {
+        format!(
+            "{}.{:09} {x} 2 0 0 0 0.6 0.8\n",
+            t / 1_000_000_000,
+            t % 1_000_000_000
+        )
+    });
+    let orb = rows(&|t, x| format!("{t}.000000 {x} 2 0 0 0 0.6 0.8\n"));
+    let header =
+        "timestamp, p_WS_W_x, p_WS_W_y, p_WS_W_z, q_WS_x, q_WS_y, q_WS_z, q_WS_w, v_WS_W_x\n";
+    let okvis = rows(&|t, x| format!("{t}, {x}, 2, 0, 0, 0, 0.6, 0.8, 9\n"));
+    let okvis = format!("{header}{okvis}");
+    let noted = format!("#{okvis}");
+    let case = Case::new(&[
+        ("tum.txt", tum.as_bytes()),
+        ("orb.txt", orb.as_bytes()),
+        ("okvis.csv", okvis.as_bytes()),
+        ("noted.csv", noted.as_bytes()),
+        ("one.txt", tum.lines().next().expect("a line").as_bytes()),
+    ]);
+    for file in ["orb.txt", "okvis.csv", "noted.csv"] {
+        let found = case.run(&format!("metrics tum.txt {file} --json")).json(0);
+        assert_eq!(found["pairs"], 3, "{file}");
+        for part in ["translation", "rotation_deg"] {
+            let most = found["ape"][part]["max"].as_f64().expect("a number");
+            assert!(most < 1e-6, "{file}: {part} {most}");
+        }
+    }
+    // One pose each has an error, and no relative one.
+    let found = case.run("metrics one.txt one.txt --json").json(0);
+    assert_eq!(found["pairs"], 1);
+    assert!(found["rpe"]["delta_1_frame"].is_null(), "{found}");
+    case.run("metrics tum.txt one.txt")
+        .is_refused_with(&["1 pair of poses only"]);
+}
+
+#[test]
+fn commas_and_headers_of_other_files_are_named() {
+    let case = Case::new(&[
+        ("good.txt", TUM.as_bytes()),
+        ("commas.csv", b"1.5,0,0,0,0,0,0,1\n"),
+        ("names.txt", b"time x y z qx qy qz qw\n1.5 0 0 0 0 0 0 1\n"),
+    ]);
+    case.run("metrics good.txt commas.csv").is_refused_with(&[
+        "commas.csv:1:4: `,`",
+        "blanks between 8 numbers",
+        "whole nanoseconds",
+    ]);
+    case.run("metrics good.txt names.txt")
+        .is_refused_with(&["names.txt:1:1: `time`", "a header begins with #"]);
+}

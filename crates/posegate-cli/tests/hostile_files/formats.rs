@@ -73,6 +73,11 @@ const VINS: &str = "%YAML:1.0\nmodel_type: PINHOLE\ncamera_name: c\nimage_width:
 const ECHO: &str = "header:\n  frame_id: c\nheight: 480\nwidth: 640\ndistortion_model: rational_polynomial\nd: [0.1, 0.2, 0.0, 0.0, 0.01, 0.3, 0.1, 0.02, 0.0, 0.0, 0.0, 0.0]\nk: [600.0, 0.0, 320.0, 0.0, 600.0, 240.0, 0.0, 0.0, 1.0]\n\
     binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, y_offset: 0, height: 480, width: 640}\n---\nheader: 1\n";
 const PHOTON: &str = "{\"resolution\":{\"width\":640.0,\"height\":480.0},\"cameraIntrinsics\":{\"rows\":3,\"cols\":3,\"type\":6,\"data\":[600,0,320,0,600,240,0,0,1]},\"distCoeffs\":{\"rows\":1,\"cols\":5,\"type\":6,\"data\":[0.1,-0.2,0,0,0]}}";
+const PHOTON_OLD: &str = "{\"resolution\":{\"width\":640,\"height\":480},\"cameraIntrinsics\":{\"data\":[600,0,320,0,600,240,0,0,1]},\"cameraExtrinsics\":{\"data\":[0.01,-0.02,0,0]},\"isFisheye\":true}";
+const ORB_SLAM: &str = "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera1.fx: 517.5\nCamera1.fy: 516.5\nCamera1.cx: 318.5\nCamera1.cy: 255.5\nCamera1.k1: 0.26\nCamera1.k2: -0.2\nCamera1.p1: -0.005\nCamera1.p2: 0.002\nCamera1.k3: 0.1\n\
+    Camera.width: 640\nCamera.height: 480\n";
+const ROWS: &str = "{image_width: 640, image_height: 480, mtx: [[520.5, 0, 322], [0, 521, 238.5], [0, 0, 1]], dist: [[0.1, -0.2, 0.001, 0.002, 0]]}\n";
+const SENSOR: &str = "sensor_type: camera\nresolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [458.5, 457.5, 322.0, 238.0]\ndistortion_model: radial-tangential\ndistortion_coefficients: [-0.1, 0.02, 0.0002, 0.00002]\n";
 const FMAP: &str = "{\"type\":\"frc\",\"fiducials\":[{\"family\":\"apriltag3_36h11_classic\",\"id\":4,\"size\":165.1,\"transform\":[0,-1,0,-2.5,1,0,0,1.25,0,0,1,0.6,0,0,0,1],\"unique\":1}]}";
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - a_0.mcap\n    - a_1.mcap\n  compression_mode: \"\"\n";
 const TABLES: &str = "[tag.t7]\nid = 7\nfamily = \"tag36h11\"\nsize = 0.3\npose = { x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }\n\n[goal.dock]\nx = 1.0\ny = 2.0\nyaw_deg = 90.0\n";
@@ -271,7 +276,14 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             "trajectories EuRoC and KITTI",
             Text,
             "mutant.csv",
-            text(&[&euroc(), &kitti()]),
+            text(&[
+                &euroc(),
+                &kitti(),
+                &format!(
+                    "timestamp, p_x, p_y, p_z, q_x, q_y, q_z, q_w, v_x\n{}",
+                    euroc()
+                ),
+            ]),
             &[
                 "metrics {} trajectory.txt --json",
                 "metrics trajectory.txt {} --times times.txt --json",
@@ -351,7 +363,9 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             "calibrations YAML",
             Text,
             "mutant.yaml",
-            text(&[ROS, KALIBR, OPENCV, VINS, ECHO, PHOTON]),
+            text(&[
+                ROS, KALIBR, OPENCV, VINS, ECHO, PHOTON, PHOTON_OLD, ORB_SLAM, ROWS, SENSOR,
+            ]),
             &["check calibrated.toml", "check calibrated.toml --json"],
         ),
         format(

@@ -24,7 +24,7 @@ pub enum PairError {
         /// First and last time.
         estimate: [f64; 2],
     },
-    /// Too few pairs for a comparison.
+    /// One pair, of trajectories of which one has several poses.
     #[error("{0} pair of poses only; expected at least 2")]
     TooFew(usize),
 }
@@ -76,7 +76,8 @@ pub fn associated(
             reference: span(reference),
             estimate: span(estimate),
         }),
-        1 => Err(PairError::TooFew(1)),
+        // Both may have one pose each: then there are no relative errors.
+        1 if long.len() > 1 => Err(PairError::TooFew(1)),
         _ => Ok(Matched {
             reference: reference_matched,
             estimate: estimate_matched,

@@ -41,8 +41,17 @@ pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, String> {
         let is_inner = relative
             .components()
             .all(|part| matches!(part, Component::Normal(_)));
+        let there = path.join(relative);
+        if is_inner && there.is_file() {
+            return Ok(there);
+        }
+        // Up to version 3 of the metadata the paths begin with the folder's own name, which users change.
+        let moved = relative.file_name().map(|name| path.join(name));
+        if let Some(moved) = moved.filter(|moved| moved.is_file()) {
+            return Ok(moved);
+        }
         if is_inner {
-            return Ok(path.join(relative));
+            return Ok(there);
         }
         Err(format!("{name} names {file:?}, which is not in the folder"))
     };

@@ -31,7 +31,7 @@ impl Format {
 }
 
 /// Returns the format of a file from its first bytes. A text has a header if its first line has a letter that is
-/// not part of a number.
+/// not part of a number. The header of a EuRoC trajectory begins with `timestamp`, also without the `#` of a comment.
 #[must_use]
 pub fn format_of(start: &[u8]) -> Format {
     if start.starts_with(b"\x89MCAP") {
@@ -46,13 +46,19 @@ pub fn format_of(start: &[u8]) -> Format {
     if start.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
         return Format::Zstd;
     }
-    let first = start
+    let mut lines = start
         .split(|byte| *byte == b'\n')
         .map(|line| line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line))
-        .find(|line| !line.trim_ascii().is_empty() && !line.trim_ascii_start().starts_with(b"#"));
-    let Some(first) = first else {
+        .filter(|line| !line.trim_ascii().is_empty() && !line.trim_ascii_start().starts_with(b"#"));
+    let Some(first) = lines.next() else {
         return Format::Tum;
     };
+    let is_timestamp = first.trim_ascii().starts_with(b"timestamp");
+    let turn = first.split(|byte| *byte == b',').nth(4).unwrap_or_default();
+    let is_header = is_timestamp && turn.trim_ascii().starts_with(b"q");
+    if is_header && lines.next().map(format_of) == Some(Format::Euroc) {
+        return Format::Euroc;
+    }
     if first.contains(&b',') || first.contains(&b'_') {
         // A CSV has a header: names, not numbers.
         let number = |field: &[u8]| {
@@ -62,7 +68,9 @@ pub fn format_of(start: &[u8]) -> Format {
         let mut fields = first.split(|byte| *byte == b',');
         let time = fields.next().unwrap_or_default().trim_ascii();
         let is_whole = !time.is_empty() && time.iter().all(u8::is_ascii_digit);
-        return if is_whole && first.contains(&b',') && fields.all(number) {
+        // Twelve are the rows of a KITTI pose with commas.
+        let is_kitti = first.split(|byte| *byte == b',').count() == 12;
+        return if is_whole && first.contains(&b',') && !is_kitti && fields.all(number) {
             Format::Euroc
         } else {
             Format::Csv
@@ -96,6 +104,15 @@ mod tests {
                 Format::Euroc,
             ),
             (b"0,0.1,0.2,0.3,1,0,0,0\n", Format::Euroc),
+            (b"1,0,0,0.1,0,1,0,0.2,0,0,1,0\n", Format::Csv),
+            (
+                b"timestamp, p_x, p_y, p_z, q_x, q_y, q_z, q_w\n1403636579763555584, 0.1, 0.2, 0.3, 0, 0, 0, 1\n",
+                Format::Euroc,
+            ),
+            (
+                b"timestamp,t_s,x_m,y_m,yaw_rad\n1500000000,1.5,0.1,0,0\n",
+                Format::Csv,
+            ),
             (b"1 0 0 0.1 0 1 0 0.2 0 0 1 0\n", Format::Kitti),
             (b"\x28\xb5\x2f\xfd", Format::Zstd),
         ] {

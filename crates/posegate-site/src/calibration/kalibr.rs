@@ -1,6 +1,6 @@
 //! Kalibr's camchain, and those of OpenVINS and TagSLAM: several cameras in one file. EuRoC's `sensor.yaml`: the same keys of one camera.
 
-use super::{ParsedCalibration, lens_of_file};
+use super::{ParsedCalibration, is_camera, lens_of_file};
 use crate::error::SiteError;
 use crate::suggest;
 use crate::yaml::{Document, Map, Node};
@@ -13,7 +13,9 @@ pub(super) fn read(
     file: Map<'_>,
     name: Option<&str>,
 ) -> Result<ParsedCalibration, SiteError> {
-    let cameras = file.sorted();
+    // Users add keys of their own: transforms, notes.
+    let mut cameras = file.sorted();
+    cameras.retain(|(name, _)| is_camera(name));
     let names = || suggest::list(cameras.iter().map(|(name, _)| *name));
     let name = match (name, cameras.as_slice()) {
         (Some(name), _) => name,

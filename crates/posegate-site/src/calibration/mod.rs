@@ -1,17 +1,19 @@
 //! Calibration files: those of ROS, OpenCV, Kalibr and their relatives in YAML, and PhotonVision's in JSON.
 
+use std::ops::Range;
 use std::path::Path;
 
 use super::Note;
 use super::error::{SiteError, Source};
 use super::named::NamedFile;
 use super::reader;
-use super::yaml::{Document, FormatMessages, Node};
+use super::yaml::{Document, FormatMessages, Map, Node};
 use posegate::certify::Roi;
 use posegate::shape::Lens;
 use posegate_files::input::{self, Limit};
 
 mod kalibr;
+mod orb_slam;
 mod photonvision;
 mod ros;
 mod vins;
@@ -92,13 +94,28 @@ pub(super) fn read(
         file: &name,
         text: &text,
     };
-    if text
-        .trim_start_matches('\u{feff}')
-        .trim_start()
-        .starts_with('{')
-    {
+    let start = text.trim_start_matches('\u{feff}').trim_start();
+    // Other files with braces are YAML in one line, as of `ros2 topic echo --flow-style`.
+    if start.starts_with('{') && start.contains("\"cameraIntrinsics\"") {
         let numbers = photonvision::read(source)?;
         return Ok((numbers.for_size(source, size_px)?, read));
+    }
+    let other = if start.starts_with('<') {
+        Some((
+            "XML",
+            "write it again in YAML: give OpenCV an output file whose name ends with .yml",
+        ))
+    } else if start.contains("\n[image]") {
+        Some((
+            "an INI file",
+            "use the file ost.yaml, which cameracalibrator saves with ost.txt",
+        ))
+    } else {
+        None
+    };
+    if let Some((kind, help)) = other {
+        let error = source.error(0..0, format!("the calibration is {kind}"));
+        return Err(error.expected(MESSAGES.what).help(help));
     }
     let document = Document::new(source, &MESSAGES)?;
     let root = document.parse()?;
@@ -109,18 +126,20 @@ pub(super) fn read(
         kalibr::read_one(&document, keys)?
     } else if vins::is_of(keys) {
         vins::read(&document, keys)?
+    } else if orb_slam::is_of(keys) {
+        orb_slam::read(&document, keys, size_px)?
     } else if ros::is_of(keys) {
         if let Some(camera) = camera {
             return Err(node
                 .error(format!("{name} is a calibration of one camera"))
                 .help(format!("remove `#{camera}`")));
         }
-        ros::read(&document, keys)?
+        ros::read(&document, keys, size_px)?
     } else {
         return Err(source
             .error(0..0, "the file is not a known kind of calibration")
             .expected(
-                "`camera_matrix` (ROS, OpenCV), `k` (a CameraInfo message), `cam0` (Kalibr) or `projection_parameters` (VINS)",
+                "`camera_matrix` (ROS, OpenCV), `k` (a CameraInfo message), `cam0` (Kalibr), `projection_parameters` (VINS) or `Camera.fx` (ORB-SLAM)",
             )
             .help(
                 "use the file that ROS's cameracalibrator saves as ost.yaml, a CameraInfo message of `ros2 topic echo --once`, an OpenCV calibration, \
@@ -143,13 +162,13 @@ fn is_camera(key: &str) -> bool {
 /// The contents of a calibration file, and the position of its image size.
 struct ParsedCalibration {
     numbers: Numbers,
-    size_at: std::ops::Range<usize>,
+    size_at: Range<usize>,
 }
 
 impl ParsedCalibration {
     /// Returns the contents of a file that describes the raw image: fx, fy, cx, cy in pixels.
     fn of_raw(
-        size_at: std::ops::Range<usize>,
+        size_at: Range<usize>,
         size_px: [f64; 2],
         [fx, fy, cx, cy]: [f64; 4],
         lens: Lens,
@@ -189,6 +208,41 @@ impl ParsedCalibration {
             ))
     }
 }
+
+/// Returns the first of these keys that a file has, with its value.
+fn one_of<'n>(file: Map<'n>, names: &[&'static str]) -> Option<(&'static str, &'n Node)> {
+    names.iter().find_map(|name| Some((*name, file.get(name)?)))
+}
+
+/// Returns the image's size, and where the file states it. A file without one is for the size of the site.
+fn size(
+    document: &Document<'_>,
+    file: Map<'_>,
+    names: [&[&'static str]; 2],
+    site_px: [Option<f64>; 2],
+    notes: &mut Vec<Note>,
+) -> Result<(Range<usize>, [f64; 2]), SiteError> {
+    let found = names.map(|names| one_of(file, names).map(|(_, node)| node));
+    match (found, site_px) {
+        ([None, None], [Some(width), Some(height)]) => {
+            notes.push(Note::assumed(
+                "the calibration does not state the size of its images: that of the site is assumed".into(),
+            ));
+            Ok((0..0, [width, height]))
+        }
+        ([width, height], _) => {
+            let required = |node: Option<&Node>, name: &str| {
+                let node = document.required(node, 0..0, name, NO_SIZE)?;
+                Ok::<_, SiteError>((node.at.clone(), f64::from(document.whole(node)?)))
+            };
+            let (at, width) = required(width, names[0][0])?;
+            Ok((at, [width, required(height, names[1][0])?.1]))
+        }
+    }
+}
+
+const NO_SIZE: &str = "copy the calibration again as the program saved it, as ost.yaml of cameracalibrator; if it has no size, write `width_px` and `height_px` of the images that \
+     were calibrated in the site's camera";
 
 /// Why coefficients are not those of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -269,8 +323,8 @@ fn lens_of_file(
     };
     let word = match written {
         Some(("none", _)) if coefficients.iter().all(|k| *k == 0.0) => return Ok(Lens::Pinhole),
-        // Drivers write it for the projection, not for the lens.
-        Some(("pinhole", _)) | None => {
+        // Drivers and CalibDB write these for the projection, not for the lens.
+        Some(("pinhole" | "rectilinear", _)) | None => {
             let assumed = match coefficients.len() {
                 0 => return Ok(Lens::Pinhole),
                 4 | 5 => "plumb_bob",

@@ -45,12 +45,33 @@ pub(super) fn read(source: Source<'_>) -> Result<ParsedCalibration, SiteError> {
                 .help("export the calibration again"));
         }
     };
-    let (data, coefficients) = numbers("distCoeffs")?;
-    // PhotonVision has no other models. It writes 5 or 8 numbers.
-    let model = if coefficients.len() > 5 {
-        "rational_polynomial"
+    if let Some(model) = file.optional("lensmodel", FILE)?
+        && !model
+            .text("\"LENSMODEL_OPENCV\"")?
+            .starts_with("LENSMODEL_OPENCV")
+    {
+        return Err(model
+            .error(format!("{} is not a model of OpenCV", model.title()))
+            .expected("LENSMODEL_OPENCV")
+            .help("calibrate again with the model of OpenCV"));
+    }
+    // Until 2024 PhotonVision had the coefficients in `cameraExtrinsics`.
+    let has = |key: &str| Ok::<_, SiteError>(file.optional(key, FILE)?.is_some());
+    let is_old = !has("distCoeffs")? && has("cameraExtrinsics")?;
+    let (data, coefficients) = numbers(if is_old {
+        "cameraExtrinsics"
     } else {
-        "plumb_bob"
+        "distCoeffs"
+    })?;
+    // It writes 5 or 8 numbers, and wrote 4 with `isFisheye`.
+    let is_fisheye = match file.optional("isFisheye", FILE)? {
+        Some(flag) => flag.truth()?,
+        None => false,
+    };
+    let model = match coefficients.len() {
+        _ if is_fisheye => "equidistant",
+        ..=5 => "plumb_bob",
+        _ => "rational_polynomial",
     };
     let lens = lens(model, &coefficients).unwrap_or(Err(Misfit::Count(8)));
     let lens = lens.map_err(|misfit| {
@@ -59,7 +80,9 @@ pub(super) fn read(source: Source<'_>) -> Result<ParsedCalibration, SiteError> {
             Misfit::Terms(terms) => terms.to_owned(),
         };
         data.error(format!("{} has {what}", data.title()))
-            .expected("4, 5 or 8 coefficients of OpenCV, or zeros after them")
+            .expected(
+                "4, 5 or 8 coefficients of OpenCV (4 of its fisheye model), or zeros after them",
+            )
             .help("calibrate again with PhotonVision")
     })?;
     Ok(ParsedCalibration::of_raw(

@@ -1,22 +1,35 @@
 //! The calibration file of ROS's camera_calibration_parsers, its relatives of OpenCV, and CameraInfo messages as text.
 
-use super::{Numbers, ParsedCalibration, lens_of_file, note_rms};
+use super::{Numbers, ParsedCalibration, lens_of_file, note_rms, one_of, size};
 use crate::error::SiteError;
 use crate::yaml::{Document, Map, Node};
 use posegate::certify::Roi;
+use std::borrow::Cow;
 use std::ops::Range;
 
 const AS_SAVED: &str = "copy the calibration again as the program saved it: ost.yaml of cameracalibrator, OpenCV's file, or \
      `ros2 topic echo --once CAMERA_INFO`";
 
+const NO_COEFFICIENTS: &str = "copy the calibration again as the program saved it; if the images have no distortion, write \
+     `distortion_coefficients: [0, 0, 0, 0, 0]`";
+
 const CALIBRATE: &str = "calibrate it: ros2 run camera_calibration cameracalibrator";
 
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
-/// The names of the keys: of ROS, of CameraInfo messages in ROS 2 and in ROS 1, and of OpenCV's samples.
+/// The names of the keys: of ROS, of CameraInfo messages in ROS 2 and in ROS 1, and of OpenCV's samples and tutorials.
 const WIDTH: &[&str] = &["image_width", "width", "image_Width"];
 const HEIGHT: &[&str] = &["image_height", "height", "image_Height"];
-const MATRIX: &[&str] = &["camera_matrix", "k", "K", "Camera_Matrix", "cameraMatrix"];
+/// A list of width and height, as of CalibDB.
+const SIZE: &[&str] = &["img_size", "image_size"];
+const MATRIX: &[&str] = &[
+    "camera_matrix",
+    "k",
+    "K",
+    "Camera_Matrix",
+    "cameraMatrix",
+    "mtx",
+];
 const COEFFICIENTS: &[&str] = &[
     "distortion_coefficients",
     "d",
@@ -24,6 +37,10 @@ const COEFFICIENTS: &[&str] = &[
     "Distortion_Coefficients",
     "distCoeffs",
     "dist_coeffs",
+    "dist_coeff",
+    "dist_coefs",
+    "distortion_coeffs",
+    "dist",
 ];
 /// Before ROS 2 cameracalibrator wrote `camera_model`.
 const MODEL: &[&str] = &["distortion_model", "camera_model"];
@@ -43,29 +60,28 @@ pub(super) fn is_of(file: Map<'_>) -> bool {
     one_of(file, MATRIX).is_some()
 }
 
-fn one_of<'n>(file: Map<'n>, names: &[&'static str]) -> Option<(&'static str, &'n Node)> {
-    names.iter().find_map(|name| Some((*name, file.get(name)?)))
-}
-
-pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalibration, SiteError> {
-    let required = |names: &[&'static str]| match one_of(file, names) {
-        Some(found) => Ok(found),
-        None => Err(document
-            .required(None::<()>, 0..0, names[0], AS_SAVED)
-            .expect_err("nothing")),
+pub(super) fn read(
+    document: &Document<'_>,
+    file: Map<'_>,
+    site_px: [Option<f64>; 2],
+) -> Result<ParsedCalibration, SiteError> {
+    let required = |names: &[&'static str], help: &str| {
+        document.required(one_of(file, names), 0..0, names[0], help)
     };
-    let (_, width) = required(WIDTH)?;
-    let (_, height) = required(HEIGHT)?;
-    let size_px = [
-        f64::from(document.whole(width)?),
-        f64::from(document.whole(height)?),
-    ];
+    let mut notes = Vec::new();
+    let (size_at, size_px) = match one_of(file, SIZE) {
+        Some((name, node)) => {
+            let list = data(document, node, name)?;
+            (list.at.clone(), document.numbers(&list, name)?)
+        }
+        None => size(document, file, [WIDTH, HEIGHT], site_px, &mut notes)?,
+    };
 
-    let (name, matrix) = required(MATRIX)?;
+    let (name, matrix) = required(MATRIX, AS_SAVED)?;
     let list = data(document, matrix, name)?;
-    let [fx, skew, cx, lower, fy, cy, rest @ ..]: [f64; 9] = document.numbers(list, name)?;
+    let [fx, skew, cx, lower, fy, cy, rest @ ..]: [f64; 9] = document.numbers(&list, name)?;
     let fault = |at: usize, what: &str, expected: &str, help: &str| {
-        let error = document.error(document.place_of(list, at), what);
+        let error = document.error(document.place_of(&list, at), what);
         Err(error.expected(expected).help(help))
     };
     if fx == 0.0 {
@@ -83,27 +99,21 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
         return fault(1, &what, "a camera matrix without skew", AS_SAVED);
     }
 
-    let mut notes = Vec::new();
-    let coefficients = one_of(file, COEFFICIENTS);
-    let list = match coefficients {
-        Some((name, node)) => Some(data(document, node, name)?),
-        None if one_of(file, MODEL).is_some() => Some(required(COEFFICIENTS)?.1),
-        None => None,
-    };
+    // A file without them may have them under another name: a pinhole would be a guess.
+    let (name, coefficients) = required(COEFFICIENTS, NO_COEFFICIENTS)?;
+    let list = data(document, coefficients, name)?;
     let is_fisheye = match file.get("fisheye_model") {
         Some(node) => document.whole(node)? == 1,
         None => false,
     };
     let lens = if is_fisheye {
         // OpenCV's sample writes the flag instead of a model.
-        let numbers = list.map_or(Ok(Vec::new()), |list| {
-            document.finite_numbers(list, COEFFICIENTS[0])
-        })?;
+        let numbers = document.finite_numbers(&list, name)?;
         let lens = super::lens("equidistant", &numbers).and_then(Result::ok);
         lens.ok_or_else(|| {
             document
                 .error(
-                    list.map_or(0..0, |list| list.at.clone()),
+                    list.at.clone(),
                     format!("a fisheye_model with {} coefficients", numbers.len()),
                 )
                 .expected("4 numbers")
@@ -111,8 +121,7 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
         })?
     } else {
         let model = one_of(file, MODEL).map(|(_, node)| node);
-        let name = coefficients.map_or(COEFFICIENTS[0], |(name, _)| name);
-        lens_of_file(document, model, list, name, &mut notes)?
+        lens_of_file(document, model, Some(&*list), name, &mut notes)?
     };
     if let Some((_, rms)) = one_of(file, RMS) {
         note_rms(document.number(rms)?, &mut notes);
@@ -122,14 +131,14 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
         None => [fx, fy, cx, cy],
         Some((name, matrix)) => {
             let list = data(document, matrix, name)?;
-            projection(document, list, name)?.unwrap_or([fx, fy, cx, cy])
+            projection(document, &list, name)?.unwrap_or([fx, fy, cx, cy])
         }
     };
     let turned = match one_of(file, RECTIFICATION) {
         None => None,
         Some((name, matrix)) => {
             let list = data(document, matrix, name)?;
-            let turn: [f64; 9] = document.numbers(list, name)?;
+            let turn: [f64; 9] = document.numbers(&list, name)?;
             (turn != IDENTITY && turn != [0.0; 9]).then(|| turned(document, list.at.clone()))
         }
     };
@@ -138,7 +147,7 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
         None => Ok(1),
     };
     Ok(ParsedCalibration {
-        size_at: width.at.clone(),
+        size_at,
         numbers: Numbers {
             size_px,
             focal_px: [fx, fy],
@@ -208,11 +217,16 @@ fn projection(
     Ok(Some([fx, fy, cx, cy]))
 }
 
-/// Returns the list of numbers of a matrix: in the notation of ROS and OpenCV, or the list itself.
-fn data<'n>(document: &Document<'_>, matrix: &'n Node, name: &str) -> Result<&'n Node, SiteError> {
+/// Returns the list of numbers of a matrix: in the notation of ROS and OpenCV, the list itself, or the rows of a list of rows.
+fn data<'n>(
+    document: &Document<'_>,
+    matrix: &'n Node,
+    name: &str,
+) -> Result<Cow<'n, Node>, SiteError> {
     if matrix.is_list() {
-        return Ok(matrix);
+        return Ok(matrix.rows());
     }
     let data = document.map(matrix)?.get("data");
-    document.required(data, matrix.at.clone(), &format!("{name}.data"), AS_SAVED)
+    let data = document.required(data, matrix.at.clone(), &format!("{name}.data"), AS_SAVED)?;
+    Ok(data.rows())
 }

@@ -52,6 +52,13 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
             };
             (projection, lens)
         }
+        "PINHOLE_FULL" => {
+            let [k1, k2, p1, p2] = numbers("distortion_parameters", ["k1", "k2", "p1", "p2"])?;
+            let [k3, k4, k5, k6] = numbers("distortion_parameters", ["k3", "k4", "k5", "k6"])?;
+            let projection = numbers("projection_parameters", ["fx", "fy", "cx", "cy"])?;
+            let coefficients = [k1, k2, p1, p2, k3, k4, k5, k6];
+            (projection, Lens::RationalPolynomial(coefficients))
+        }
         "KANNALA_BRANDT" => {
             let projection = numbers("projection_parameters", ["mu", "mv", "u0", "v0"])?;
             let coefficients = numbers("projection_parameters", ["k2", "k3", "k4", "k5"])?;
@@ -61,7 +68,7 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
             let message = format!("the camera model `{other}` is not supported");
             return Err(document
                 .error(model.at.clone(), message)
-                .expected("PINHOLE or KANNALA_BRANDT")
+                .expected("PINHOLE, PINHOLE_FULL or KANNALA_BRANDT")
                 .help("calibrate with one of these models"));
         }
     };

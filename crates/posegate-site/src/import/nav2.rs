@@ -376,22 +376,41 @@ impl Plugin {
             },
             None => Ok(false),
         };
-        let direction = match (of_plugin("dock_direction"), server.get("dock_backwards")) {
-            (Some(node), _) => {
+        let of_dock = match of_plugin("dock_direction") {
+            Some(node) => {
                 let word = document.text(node)?;
-                let direction = DockDirection::named(word).ok_or_else(|| {
-                    document
-                        .error(node.at.clone(), format!("the dock direction is `{word}`"))
-                        .expected("\"forward\" or \"backward\"")
-                        .help("write one of them")
-                })?;
+                // Nav2 reads it in any case.
+                let direction =
+                    DockDirection::named(&word.to_ascii_lowercase()).ok_or_else(|| {
+                        document
+                            .error(node.at.clone(), format!("the dock direction is `{word}`"))
+                            .expected("\"forward\" or \"backward\"")
+                            .help("write one of them")
+                    })?;
                 Some((direction, node.at.clone()))
             }
-            (None, Some(node)) if truth(Some(node))? => {
-                Some((DockDirection::Backward, node.at.clone()))
+            None => None,
+        };
+        let of_server = match server.get("dock_backwards") {
+            Some(node) if truth(Some(node))? => Some((DockDirection::Backward, node.at.clone())),
+            Some(node) => Some((DockDirection::Forward, node.at.clone())),
+            None => None,
+        };
+        let direction = match (of_dock, of_server) {
+            (Some((of_dock, _)), Some((of_server, at))) if of_dock != of_server => {
+                return Err(document
+                    .error(
+                        at,
+                        format!(
+                            "dock_backwards says {}, and dock_direction of the plugin says {}",
+                            of_server.name(),
+                            of_dock.name()
+                        ),
+                    )
+                    .expected("one direction: versions of Nav2 differ in the one that they use")
+                    .help("remove dock_backwards, which is the old parameter, or correct it"));
             }
-            (None, Some(node)) => Some((DockDirection::Forward, node.at.clone())),
-            (None, None) => None,
+            (of_dock, of_server) => of_dock.or(of_server),
         };
         let threshold = number("docking_threshold")?;
         if let Some(metres) = threshold

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Imported;
 use posegate::shape::Pose3Deg;
-use posegate_files::printable::toml_string;
+use posegate_files::printable::{toml_key as key, toml_string};
 
 /// Returns the tables, ordered by name. Numbers have as many digits as needed to be read back to the same
 /// bits.
@@ -55,14 +55,4 @@ pub(super) fn tables(imported: &Imported) -> String {
         ));
     }
     text.trim_start().to_string()
-}
-
-/// Returns a name as part of a table's header.
-fn key(name: &str) -> String {
-    let bare = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
-    if !name.is_empty() && name.bytes().all(bare) {
-        name.to_string()
-    } else {
-        toml_string(name)
-    }
 }

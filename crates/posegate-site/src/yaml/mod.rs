@@ -2,8 +2,10 @@
 
 mod tree;
 
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::ops::Range;
+use std::rc::Rc;
 
 pub(super) use self::tree::Node;
 use self::tree::{Entry, Value};
@@ -73,6 +75,22 @@ impl Node {
         matches!(&*self.value, Value::List(_))
     }
 
+    /// Returns a list of lists as one list, row by row; other values as they are.
+    pub(super) fn rows(&self) -> Cow<'_, Self> {
+        let Value::List(rows) = &*self.value else {
+            return Cow::Borrowed(self);
+        };
+        let mut all = Vec::new();
+        for row in rows {
+            match &*row.value {
+                Value::List(row) => all.extend(row.iter().cloned()),
+                _ => return Cow::Borrowed(self),
+            }
+        }
+        let (at, value) = (self.at.clone(), Rc::new(Value::List(all)));
+        Cow::Owned(Self { at, value })
+    }
+
     /// Returns the entries of a map; `None` for other values.
     pub(super) fn as_map(&self) -> Option<Map<'_>> {
         match &*self.value {
@@ -91,7 +109,8 @@ impl<'a> Document<'a> {
         let mut start = 0;
         for line in source.text.split_inclusive('\n') {
             let indent = line.len() - line.trim_start_matches([' ', '\t']).len();
-            if let Some(tab) = line[..indent].find('\t') {
+            let is_blank = line.trim().is_empty();
+            if let Some(tab) = line[..indent].find('\t').filter(|_| !is_blank) {
                 let at = start + tab;
                 return Err(source
                     .error(at..at + 1, "the line is indented by a tab")
