@@ -26,7 +26,7 @@ pub struct Arguments {
     #[arg(long, required_unless_present = "box")]
     poses: Option<Input>,
     /// Find a box of poses about the goal
-    #[arg(long, id = "box", conflicts_with = "poses")]
+    #[arg(long = "box", id = "box", conflicts_with = "poses")]
     is_box: bool,
     /// The box has the headings up to this many degrees to both sides of the goal's [default: as many as make a large box]
     #[arg(long, requires = "box")]
