@@ -1,4 +1,4 @@
-//! Tables (CSV) that [`learn`](posegate_learn) reads, made from recordings.
+//! Tables (CSV) that `posegate-learn` reads, made from recordings.
 
 use super::corners::{MountedCamera, TagObservation, locate_all};
 use super::recording::{Item, Recording, RecordingError, Sample, TagLocalizer};
