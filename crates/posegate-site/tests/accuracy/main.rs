@@ -139,6 +139,8 @@ fn main() -> ExitCode {
                 .expect("accuracy [N [SEED]] [unions|turning|regions]")
         })
         .collect();
+    // The fast suite leaves out what takes minutes in unoptimised code: the grid, and poses across regions. `ci.sh counts` has them.
+    let is_whole = !arguments.is_empty();
     let count = arguments.first().copied().unwrap_or(40);
     let seed = arguments.get(1).copied().unwrap_or(1);
     if let Some(part) = alone {
@@ -169,7 +171,9 @@ fn main() -> ExitCode {
     .unwrap();
     let task = site.task("see-t7").unwrap();
     let mut short = false;
-    for layout in [Layout::Facets, Layout::Grid] {
+    let layouts = [Layout::Facets, Layout::Grid];
+    for layout in &layouts[..if is_whole { 2 } else { 1 }] {
+        let layout = *layout;
         let mut spec = *site.table_spec(task).unwrap();
         spec.layout = layout;
         let order = BakeInput {
@@ -237,6 +241,6 @@ fn main() -> ExitCode {
     short |= unions::unions((count / 10).max(12), seed);
     short |= turning::turning((count / 10).max(12), seed);
     // The mean of all tables is known to 0.002 with 30 sets each.
-    short |= regions::regions((count / 20).max(30), seed);
+    short |= is_whole && regions::regions((count / 20).max(30), seed);
     ExitCode::from(u8::from(short))
 }
