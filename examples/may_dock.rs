@@ -20,7 +20,7 @@ static SETTINGS: Settings<'static> = Settings {
         frame: FrameId::of("map"),
         trust: Trust::FULL,
         aging: Aging::NONE,
-        motion: MotionBounds::of_mm_mrad(50, 0, 100), // at most 0.05 m/s and 0.1 rad/s
+        motion: MotionBounds::of_mm_mrad(50, 0, 100), // 0.05 m/s along its axis, none across, 0.1 rad/s
     }],
     look_at: Some(7),
     // Reports come every 50 ms, up to 50 ms after their stamps.

@@ -93,7 +93,7 @@ impl MotionBounds {
         })
     }
 
-    /// Returns bounds from whole numbers, for constants: mm/s along and across the robot's axis, mrad/s of turn. Rounded up. Larger
+    /// Returns bounds from whole numbers, for constants, as [`MotionBounds::new`]: mm/s along and across the robot's axis, mrad/s of turn. Rounded up. Larger
     /// speeds are limited to 1,000 m/s and 24 rad/s.
     #[must_use]
     pub const fn of_mm_mrad(along_mm_s: u32, across_mm_s: u32, turn_mrad_s: u32) -> Self {

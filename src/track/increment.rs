@@ -14,8 +14,8 @@ use crate::set::Q24_PER_RADIAN_Q52;
 /// 0.014 rad in total. A robot that turns first and then drives has up to 1.42 times the deviation that this increment adds; that matters only for a
 /// path of few increments. A robot that drives to and fro within one increment drives farther than these bounds allow for.
 ///
-/// For fixes that come late, a tracker keeps increments that together last at most 8 ms as one: what is needed of an increment is then needed of all
-/// of them together, except that the lengths and turns of each are counted.
+/// For late fixes, a tracker adds up increments that together last at most 8 ms to a single one. All of them together must then be what a single increment
+/// must be. The lengths and turns of each are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Increment {

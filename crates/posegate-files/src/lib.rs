@@ -1,4 +1,4 @@
-//! Files of the tools of Posegate: read within limits, printed safely, written as a whole or not at all.
+//! Files of the tools of Posegate: read up to a stated size, printed safely, written atomically.
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
