@@ -56,6 +56,19 @@ fn bounded_set_grows_by_speed_times_time() {
     }
 }
 
+/// A robot whose speed across its axis is not stated may drive sideways: the dock ends at y = 0.06 m, the set at 0.048 m, and it may drive 2 cm.
+#[test]
+fn set_grows_in_any_direction() {
+    let estimates = format!("{HEADER}0,0,0.045,0,1e-6,0,0,1e-6,0,1e-6,0\n");
+    let still = gate(&estimates, "");
+    assert_eq!(still.status.code(), Some(0), "{still:?}");
+    let moving = gate(
+        &estimates,
+        "--max-speed 0.1 --max-yaw-rate 1 --horizon-ms 200",
+    );
+    assert_eq!(moving.status.code(), Some(1), "{moving:?}");
+}
+
 /// The dock ends at 0.08 m: an ellipsoid of 1 cm at 99 % reaches 3.37 cm.
 #[test]
 fn ellipsoid_grows_by_speed_times_time() {
