@@ -231,15 +231,14 @@ mod firmware {
             let mut cost = counter
                 .count(|| decide(black_box(table), black_box(&set)))?
                 .0;
-            // A robot that moves: the set is grown by 1 to 128 mm and by 0.09 to 11 degrees.
-            let mut movement = number % 64;
+            // A robot that moves: the set is grown by 1 to 128 mm in any direction or along the heading, and by 0.09 to 11 degrees.
+            let mut movement = number % 128;
             if number >= random && number % 2 != 0 {
                 movement = best_movement;
             }
-            let moved = set.grown(Growth::new(
-                1_000 << (movement % 8),
-                4_096 << (movement / 8),
-            ));
+            let length = 1_000 << (movement % 8);
+            let side = if movement < 64 { length } else { 0 };
+            let moved = set.grown(Growth::along(length, side, 4_096 << (movement / 8 % 8)));
             let own = counter
                 .count(|| decide(black_box(table), black_box(&moved)))?
                 .0;

@@ -57,8 +57,6 @@ pub(super) struct Movement {
     pub length: i32,
     /// The largest part of it across the estimate's heading, extent units, up; the radius if it may lead anywhere.
     pub side: i32,
-    /// The same, micrometres.
-    pub aside_um: i32,
     /// The turn to either side: at most half a radian.
     pub turn: Turn,
     /// The right shift of a product of the turn and a length in length units, to extent units.
@@ -194,11 +192,9 @@ impl Placed {
         };
         if ellipsoid.is_some() && has_moved {
             let extent = |um: i32| um.unsigned_abs().wrapping_shr(e).wrapping_add(1) as i32;
-            let aside_um = by.aside_um(factor.map_or(0, |factor| factor.yaw));
             placed.movement = Some(Movement {
                 length: extent(by.translation_um()),
-                side: extent(aside_um),
-                aside_um,
+                side: extent(by.aside_um(yaw)),
                 turn: swing,
                 shift: swing.shift(finer),
                 by,

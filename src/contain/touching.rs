@@ -66,7 +66,8 @@ impl Touching {
     };
 
     /// Returns the pose after a movement along the normal that turns it outwards, to first order.
-    fn moved(self, movement: &Movement, section: &Section, [c, s]: [i32; 2]) -> Self {
+    fn moved(self, movement: &Movement, section: &Section, placed: &Placed) -> Self {
+        let [c, s] = placed.facing;
         let [nx, ny] = section.normal;
         let length = sqrt_ceil(squares(nx, ny).into()).max(1);
         let radius = movement.by.translation_um();
@@ -74,7 +75,7 @@ impl Touching {
             [nx, ny].map(|v| towards_zero(product(v, radius), length))
         } else {
             // A corner of the strip in the disc, or a point that is nearer.
-            let side = movement.aside_um;
+            let side = movement.by.aside_um(placed.yaw as i32);
             let ahead = radius.wrapping_sub(side);
             let ahead = if product(nx, c).wrapping_add(product(ny, s)) < 0 {
                 ahead.wrapping_neg()
@@ -129,7 +130,7 @@ impl Placed {
             offset: [x, y, product(self.yaw as i32, e) >> U],
         };
         match &self.movement {
-            Some(movement) => touching.moved(movement, section, self.facing),
+            Some(movement) => touching.moved(movement, section, self),
             None => touching,
         }
     }

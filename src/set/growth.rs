@@ -112,9 +112,12 @@ impl Growth {
     /// the radius.
     #[must_use]
     pub(crate) fn aside_um(self, yaw_q24: i32) -> i32 {
-        let swung = self
-            .swung(yaw_q24.saturating_add(self.yaw_q24))
-            .translation_um;
+        // The usual case costs nothing.
+        if self.side_um == self.translation_um {
+            return self.translation_um;
+        }
+        let yaw_q24 = yaw_q24.saturating_add(self.yaw_q24);
+        let swung = self.swung(yaw_q24).translation_um;
         swung.saturating_add(self.side_um).min(self.translation_um)
     }
 

@@ -220,7 +220,7 @@ impl PoseSet {
         radius_squared: RadiusSquared,
     ) -> Result<Self, InputError> {
         let reach = Reach::of(radius_squared, Trust::FULL);
-        Self::of_covariance(mean(estimate)?, &covariance.into(), reach)
+        Self::of_covariance(pose_of(estimate)?, &covariance.into(), reach)
     }
 
     /// Returns the bounded set `{ |(px-x, py-y)| <= translation, |wrap(pyaw-yaw)| <= yaw }`.
@@ -240,8 +240,9 @@ impl PoseSet {
             translation_m,
             yaw_rad,
         };
+        let mean = pose_of(estimate)?;
         // A cylinder does not use the radius.
-        Self::trusted(mean(estimate)?, spread, RadiusSquared::LARGEST, Trust::FULL)
+        Self::trusted(mean, spread, RadiusSquared::LARGEST, Trust::FULL)
     }
 
     /// Returns the set of an uncertainty about a pose, with the trust in its source applied. A covariance is
@@ -463,17 +464,12 @@ pub(crate) fn factor_of(
     }
 }
 
-/// Returns an estimate in micrometres and 2^-32 turn.
+/// Returns an estimate in micrometres and 2^-32 turn. The error is 0.5 um on each axis, and 0.5 unit and 2^-30 unit of a
+/// binary angle.
 ///
 /// # Errors
 /// The [`InputError`]s that concern the estimate.
 pub fn pose_of(estimate: Estimate) -> Result<Pose, InputError> {
-    mean(estimate)
-}
-
-/// Returns the estimate as integers. The error is 0.5 um on each axis, and 0.5 unit and 2^-30 unit of a
-/// binary angle.
-fn mean(estimate: Estimate) -> Result<Pose, InputError> {
     let Estimate { x_m, y_m, yaw_rad } = estimate;
     if !(is_finite(y_m) && is_finite(yaw_rad)) {
         return Err(InputError::EstimateNotFinite);

@@ -561,12 +561,16 @@ impl<'a> Layout<'a> {
 #[inline(never)]
 pub(super) fn hold(table: &[u8], layout: &[u8], question: &Question<'_>) -> Option<bool> {
     let layout = Layout::read(layout)?;
-    if in_one(table, &layout, question) == Some(true) {
-        return Some(true);
+    let is_in_one = in_one(table, &layout, question) == Some(true);
+    if is_in_one || !parts::UNIONS || layout.pieces.len() < 2 {
+        return Some(is_in_one);
     }
-    if !parts::UNIONS || layout.pieces.len() < 2 {
-        return Some(false);
-    }
+    in_several(table, layout, question)
+}
+
+/// Its stack is free while the pieces are tried one by one.
+#[inline(never)]
+fn in_several(table: &[u8], layout: Layout<'_>, question: &Question<'_>) -> Option<bool> {
     let place = Place {
         at: question.above(table, FINER)?,
         heading: question.heading()?,
