@@ -1,6 +1,6 @@
 //! Containment test: is a pose-set inside the success set of a table?
 //!
-//! Entry points: [`decide`], [`decide_with_margin`] and [`examine`].
+//! Entry points: [`decide`], [`decide_with_margin`], [`decide_with_sharp_margin`] and [`examine`].
 //!
 //! ```
 //! use posegate::contain::{Cause, Decision, Margin, decide, decide_with_margin};
@@ -193,12 +193,32 @@ fn decide_on_cells(table: &Table<'_>, set: &PoseSet) -> Decision {
 /// Cost: a few dozen decisions, of which those at larger scales walk more of the table: 30 to 500 times [`decide`]
 /// (`ci.sh budgets` prints both). For reports and telemetry, not for every control cycle.
 pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
-    let decision = decide(table, set);
-    let at_estimate = Examination {
-        decision,
-        margin: Margin(0),
-        worst_pose: Some(set.mean()),
+    let (decision, margin, beyond) = scales(table, set);
+    let worst_pose = match (decision, beyond) {
+        (Decision::Inside, _) => None,
+        (_, Some((placed, scale))) => placed.worst_pose(table, scale),
+        (_, None) => Some(set.mean()),
     };
+    Examination {
+        decision,
+        margin,
+        worst_pose,
+    }
+}
+
+/// Decides, and returns the margin of [`examine`], which costs less without the worst pose.
+pub fn decide_with_sharp_margin(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
+    let (decision, margin, _) = scales(table, set);
+    (decision, margin)
+}
+
+/// A set on a table, and a scale at which poses of it are beyond the table.
+type Beyond<'s> = (GoalFramePoseSet<'s>, Margin);
+
+/// Returns the decision and the margin, and where to look for a worst pose: `None` at the estimate.
+fn scales<'s>(table: &Table<'_>, set: &'s PoseSet) -> (Decision, Margin, Option<Beyond<'s>>) {
+    let decision = decide(table, set);
+    let at_estimate = (decision, Margin(0), None);
     let Some(placed) = GoalFramePoseSet::at(table, set, turned(table, set.extent())) else {
         return at_estimate;
     };
@@ -207,30 +227,20 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         while low.0 < Margin::MOST.0 && placed.is_covered(table, low.doubled()) {
             low = low.doubled();
         }
-        let margin = if low.0 < Margin::MOST.0 {
-            placed.bisect(table, low, low.doubled()).0
-        } else {
-            low
-        };
-        return Examination {
-            decision,
-            margin,
-            worst_pose: None,
-        };
+        if low.0 < Margin::MOST.0 {
+            low = placed.bisect(table, low, low.doubled()).0;
+        }
+        return (decision, low, None);
     }
     if decision == Decision::Outside(Cause::OffTable) {
         return at_estimate;
     }
     if !placed.is_covered(table, Margin(0)) || placed.is_covered(table, Margin::ONE) {
         // The estimate is outside. Or the set is too large for a table of the whole circle, of which only a rounding covers it.
-        return Examination {
-            worst_pose: placed.worst_pose(table, Margin::ONE),
-            ..at_estimate
-        };
+        return (decision, Margin(0), Some((placed, Margin::ONE)));
     }
     // The set is outside at scale 1 by the decision; search downwards for a scale that is inside.
-    let mut high = Margin::ONE;
-    let mut low = Margin(high.0 >> 1);
+    let (mut low, mut high) = (Margin(Margin::ONE.0 >> 1), Margin::ONE);
     while low.0 > 8 && !placed.is_covered(table, low) {
         high = low;
         low = Margin(low.0 >> 1);
@@ -239,11 +249,7 @@ pub fn examine(table: &Table<'_>, set: &PoseSet) -> Examination {
         low = Margin(0);
     }
     let (margin, high) = placed.bisect(table, low, high);
-    Examination {
-        decision,
-        margin,
-        worst_pose: placed.worst_pose(table, high),
-    }
+    (decision, margin, Some((placed, high)))
 }
 
 impl Margin {

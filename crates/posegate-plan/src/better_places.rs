@@ -11,9 +11,10 @@ use super::costs::distance;
 use super::library::{facing, needed};
 use super::problem::drive_to;
 use super::{BeliefStateF64, Library, Options, Plan, StepKind};
-use posegate::contain::{Decision, decide, examine};
+use posegate::contain::{Decision, decide, decide_with_sharp_margin};
 use posegate::set::PoseSet;
 use posegate::table::Table;
+use posegate_replay::factor;
 use posegate_site::{ChainStart, DriveModel, Site};
 
 /// A look, by number, and the place from which it is made.
@@ -282,6 +283,5 @@ impl BetterPlaces<'_> {
 
 /// Returns the difference of the required scale and that of a set that does not fit.
 fn missing_scale(table: &Table<'_>, set: &PoseSet) -> f64 {
-    let fits = f64::from(examine(table, set).margin.q16()) / 65_536.0;
-    (1.0 - fits).max(1e-3)
+    (1.0 - factor(decide_with_sharp_margin(table, set).1)).max(1e-3)
 }

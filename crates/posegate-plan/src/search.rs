@@ -21,8 +21,9 @@ use super::BeliefStateF64;
 use super::library::needed;
 use super::problem::SearchProblem;
 use super::queue::Queued;
-use posegate::contain::{Examination, examine};
+use posegate::contain::decide_with_sharp_margin;
 use posegate::table::Table;
+use posegate_replay::factor;
 use posegate_site::ErrorBound;
 
 /// The goal of a search.
@@ -451,6 +452,5 @@ fn scale(work: &Table<'_>, belief: &BeliefStateF64, wider: f64) -> f64 {
     let Some(set) = needed(belief, wider) else {
         return 0.0;
     };
-    let Examination { margin, .. } = examine(work, &set);
-    f64::from(margin.q16()) / 65_536.0
+    factor(decide_with_sharp_margin(work, &set).1)
 }

@@ -5,9 +5,9 @@ use nalgebra::Matrix3;
 use super::{BeliefStateF64, PlanError, StepKind, StepReport};
 use posegate::chain::{BeliefState, StartAssumption, Step, take};
 use posegate::confidence::core_radius;
-use posegate::contain::{Decision, Margin, examine};
+use posegate::contain::decide_with_sharp_margin;
 use posegate::pose::Pose;
-use posegate::set::{Estimate, InputError, PoseSet};
+use posegate::set::{Estimate, InputError};
 use posegate::shape::{PoseDeg, Tolerance};
 use posegate::table::Table;
 use posegate::task::{
@@ -90,7 +90,8 @@ impl Walk {
         };
         let before = self.belief.clone();
         let standing = self.standing;
-        let found = take(&mut self.standing, &step, self.assume, sharply);
+        let judge = decide_with_sharp_margin;
+        let found = take(&mut self.standing, &step, self.assume, judge);
         if let Some(bound) = bound {
             self.belief = self.belief.localized(bound.metres_radians());
         }
@@ -141,7 +142,7 @@ impl Walk {
             &mut self.standing,
             &Step::Navigation(&growth),
             self.assume,
-            sharply,
+            decide_with_sharp_margin,
         );
         let (off, controller) = match self.assume {
             StartAssumption::AtGoal => ([0.0, 0.0], Tolerance::NONE),
@@ -166,12 +167,6 @@ impl Walk {
             risk: 0.0,
         })
     }
-}
-
-/// Returns the core's decision with its sharp margin.
-fn sharply(table: &Table<'_>, set: &PoseSet) -> (Decision, Margin) {
-    let examination = examine(table, set);
-    (examination.decision, examination.margin)
 }
 
 /// Converts a covariance for the core. A singular or zero covariance is widened by 1e-6 of its diagonal, 1 um and
