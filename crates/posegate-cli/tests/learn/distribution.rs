@@ -152,7 +152,7 @@ impl Distribution {
     /// Returns the shares of translation and of yaw errors at a place that are at most their bounds.
     pub fn shares_within(&self, at: [f64; 3], bounds: [f64; 2]) -> [f64; 2] {
         let (sigma, flips) = ((self.sigma)(at), (self.flips)(at));
-        let half_normal = |x: f64| error_function(x / core::f64::consts::SQRT_2);
+        let half_normal = |x: f64| libm::erf(x / core::f64::consts::SQRT_2);
         let share = |bound: f64, sigma: f64| {
             let flipped = half_normal((bound - 1.0).max(0.0) / sigma);
             (1.0 - flips) * half_normal(bound / sigma) + flips * flipped
@@ -172,24 +172,5 @@ impl Distribution {
             }
         }
         high
-    }
-}
-
-/// Returns the error function by its series and by a continued fraction, independent of the crate.
-fn error_function(x: f64) -> f64 {
-    if x < 3.0 {
-        let (mut term, mut sum) = (x, x);
-        for n in 1..80 {
-            let n = f64::from(n);
-            term *= -x * x / n;
-            sum += term / (2.0 * n + 1.0);
-        }
-        sum * core::f64::consts::FRAC_2_SQRT_PI
-    } else {
-        let mut fraction = 0.0;
-        for n in (1..60).rev() {
-            fraction = 0.5 * f64::from(n) / (x + fraction);
-        }
-        1.0 - (-x * x).exp() / ((x + fraction) * core::f64::consts::PI.sqrt())
     }
 }
