@@ -2221,7 +2221,8 @@ posegate_status posegate_checksum(uint32_t so_far,
                                   uint32_t *checksum);
 
 /**
- * Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
+ * Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table. With several tables, give the one with
+ * the largest confidence; `posegate_gate_step_tracked` also follows the gate's table, `posegate_tracker_tracked` does not know it.
  *
  * Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; those of `posegate_table_check`, since the table states the
  * confidence.
