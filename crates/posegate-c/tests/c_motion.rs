@@ -906,3 +906,46 @@ fn a_tracker_follows_the_confidence_of_the_gates_table() {
     }
     assert!(decisions.len() > 1, "{decisions:?}");
 }
+
+/// A change of the table is no end of a permit that waits for a reset; an inhibit before it is.
+#[test]
+fn a_change_of_the_table_waits_for_no_reset() {
+    let mut settings = settings_of_c(&Table::parse(SEE_T7).unwrap());
+    settings.sources[0].motion = posegate_motion::StandsStill as u32;
+    settings.restart = posegate_restart::OnReset as u32;
+    let settings = leaked(settings);
+    let (table, length) = (SEE_T7.as_ptr(), SEE_T7.len());
+    for is_inhibited in [false, true] {
+        let gate = zeroed();
+        // SAFETY: valid pointers.
+        let status = unsafe { posegate_gate_init(gate, table, length, settings, leaked(0), 0) };
+        assert_eq!(status, posegate_status::Ok);
+        let opened = |from: u32| {
+            let last = (from..from + 30).map(|sequence| {
+                let now = 10 * sequence;
+                let mut belief = belief_of_c(0.0, 0.0, 0.0);
+                belief.spread = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-7];
+                let report = report_of_c(sequence, now, belief);
+                step_on(gate, now, &evidence_of_c(report, &[])).1.state.kind
+            });
+            last.last()
+        };
+        assert_eq!(opened(1), Some(posegate_state_kind::Permitted as u32));
+        // SAFETY: valid pointers.
+        unsafe {
+            if is_inhibited {
+                let reason = Reason::Silent as u32;
+                let status = posegate_gate_inhibit(gate, 305, reason, zeroed());
+                assert_eq!(status, posegate_status::Ok);
+            }
+            let status = posegate_gate_change_table(gate, table, length, settings, 305);
+            assert_eq!(status, posegate_status::Ok);
+        }
+        let expected = if is_inhibited {
+            posegate_state_kind::Latched
+        } else {
+            posegate_state_kind::Permitted
+        };
+        assert_eq!(opened(31), Some(expected as u32));
+    }
+}
