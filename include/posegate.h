@@ -1840,7 +1840,8 @@ posegate_status posegate_gate_init(struct posegate_gate *gate,
 
 /**
  * Gives a gate another table and other settings, within one control cycle: it is then closed as after `posegate_gate_init`, without
- * another run of the self-test. A gate that is latched stays latched, unless its table was the reason.
+ * another run of the self-test. A gate that is latched stays latched, unless its table was the reason. With `POSEGATE_RESTART_ON_RESET`, too, an open
+ * gate waits for no reset after the change: `posegate_gate_inhibit` before it makes it wait.
  *
  * Errors: as for `posegate_gate_init`. After an error the storage is not initialised, so every function denies.
  *
@@ -2221,7 +2222,8 @@ posegate_status posegate_checksum(uint32_t so_far,
                                   uint32_t *checksum);
 
 /**
- * Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
+ * Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table. With several tables, give the one with
+ * the largest confidence; `posegate_gate_step_tracked` also follows the gate's table, `posegate_tracker_tracked` does not know it.
  *
  * Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; those of `posegate_table_check`, since the table states the
  * confidence.

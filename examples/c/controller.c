@@ -19,12 +19,13 @@ static const posegate_settings SETTINGS = {
     .task_digest = TASK_DIGEST,
     .sources =
         {
-            /* The robot's speed is the same for every source: 0.1 m/s ahead, 0.1 rad/s. */
+            /* The robot's speed is the same for every source: 0.1 m/s ahead, 0.1 rad/s. None to the side: the pose is that of
+               a point on the axle. */
             {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
-             .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
+             .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .across_m_s = 0.0, .turn_rad_s = 0.1},
             /* Carried: the tracker applies the trust. */
             {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
-             .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
+             .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .across_m_s = 0.0, .turn_rad_s = 0.1},
         },
     .source_count = 2U,
     .maximum_age_ms = 200U,
@@ -44,7 +45,7 @@ static const posegate_tracker_settings TRACKING = {
                .slip = 0.02, .turn_slip = 0.02},
     /* Its frame is not used. */
     .source = {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
-               .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
+               .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .across_m_s = 0.0, .turn_rad_s = 0.1},
     .maximum_gap_ms = 60U,
     .maximum_fix_age_ms = 1000U,
 };

@@ -82,7 +82,7 @@ pub struct TrackerSettings {
     /// The trust in the covariances of fixes. The tracker applies it, so the gate's source is declared with
     /// [`Trust::FULL`].
     pub trust: Trust,
-    /// The squared radius of the table ([`crate::table::Table::radius_squared`]).
+    /// The squared radius of the table ([`crate::table::Table::radius_squared`]), or the largest of several ([`Tracker::cover`]).
     pub radius_squared: RadiusSquared,
     /// The longest time between two increments, and from the newest to now, milliseconds.
     pub maximum_gap_ms: u32,
@@ -272,6 +272,13 @@ impl<const N: usize> Tracker<N> {
         self.begins_ms = stamp_ms;
         self.newest_ms = Some(stamp_ms);
         self.fix = None;
+    }
+
+    /// Takes the squared radius of another table if it is larger: the bounds of a report hold up to this radius. For a gate whose table changes.
+    pub const fn cover(&mut self, radius_squared: RadiusSquared) {
+        if radius_squared.q16() > self.settings.radius_squared.q16() {
+            self.settings.radius_squared = radius_squared;
+        }
     }
 
     /// Returns how far back the kept increments reach from the newest, milliseconds: a fix that is older is refused with

@@ -417,7 +417,8 @@ pub unsafe extern "C" fn posegate_gate_init(
 }
 
 /// Gives a gate another table and other settings, within one control cycle: it is then closed as after `posegate_gate_init`, without
-/// another run of the self-test. A gate that is latched stays latched, unless its table was the reason.
+/// another run of the self-test. A gate that is latched stays latched, unless its table was the reason. With `POSEGATE_RESTART_ON_RESET`, too, an open
+/// gate waits for no reset after the change: `posegate_gate_inhibit` before it makes it wait.
 ///
 /// Errors: as for `posegate_gate_init`. After an error the storage is not initialised, so every function denies.
 ///

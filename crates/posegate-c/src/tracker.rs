@@ -153,7 +153,8 @@ fn code(outcome: Result<(), Reason>) -> u32 {
     outcome.map_or_else(|reason| u32::from(reason.code()), |()| 0)
 }
 
-/// Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table.
+/// Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table. With several tables, give the one with
+/// the largest confidence; `posegate_gate_step_tracked` also follows the gate's table, `posegate_tracker_tracked` does not know it.
 ///
 /// Errors: `POSEGATE_STATUS_ODOMETRY`, also if all errors are zero; those of a source; those of `posegate_table_check`, since the table states the
 /// confidence.
@@ -360,7 +361,14 @@ pub unsafe extern "C" fn posegate_gate_step_tracked(
         let tracker = open(tracker);
         let gate = held(gate)?;
         let found = match &tracker {
-            Ok(tracker) => (**tracker).tracked(now_ms),
+            Ok(tracker) => {
+                let tracker = &mut **tracker;
+                // The gate may have another table since the tracker was initialised.
+                if let Ok(table) = gate.table() {
+                    tracker.cover(table.radius_squared());
+                }
+                tracker.tracked(now_ms)
+            }
             Err(_) => Err(Reason::Silent),
         };
         let mut result = match &found {

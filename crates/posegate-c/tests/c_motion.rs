@@ -4,7 +4,7 @@ use posegate::gate::{Evidence, Gate, Reason, Settings, Source, Verdict};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{Aging, CrossTerms, Estimate, Growth, Inflation, Uncertainty};
-use posegate::table::Table;
+use posegate::table::{Table, checksum_continued};
 use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_c::*;
@@ -833,4 +833,119 @@ fn a_changed_gate_is_a_new_one_with_the_other_table() {
     // SAFETY: a valid pointer.
     let permits = unsafe { posegate_permission_is_permit(&denied.permission, 6020) };
     assert_ne!(permits, POSEGATE_PERMIT);
+}
+
+/// Returns a table with another squared radius, 2^-16.
+fn of_radius(bytes: &[u8], radius_q16: u32) -> &'static [u8] {
+    let mut bytes = bytes.to_vec();
+    bytes[64..68].copy_from_slice(&radius_q16.to_le_bytes());
+    let end = bytes.len() - 4;
+    let crc = checksum_continued(0, &bytes[..end]).to_le_bytes();
+    bytes[end..].copy_from_slice(&crc);
+    bytes.leak()
+}
+
+/// A tracker bounds the curvature of the path's error by the confidence. A gate on a table of a larger one permits nothing that it would not permit with a
+/// tracker of that table.
+#[test]
+fn a_tracker_follows_the_confidence_of_the_gates_table() {
+    let [less, more] = [1 << 16, 20 << 16].map(|radius_q16| of_radius(DOCK, radius_q16));
+    let mut decisions = BTreeSet::new();
+    for across in 0..120 {
+        let verdicts = [less, more].map(|bytes| {
+            let gate = gate_of_c(less);
+            let mut settings = settings_of_c(&Table::parse(more).unwrap());
+            settings.sources[0].motion = posegate_motion::StandsStill as u32;
+            let settings = leaked(settings);
+            let mut given = tracker_settings_of_c();
+            given.errors.slip = 0.0;
+            given.errors.turn_slip_per_m = 0.0;
+            given.errors.m_per_sqrt_m = 1e-4;
+            given.errors.rad_per_sqrt_m = 1e-4;
+            given.errors.m_per_sqrt_s = 1e-4;
+            given.errors.rad_per_sqrt_s = 1e-4;
+            given.source.along_m_s = 5.0;
+            given.source.turn_rad_s = 0.1;
+            given.source.inflation = 1.0;
+            let tracker = zeroed::<posegate_tracker>();
+            let mut belief = belief_of_c(-1.0, 0.0005 * f64::from(across), 0.0);
+            belief.spread = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-4];
+            let fix = report_of_c(1, 0, belief);
+            let step = zeroed::<posegate_step>();
+            let mut reason = 77;
+            // SAFETY: valid pointers.
+            unsafe {
+                let status =
+                    posegate_tracker_init(tracker, bytes.as_ptr(), bytes.len(), leaked(given));
+                assert_eq!(status, posegate_status::Ok);
+                for number in 0..11 {
+                    let increment = posegate_increment {
+                        ahead_m: 0.1,
+                        left_m: 0.0,
+                        turn_rad: 0.0,
+                        begins_ms: if number == 0 { 0 } else { 20 * (number - 1) },
+                        stamp_ms: 20 * number,
+                    };
+                    let status = posegate_tracker_odometry(tracker, &increment, &mut reason);
+                    assert_eq!((status, reason), (posegate_status::Ok, 0));
+                    if number == 0 {
+                        let status = posegate_tracker_fix(tracker, &fix, &mut reason);
+                        assert_eq!((status, reason), (posegate_status::Ok, 0));
+                    }
+                }
+                let status =
+                    posegate_gate_change_table(gate, more.as_ptr(), more.len(), settings, 190);
+                assert_eq!(status, posegate_status::Ok);
+                let status = posegate_gate_step_tracked(gate, 200, tracker, step);
+                assert_eq!(status, posegate_status::Ok);
+                (*step).reason
+            }
+        });
+        assert_eq!(verdicts[0], verdicts[1], "{across}");
+        decisions.insert(verdicts[0]);
+    }
+    assert!(decisions.len() > 1, "{decisions:?}");
+}
+
+/// A change of the table is no end of a permit that waits for a reset; an inhibit before it is.
+#[test]
+fn a_change_of_the_table_waits_for_no_reset() {
+    let mut settings = settings_of_c(&Table::parse(SEE_T7).unwrap());
+    settings.sources[0].motion = posegate_motion::StandsStill as u32;
+    settings.restart = posegate_restart::OnReset as u32;
+    let settings = leaked(settings);
+    let (table, length) = (SEE_T7.as_ptr(), SEE_T7.len());
+    for is_inhibited in [false, true] {
+        let gate = zeroed();
+        // SAFETY: valid pointers.
+        let status = unsafe { posegate_gate_init(gate, table, length, settings, leaked(0), 0) };
+        assert_eq!(status, posegate_status::Ok);
+        let opened = |from: u32| {
+            let last = (from..from + 30).map(|sequence| {
+                let now = 10 * sequence;
+                let mut belief = belief_of_c(0.0, 0.0, 0.0);
+                belief.spread = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-7];
+                let report = report_of_c(sequence, now, belief);
+                step_on(gate, now, &evidence_of_c(report, &[])).1.state.kind
+            });
+            last.last()
+        };
+        assert_eq!(opened(1), Some(posegate_state_kind::Permitted as u32));
+        // SAFETY: valid pointers.
+        unsafe {
+            if is_inhibited {
+                let reason = Reason::Silent as u32;
+                let status = posegate_gate_inhibit(gate, 305, reason, zeroed());
+                assert_eq!(status, posegate_status::Ok);
+            }
+            let status = posegate_gate_change_table(gate, table, length, settings, 305);
+            assert_eq!(status, posegate_status::Ok);
+        }
+        let expected = if is_inhibited {
+            posegate_state_kind::Latched
+        } else {
+            posegate_state_kind::Permitted
+        };
+        assert_eq!(opened(31), Some(expected as u32));
+    }
 }

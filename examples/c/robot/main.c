@@ -28,7 +28,8 @@ extern const uint32_t table_wait_length;
     {.task = name,                                                                                 \
      .task_digest = digest,                                                                   \
      .sources = {{.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,    \
-                  .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1}},          \
+                  .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .across_m_s = 0.0,            \
+                  .turn_rad_s = 0.1}},                                                             \
      .source_count = 1U,                                                                           \
      .maximum_age_ms = 60U,                                                                        \
      .response_ms = 20U,                                                                           \
@@ -47,7 +48,7 @@ static const posegate_tracker_settings TRACKING = {
     .errors = {.m_per_sqrt_m = 0.002, .rad_per_sqrt_rad = 0.01, .rad_per_sqrt_m = 0.005,
                .slip = 0.01, .turn_slip = 0.01},
     .source = {.frame = "map", .inflation = 1.0, .cross_terms = POSEGATE_CROSS_TERMS_FILLED,
-               .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .turn_rad_s = 0.1},
+               .motion = POSEGATE_MOTION_MOVES, .along_m_s = 0.1, .across_m_s = 0.0, .turn_rad_s = 0.1},
     .maximum_gap_ms = 30U,
     .maximum_fix_age_ms = 1500U,
 };
