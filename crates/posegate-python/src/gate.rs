@@ -204,10 +204,16 @@ impl PyGate {
 
     /// Evaluates what a tracker carries to the time `now_ms`. Without a usable fix the gate closes, with the reason.
     fn step_on(&mut self, now_ms: u32, tracker: &mut PyTracker) -> PyGateStep {
-        let tracked = tracker.tracker.tracked(now_ms);
-        let step = self.with(|gate| match &tracked {
-            Ok(tracked) => gate.step_on(now_ms, &tracked.evidence()),
-            Err(reason) => gate.inhibit(now_ms, *reason),
+        let tracker = &mut tracker.tracker;
+        let step = self.with(|gate| {
+            // The tracker may have been made for another table.
+            if let Ok(table) = gate.table() {
+                tracker.cover(table.radius_squared());
+            }
+            match tracker.tracked(now_ms) {
+                Ok(tracked) => gate.step_on(now_ms, &tracked.evidence()),
+                Err(reason) => gate.inhibit(now_ms, reason),
+            }
         });
         step.into()
     }
