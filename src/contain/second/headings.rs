@@ -26,20 +26,24 @@ impl Body {
     /// Returns `true` if the sections of the set at seventeen headings are within a facet.
     #[inline(never)]
     pub(super) fn sections_hold(&self, facet: &Facet, axes: u8, point: [i32; 2]) -> bool {
-        // Below 2^32: in a set that turns farther, headings repeat.
-        let turn = root(self.reach) as i64;
-        // Twice to where the section before reaches farthest: to first order the touching point.
-        let mut e = 0;
-        for _ in 0..3 {
-            match self.section_holds(facet, axes, point, turn, [e, 0]) {
-                None => return false,
-                Some(next) => e = next,
+        let [.., tt] = self.world;
+        // Below 2^32: in a set that turns farther, headings repeat. The root of C_tt has 15 more bits.
+        let yaw =
+            [self.reach, u64::from(tt.unsigned_abs()) << 30].map(|square| root(square) as i64);
+        let section = |e: i32, swing: i64, seeks: bool| {
+            self.section_holds(facet, axes, point, yaw, [e, swing as i32], seeks)
+        };
+        if !self.is_cylinder && tt >= THIN {
+            // Twice to where the section before reaches farthest: to first order the touching point.
+            let mut e = 0;
+            for seeks in [true, true, false] {
+                match section(e, 0, seeks) {
+                    None => return false,
+                    Some(next) => e = next,
+                }
             }
         }
-        let holds = |k: i32, swing: i64| {
-            self.section_holds(facet, axes, point, turn, [k << 12, swing as i32])
-                .is_some()
-        };
+        let holds = |k: i32, swing: i64| section(k << 12, swing, false).is_some();
         // A turn of 2^31 or more: the low bits are the heading.
         (SIDE.wrapping_neg()..=SIDE).all(|k| {
             holds(k, 0)
@@ -48,14 +52,15 @@ impl Body {
     }
 
     /// Checks the section at the share e, unit 2^-15, of the yaw's extent: `None` if it is beyond the facet, else the share at which the
-    /// set would reach farthest if the point moved as it does here. The robot has turned by `swing`, 2^-32 turn, after that.
+    /// set would reach farthest if the point moved as it does here, if that is sought. The robot has turned by `swing`, 2^-32 turn, after that.
     fn section_holds(
         &self,
         [x0, x1, y0, y1, b0, b1]: &Facet,
         axes: u8,
         [vx, vy]: [i32; 2],
-        turn: i64,
+        [turn, deviation]: [i64; 2],
         [e, swing]: [i32; 2],
+        seeks: bool,
     ) -> Option<i32> {
         let ahead = (turn.wrapping_mul(i64::from(e)) >> 15) as u32;
         let ahead = ahead.wrapping_add(swing as u32);
@@ -110,9 +115,8 @@ impl Body {
             .max(0);
         let reach = root(square.unsigned_abs());
         let mut allowed = reach >> 11;
-        let (shift, across, next) = if self.is_cylinder {
-            (0, square, e)
-        } else if tt < THIN {
+        let (mut shift, mut across, mut next) = (0, square, e);
+        if !self.is_cylinder && tt < THIN {
             if e != 0 {
                 return Some(e);
             }
@@ -123,32 +127,28 @@ impl Body {
                 let turn = turn.unsigned_abs();
                 allowed = allowed.wrapping_add(reach.wrapping_mul(turn) >> 29);
             }
-            (0, square, e)
-        } else {
-            // n . C_pt / sqrt(C_tt), with 15 more bits of the root.
-            let deviation = root(u64::from(tt.unsigned_abs()) << 30);
+        } else if !self.is_cylinder {
+            // n . C_pt / sqrt(C_tt).
             let sum = wide(nx, xt).wrapping_add(wide(ny, yt));
-            let along = quotient(sum.wrapping_mul(1 << 15), deviation);
+            let along = quotient(sum.wrapping_mul(1 << 15), deviation.unsigned_abs());
             let relative = along.unsigned_abs().wrapping_mul(LOST);
             let tt = u64::from(tt.unsigned_abs());
             allowed = allowed.wrapping_add(num::quotient(relative, tt).unwrap_or(0));
-            let shift = along.wrapping_mul(i64::from(e)) >> 15;
+            shift = along.wrapping_mul(i64::from(e)) >> 15;
             let rest = square.wrapping_sub(along.wrapping_mul(along)).max(0);
             let open = (1i64 << 30).wrapping_sub(i64::from(e).wrapping_mul(i64::from(e)));
-            // The lever counts as well: the movement of the point over the yaw's extent.
-            let moved = self.moved(normal, lever, axes);
-            let both = along.wrapping_add(moved);
-            let squares = rest
-                .unsigned_abs()
-                .saturating_add(both.unsigned_abs().saturating_mul(both.unsigned_abs()));
-            let length = root(squares).max(1);
-            let next = quotient(both.wrapping_mul(1 << 15), length) as i32;
-            (
-                shift,
-                (rest >> 30).wrapping_mul(open.max(0)),
-                next.clamp(-(1 << 15), 1 << 15),
-            )
-        };
+            across = (rest >> 30).wrapping_mul(open.max(0));
+            if seeks {
+                // The lever counts as well: the movement of the point over the yaw's extent.
+                let both = along.wrapping_add(self.moved(normal, lever, axes, turn));
+                let squares = rest
+                    .unsigned_abs()
+                    .saturating_add(both.unsigned_abs().saturating_mul(both.unsigned_abs()));
+                let length = root(squares).max(1);
+                let farthest = quotient(both.wrapping_mul(1 << 15), length) as i32;
+                next = farthest.clamp(-(1 << 15), 1 << 15);
+            }
+        }
         let left = spare.wrapping_sub(shift);
         let left = left.wrapping_add(allowed as i64).wrapping_add(16);
         let holds = left >= 0
@@ -157,7 +157,7 @@ impl Body {
     }
 
     /// Returns the movement of the point along the normal over the yaw's extent, in the units of a scaled length.
-    fn moved(&self, normal: [i32; 2], [lx, ly]: [i32; 2], axes: u8) -> i64 {
+    fn moved(&self, normal: [i32; 2], [lx, ly]: [i32; 2], axes: u8, turn: i64) -> i64 {
         let ahead = if axes == 0 {
             [ly.wrapping_neg(), lx]
         } else {
@@ -165,8 +165,8 @@ impl Body {
         };
         let along = dot(normal, ahead);
         // The extent in 2^-31 rad.
-        let turn = root(self.reach).min(1 << 31).wrapping_mul(1_686_629_713) >> 30;
-        let length = (along >> 14).wrapping_mul((turn >> 17) as i64);
+        let turn = turn.min(1 << 31).wrapping_mul(1_686_629_713) >> 30;
+        let length = (along >> 14).wrapping_mul(turn >> 17);
         let size = self
             .scaled(length.saturating_abs())
             .map_or(1 << 30, i64::from);
