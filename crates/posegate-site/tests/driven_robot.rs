@@ -1,4 +1,4 @@
-//! Promise P7 for a differential drive and an omnidirectional robot that are simulated at 10 kHz, minutes long.
+//! Promise P7 for a differential drive and an omnidirectional robot that are simulated for minutes, with times to a tenth of a millisecond.
 //!
 //! The simulation shares no derivation with the tracker: it never looks at a covariance, a path or a bound. Several true robots drive
 //! what the odometry reports, each with errors that the settings allow, all against one wall: the pose at the fix on the border of
@@ -28,6 +28,8 @@ const POINT: [[f64; 2]; 1] = [[0.0, 0.0]];
 /// Ticks of the simulation in a millisecond, and a tick in seconds.
 const TICKS_PER_MS: u64 = 10;
 const TICK_S: f64 = 1e-4;
+/// A true robot drives at most so many ticks at once.
+const TICKS_AT_ONCE: u64 = 10;
 /// True robots of each fix.
 const ROBOTS: usize = 12;
 
@@ -339,8 +341,8 @@ impl Robot {
         }
     }
 
-    /// Drives for a tick what is reported as a twist.
-    fn drive(&mut self, [ahead, left, rate]: [f64; 3], errors: &OdometryErrors) {
+    /// Drives for a short time what is reported as a twist: along an arc, with errors that do not change meanwhile.
+    fn drive(&mut self, [ahead, left, rate]: [f64; 3], errors: &OdometryErrors, seconds: f64) {
         let speed = ahead.hypot(left);
         let square = |v: f64| v * v;
         let variances = [
@@ -351,9 +353,10 @@ impl Robot {
         ];
         let mut off = [0.0; 2];
         for k in 0..2 {
-            let variance = variances[k] * TICK_S;
+            let variance = variances[k] * seconds;
             if variance > 0.0 && self.used[k] + variance <= self.lasts[k] {
-                let at = self.used[k] / self.lasts[k];
+                // In the middle: the sum of squares is below their integral.
+                let at = (self.used[k] + 0.5 * variance) / self.lasts[k];
                 let weight = if self.is_early {
                     3f64.sqrt() * (1.0 - at)
                 } else {
@@ -363,30 +366,41 @@ impl Robot {
                 self.used[k] += variance;
             }
         }
-        let (s, c) = (self.pose[2] + 0.5 * rate * TICK_S).sin_cos();
-        let (x, y) = (c * ahead - s * left, s * ahead + c * left);
+        let velocity = |heading: f64| {
+            let (s, c) = heading.sin_cos();
+            [c * ahead - s * left, s * ahead + c * left]
+        };
         // The share is of the longer of the true and the reported movement.
         let share = errors.slip;
-        let towards = x * self.wall[0] + y * self.wall[1];
-        let of_true = (share * share * towards
-            + share * (square(share * towards) + (1.0 - share * share) * speed * speed).sqrt())
-            / (1.0 - share * share);
-        let slip = of_true.max(share * speed) * TICK_S;
-        let driven =
-            speed.max((x + slip / TICK_S * self.wall[0]).hypot(y + slip / TICK_S * self.wall[1]));
+        let slip_at = |heading: f64| {
+            let [x, y] = velocity(heading);
+            let towards = x * self.wall[0] + y * self.wall[1];
+            let of_true = (share * share * towards
+                + share * (square(share * towards) + (1.0 - share * share) * speed * speed).sqrt())
+                / (1.0 - share * share);
+            of_true.max(share * speed)
+        };
+        let slip = match share {
+            0.0 => 0.0,
+            _ => slip_at(self.pose[2]).min(slip_at(self.pose[2] + rate * seconds)),
+        };
+        // Along an arc, its chord.
+        let chord = |turn: f64| 1.0 - square(turn) / 24.0;
+        let [x, y] = velocity(self.pose[2] + 0.5 * rate * seconds);
+        let driven = speed.max((x + slip * self.wall[0]).hypot(y + slip * self.wall[1]));
         let per_metre = errors.turn_slip_per_m * driven;
         let turned = if self.side * rate > 0.0 {
             (errors.turn_slip * rate.abs() + per_metre) / (1.0 - errors.turn_slip)
         } else {
             errors.turn_slip * rate.abs() + per_metre
         };
-        // The chord of a tick.
-        let chord = 1.0 - square(rate * TICK_S) / 24.0;
-        let away = slip + off[1];
+        let turn = (rate + self.side * turned) * seconds + self.side * off[0];
+        let [x, y] = velocity(self.pose[2] + 0.5 * turn);
+        let away = slip * seconds + off[1];
         self.pose = [
-            self.pose[0] + x * TICK_S * chord + away * self.wall[0],
-            self.pose[1] + y * TICK_S * chord + away * self.wall[1],
-            self.pose[2] + (rate + self.side * turned) * TICK_S + self.side * off[0],
+            self.pose[0] + x * seconds * chord(turn) + away * self.wall[0],
+            self.pose[1] + y * seconds * chord(turn) + away * self.wall[1],
+            self.pose[2] + turn,
         ];
     }
 }
@@ -398,9 +412,21 @@ struct Fix {
     arrives: u64,
     set: Believed,
     robots: Vec<Robot>,
-    /// The poses at the newest reading, and its tick.
-    poses: Vec<[f64; 3]>,
+    /// The tick of the newest reading, at which the robots are.
     newest: u64,
+}
+
+impl Fix {
+    /// Drives the robots to a tick, as a twist is reported.
+    fn drive_to(&mut self, now: u64, twist: [f64; 3], errors: &OdometryErrors) {
+        while self.newest < now {
+            let ticks = TICKS_AT_ONCE.min(now - self.newest);
+            self.newest += ticks;
+            for robot in &mut self.robots {
+                robot.drive(twist, errors, ticks as f64 * TICK_S);
+            }
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -560,14 +586,9 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
     let (mut sequence, mut is_open, mut is_broken) = (0, false, None);
     while now < ends {
         now += 1;
-        at = moved(at, arc(twist, TICK_S));
-        for fix in coming.iter_mut().chain(current.as_mut()) {
-            for robot in &mut fix.robots {
-                robot.drive(twist, &scene.errors);
-            }
-        }
         if now - read_at >= scene.reading {
             let seconds = (now - read_at) as f64 * TICK_S;
+            at = moved(at, arc(twist, seconds));
             let by = reporter.read(twist, seconds);
             let span = [clock(read_at), clock(now)];
             let increment = Increment::of(by[0], by[1], by[2], span).expect("a short path");
@@ -577,9 +598,7 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
             }
             read_at = now;
             for fix in coming.iter_mut().chain(current.as_mut()) {
-                fix.poses.clear();
-                fix.poses.extend(fix.robots.iter().map(|robot| robot.pose));
-                fix.newest = now;
+                fix.drive_to(now, twist, &scene.errors);
             }
             let seconds = scene.reading as f64 * TICK_S;
             // A wrong heading on a straight path needs no other command.
@@ -596,6 +615,7 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
                 set.turn = rng.within(2.0, scene.sizes[1]);
             }
             // The pose that the odometry's path passes is one of the set.
+            let at = moved(at, arc(twist, (now - read_at) as f64 * TICK_S));
             let off = [0; 3].map(|_| rng.within(-0.5, 0.5));
             let row = |row: [f64; 3]| row.iter().zip(off).map(|(a, b)| a * b).sum::<f64>();
             set.mean = [
@@ -618,7 +638,6 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
                 arrives: now
                     + TICKS_PER_MS * u64::from(rng.below(scene.latency_ms as usize + 1) as u32),
                 set,
-                poses: robots.iter().map(|robot| robot.pose).collect(),
                 robots,
                 newest: now,
             });
@@ -653,7 +672,8 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
                 if step.verdict.is_ok()
                     && let Some(fix) = &current
                 {
-                    permitted = Some((fix.poses.clone(), fix.newest));
+                    let poses = fix.robots.iter().map(|robot| robot.pose).collect();
+                    permitted = Some((poses, fix.newest));
                 }
                 step
             }
