@@ -12,6 +12,9 @@ use serde_json::{Value, json};
 /// Ends with warnings of likely mistakes in tags, candidates, cameras and tasks, with the line of the file. If the site has a `[controller]`, they name each task on whose table a step of the gate may take more cycles than
 /// the controller has. Warnings do not change the exit code.
 ///
+/// Cameras may name calibrations of ROS, OpenCV (YAML, XML), Kalibr, OKVIS, Basalt, VINS, ORB-SLAM, PhotonVision, or CameraInfo messages as text; [import.NAME] reads the formats of
+/// `posegate import`.
+///
 /// --draw shows what the site file says: every tag and camera with its axes. A tag's x axis comes out of its face, and z is up;
 /// a camera looks along its x axis. It also lists which camera sees which tag from which goal.
 #[derive(clap::Args)]

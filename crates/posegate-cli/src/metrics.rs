@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 /// Compares an estimated trajectory with a reference: ATE, RPE, Correct Rate
 ///
-/// Both are files of TUM (timestamp tx ty tz qx qy qz qw), EuRoC (nanoseconds, x, y, z, qw, qx, qy, qz) or KITTI (12 numbers; --times). A
+/// Both are files of TUM (timestamp tx ty tz qx qy qz qw), EuRoC (nanoseconds or decimal seconds, x, y, z, qw, qx, qy, qz) or KITTI (12 numbers; --times). A
 /// time that is there twice is used once. Errors and statistics are those of evo.
 #[derive(clap::Args)]
 #[command(

@@ -11,7 +11,7 @@
 //! ```
 
 use super::recording::{Exact, Format, format_of};
-use super::tum::{Stamped, TumError, fault, fields, numbers};
+use super::tum::{NANOSECONDS, Stamped, TumError, fault, fields, numbers};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 /// The largest difference of a quaternion's length from 1, and of a rotation's entries: files are rounded to a few decimals.
@@ -64,7 +64,10 @@ pub fn read(text: &[u8], file: &str, times: Option<Named<'_>>) -> Result<Poses, 
         duplicates: 0,
     };
     let mut last = 0;
-    let mut w_is_last = false;
+    let mut columns = EurocColumns {
+        is_seconds: format == Format::Euroc && has_decimal_times(text),
+        w_is_last: None,
+    };
     for (index, line) in lines(text).enumerate() {
         last = index + 1;
         let line = match format {
@@ -89,10 +92,10 @@ pub fn read(text: &[u8], file: &str, times: Option<Named<'_>>) -> Result<Poses, 
                 let is_first = found.poses.is_empty();
                 if is_first && line.starts_with(|first: char| first == '#' || first.is_alphabetic())
                 {
-                    w_is_last |= names_w_last(&line);
+                    columns.read_header(&line, file, last)?;
                     continue;
                 }
-                match euroc(&line, file, last, w_is_last)? {
+                match euroc(&line, file, last, &columns)? {
                     Some(pose) => pose,
                     None => continue,
                 }
@@ -204,8 +207,48 @@ fn tum(line: &str, file: &str, number: usize) -> Result<Option<Line>, TumError> 
     }))
 }
 
-/// Returns `true` if a header names the quaternion's parts in the order x, y, z, w, as OKVIS writes them.
-fn names_w_last(header: &str) -> bool {
+/// What a EuRoC trajectory says of its columns.
+struct EurocColumns {
+    /// Times are seconds, not nanoseconds.
+    is_seconds: bool,
+    /// The order of the quaternion's parts, if a header names it.
+    w_is_last: Option<bool>,
+}
+
+impl EurocColumns {
+    fn read_header(&mut self, line: &str, file: &str, number: usize) -> Result<(), TumError> {
+        let order = |parts| names_quaternion(line, parts);
+        if order("xyzw") || order("wxyz") {
+            self.w_is_last = Some(order("xyzw"));
+        }
+        let time = line.split(',').next().unwrap_or_default();
+        let unit = time
+            .split_once(['[', '('])
+            .and_then(|(_, rest)| rest.split([']', ')']).next());
+        match unit.map(str::trim) {
+            _ if !line.contains(',') => {}
+            Some("s" | "sec" | "seconds") => self.is_seconds = true,
+            Some("us" | "usec" | "ms" | "msec") => {
+                let message = format!("`{}`", time.trim());
+                let expected = "times in nanoseconds or in seconds: [ns] or [s]";
+                return Err(fault(file, number, 1, message, expected));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// Returns `true` if the first number of a line has a decimal point.
+fn has_decimal_times(text: &[u8]) -> bool {
+    lines(text).any(|line| {
+        let time = line.split(',').next().unwrap_or_default();
+        time.contains('.') && time.trim().parse::<f64>().is_ok()
+    })
+}
+
+/// Returns `true` if a header names the quaternion's parts in this order. OKVIS has w last.
+pub(super) fn names_quaternion(header: &str, order: &str) -> bool {
     let part = |name: &str| {
         let name = name.split('[').next().unwrap_or_default();
         name.trim()
@@ -214,12 +257,17 @@ fn names_w_last(header: &str) -> bool {
             .map(|last| last.to_ascii_lowercase())
     };
     let parts = header.split(',').skip(4).take(4).map(part);
-    parts.eq("xyzw".chars().map(Some))
+    parts.eq(order.chars().map(Some))
 }
 
-/// Reads a line of EuRoC's ground truth: nanoseconds, the position, the quaternion with w first unless the header says otherwise; velocities
+/// Reads a line of EuRoC's ground truth: the time, the position, the quaternion with w first unless the header says otherwise; velocities
 /// and biases may follow.
-fn euroc(line: &str, file: &str, number: usize, w_is_last: bool) -> Result<Option<Line>, TumError> {
+fn euroc(
+    line: &str,
+    file: &str,
+    number: usize,
+    columns: &EurocColumns,
+) -> Result<Option<Line>, TumError> {
     let spaced = line.replace(',', " ");
     let all = fields(&spaced);
     if all.is_empty() {
@@ -241,7 +289,11 @@ fn euroc(line: &str, file: &str, number: usize, w_is_last: bool) -> Result<Optio
     };
     let wrong =
         |place: usize, field: &str| fault(file, number, place, format!("`{field}`"), expected);
-    let stamp: i64 = time.1.parse().map_err(|_| wrong(time.0, time.1))?;
+    let t_s = match time.1.parse() {
+        Ok(stamp) if !columns.is_seconds => Exact::seconds(stamp),
+        _ if columns.is_seconds => seconds_of(time.1).ok_or_else(|| wrong(time.0, time.1))?,
+        _ => return Err(wrong(time.0, time.1)),
+    };
     let mut values = [0.0; 7];
     for (to, (place, field)) in values.iter_mut().zip(of_pose) {
         *to = field.parse().map_err(|_| wrong(*place, field))?;
@@ -249,13 +301,34 @@ fn euroc(line: &str, file: &str, number: usize, w_is_last: bool) -> Result<Optio
     finite(&values, of_pose, file, number)?;
     let [x, y, z, turn @ ..] = values;
     let [qx, qy, qz, qw] = turn;
+    let w_is_last = match columns.w_is_last {
+        Some(is_last) => is_last,
+        // EuRoC's own files have nanoseconds, or velocities after the quaternion.
+        None if columns.is_seconds && all.len() == 8 => {
+            let message = "seconds, commas, and no header that names the quaternion's parts".into();
+            let expected = "a first line with the order in the file: `#timestamp [s],x,y,z,qw,qx,qy,qz` or `#timestamp [s],x,y,z,qx,qy,qz,qw`";
+            return Err(fault(file, number, 1, message, expected));
+        }
+        None => false,
+    };
     let wxyz = if w_is_last { [qw, qx, qy, qz] } else { turn };
     Ok(Some(Line {
-        t_s: Exact::seconds(stamp),
+        t_s,
         position: [x, y, z],
         wxyz,
         places: [time.0, of_pose.get(3).map_or(1, |(place, _)| *place)],
     }))
+}
+
+/// Returns a decimal time in seconds; programs also write nanoseconds with a decimal point.
+fn seconds_of(field: &str) -> Option<f64> {
+    let time: f64 = field.parse().ok()?;
+    let seconds = if time >= NANOSECONDS {
+        time / 1e9
+    } else {
+        time
+    };
+    seconds.is_finite().then_some(seconds)
 }
 
 /// Reads a line of KITTI: the first three rows of a transform.
@@ -306,7 +379,7 @@ fn seconds(text: &[u8], file: &str) -> Result<Vec<f64>, TumError> {
             let message = format!("{} numbers", fields.len());
             return Err(fault(file, index + 1, 1, message, "one time, in seconds"));
         };
-        let time = field.parse().ok().filter(|time: &f64| time.is_finite());
+        let time = seconds_of(field);
         let message = || {
             fault(
                 file,
@@ -364,6 +437,41 @@ mod tests {
         );
         let [.., yaw] = first.unwrap().poses[0].level();
         assert!((yaw - 2.0 * 0.6f64.asin()).abs() < 1e-12, "{yaw}");
+    }
+
+    /// Exports of EuRoC's columns have decimal seconds; commas alone do not say which part of the quaternion is first.
+    #[test]
+    fn decimal_times_are_seconds() {
+        let of = |text: &str| read(text.as_bytes(), "t", None).map(|found| found.poses);
+        let expected = of(
+            "#timestamp [ns],x,y,z,qw\n1500000000,1,2,0,0.8,0,0,0.6\n2000000000,1,2,0,1,0,0,0\n",
+        )
+        .unwrap();
+        for text in [
+            "#timestamp [s],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []\r\n1.5,1,2,0,0.8,0,0,0.6\r\n2,1,2,0,1,0,0,0\r\n",
+            "\u{feff}time,tx,ty,tz,qx,qy,qz,qw\n1.5, 1, 2, 0, 0, 0, 0.6, 0.8\n2.0, 1, 2, 0, 0, 0, 0, 1\n",
+            "1.50000000,1,2,0,0.8,0,0,0.6,0,0,0,0,0,0,0,0,0\n2.0,1,2,0,1,0,0,0,0,0,0,0,0,0,0,0,0\n",
+        ] {
+            assert_eq!(of(text).unwrap(), expected, "{text}");
+        }
+        let whole = of("#timestamp [s],x,y,z,qw,qx,qy,qz\n3,1,2,0,1,0,0,0\n").unwrap();
+        assert_eq!(whole[0].t_s, 3.0);
+        let pandas =
+            of("timestamp,x,y,z,qw,qx,qy,qz\n1.4036365797635556e+18,1,2,0,1,0,0,0\n").unwrap();
+        assert!((pandas[0].t_s - 1_403_636_579.763_555_6).abs() < 1e-6);
+        for (text, words) in [
+            ("1.5,1,2,0,0,0,0,1\n", "#timestamp [s],x,y,z,qw,qx,qy,qz"),
+            (
+                "#timestamp [us],x,y,z,qw,qx,qy,qz\n15,1,2,0,1,0,0,0\n",
+                "nanoseconds or in seconds",
+            ),
+        ] {
+            let error = of(text).unwrap_err().to_string();
+            assert!(
+                error.starts_with("t:1:1: ") && error.contains(words),
+                "{error}"
+            );
+        }
     }
 
     #[test]

@@ -32,6 +32,12 @@ impl Stamped {
         let (_, _, yaw) = self.rotation.euler_angles();
         [self.position.x, self.position.y, yaw]
     }
+
+    /// Returns the cosine of the angle between the body's z axis and the world's.
+    #[must_use]
+    pub fn upright(&self) -> f64 {
+        (self.rotation * Vector3::z()).z
+    }
 }
 
 /// A fault in a trajectory file.
@@ -60,7 +66,7 @@ pub fn trajectory(text: &str, file: &str) -> Result<Vec<Stamped>, TumError> {
 }
 
 /// Times from here on are nanoseconds: those of 1973, or of the year 3 billion.
-const NANOSECONDS: f64 = 1e17;
+pub(super) const NANOSECONDS: f64 = 1e17;
 
 /// Eight numbers, and the character at which each begins.
 type Line = ([f64; 8], [usize; 8]);
@@ -74,8 +80,7 @@ pub(super) fn numbers(line: &str, file: &str, number: usize) -> Result<Option<Li
     }
     if let Some((column, field)) = fields.iter().find(|(_, field)| field.contains(',')) {
         let comma = field.chars().take_while(|letter| *letter != ',').count();
-        let expected = "blanks between 8 numbers: timestamp tx ty tz qx qy qz qw; commas are EuRoC's, with whole nanoseconds: timestamp, x, y, z, \
-                        qw, qx, qy, qz";
+        let expected = "blanks between 8 numbers: timestamp tx ty tz qx qy qz qw; commas are EuRoC's: timestamp, x, y, z, qw, qx, qy, qz";
         return Err(fault(file, number, column + comma, "`,`".into(), expected));
     }
     if fields.len() != 8 {

@@ -8,6 +8,7 @@ use crate::message::{
 };
 use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
+use posegate_files::printable::toml_key;
 use posegate_replay::recording::{
     BodyFrames, FrameNames, LivePose, LivePoses, LiveTransform, RecordingError,
 };
@@ -71,7 +72,8 @@ pub struct PoseReport {
 pub enum RefusedPose {
     /// The pose is that of a frame with an unknown place on the robot.
     #[error(
-        "poses are of the frame `{child}`, and its place on the robot is not known{known}: give --site FILE with [frame.{child}], or child_frame_id:={child} if it is the robot's base"
+        "poses are of the frame `{child}`, and its place on the robot is not known{known}: give --site FILE with [frame.{}], or child_frame_id:={child} if it is the robot's base",
+        toml_key(.child)
     )]
     ChildFrame {
         /// The frame.

@@ -96,7 +96,7 @@ pub(super) const COEFFICIENTS: Key = Key::new(
 );
 pub(super) const CALIBRATION: Key = Key::new(
     "calibration",
-    "a calibration of ROS, OpenCV, Kalibr, VINS, ORB-SLAM or PhotonVision, or a CameraInfo message as text, with a path relative to the site file's folder",
+    "a calibration of ROS, OpenCV, Kalibr, OKVIS, Basalt, VINS, ORB-SLAM or PhotonVision, or a CameraInfo message as text, with a path relative to the site file's folder",
     "\"front.yaml\"",
 );
 pub(super) const BORDER: Key = Key::number(

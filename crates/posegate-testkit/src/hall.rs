@@ -89,13 +89,18 @@ pub fn farthest([x, y]: [f64; 2], length: f64, swing: f64, [first, share]: [f64;
     let aligned = (from / PI).round() * PI;
     let spare = 0.5 * (swing - (last - from).abs());
     let headings = [from.min(last) - spare, from.max(last) + spare, from, last];
-    let ways = headings.into_iter().chain([aligned]).filter_map(|kept| {
-        let turned = (kept - from).abs() + (last - kept).abs();
-        let rest = swing - turned;
-        let ends = [(from, kept), (kept, last)];
-        let moving = ends.map(|(a, b): (f64, f64)| (integral(b) - integral(a)).abs());
-        (rest >= -1e-12).then(|| moving[0] + moving[1] + rest.max(0.0) * kept.cos().abs())
-    });
+    let ends = [from, last].map(|end| (end, integral(end)));
+    let ways = headings
+        .into_iter()
+        .chain([aligned])
+        .filter_map(|kept: f64| {
+            let rest = swing - ends.map(|(end, _)| (kept - end).abs()).iter().sum::<f64>();
+            (rest >= -1e-12).then(|| {
+                let at = integral(kept);
+                let moving = ends.map(|(_, end)| (at - end).abs());
+                moving[0] + moving[1] + rest.max(0.0) * kept.cos().abs()
+            })
+        });
     length / swing * ways.fold(0.0, f64::max)
 }
 
@@ -126,28 +131,33 @@ impl Believed {
     /// The robot drives as in [`farthest`].
     #[must_use]
     pub fn room(&self, length: f64, swing: f64) -> f64 {
-        let rooms = WALLS.map(|wall| self.room_before(wall, length, swing));
-        rooms.into_iter().fold(f64::INFINITY, f64::min)
+        self.rooms(length, swing)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
     }
 
-    fn room_before(&self, wall: [f64; 2], length: f64, swing: f64) -> f64 {
-        let along = |column: usize| wall[0] * self.x[column] + wall[1] * self.y[column];
-        let middle = wall[0] * self.mean[0] + wall[1] * self.mean[1];
-        let mut least = f64::INFINITY;
+    /// Returns the room before each wall.
+    fn rooms(&self, length: f64, swing: f64) -> [f64; 4] {
+        let along = WALLS.map(|[x, y]| [0, 1, 2].map(|k| x * self.x[k] + y * self.y[k]));
+        let middle = WALLS.map(|[x, y]| x * self.mean[0] + y * self.mean[1]);
+        let mut least = [f64::INFINITY; 4];
         for k in -20..=20 {
             let u = (f64::from(k) / 20.0 * std::f64::consts::FRAC_PI_2).sin();
             let r = (1.0 - u * u).max(0.0).sqrt();
-            let reach = along(0) * u + r * along(1).hypot(along(2));
+            let reach = along.map(|[first, a, b]| first * u + r * a.hypot(b));
+            let first = self.mean[2] + self.turn * u;
             for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
-                let first = self.mean[2] + self.turn * u;
                 let (s, c) = (first + swing * share).sin_cos();
-                let corners = CORNERS
-                    .map(|[vx, vy]| wall[0] * (c * vx - s * vy) + wall[1] * (s * vx + c * vy));
-                let corner = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                let at_rest = TO_WALL_M - middle - corner - reach;
-                // No drive leads farther than its length.
-                if at_rest - length < least {
-                    least = least.min(at_rest - farthest(wall, length, swing, [first, share]));
+                let corners = CORNERS.map(|[vx, vy]| [c * vx - s * vy, s * vx + c * vy]);
+                for (number, wall) in WALLS.into_iter().enumerate() {
+                    let tips = corners.map(|[x, y]| wall[0] * x + wall[1] * y);
+                    let corner = tips.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                    let at_rest = TO_WALL_M - middle[number] - corner - reach[number];
+                    // No drive leads farther than its length.
+                    if at_rest - length < least[number] {
+                        let left = at_rest - farthest(wall, length, swing, [first, share]);
+                        least[number] = least[number].min(left);
+                    }
                 }
             }
         }
@@ -160,8 +170,8 @@ impl Believed {
         let (s, c) = direction.sin_cos();
         (self.mean[0], self.mean[1]) = (0.0, 0.0);
         let mut way = 3.0_f64;
-        for wall in WALLS {
-            let left = self.room_before(wall, length, swing) - room;
+        for (wall, before) in WALLS.into_iter().zip(self.rooms(length, swing)) {
+            let left = before - room;
             if left < 0.0 {
                 return None;
             }

@@ -6,7 +6,7 @@ use posegate::confidence::radius_squared;
 use posegate_files::files::{Files, Input};
 use posegate_replay::KnownTags;
 use posegate_replay::corners::MountedCamera;
-use posegate_replay::recording::format_of;
+use posegate_replay::recording::{format_of, is_folder};
 use posegate_replay::tables::{Played, Table};
 use posegate_site::Site;
 use std::io::Read;
@@ -186,8 +186,11 @@ fn open(
 
 /// Returns `true` if an input is a bag: a folder, or a file that begins like one.
 fn is_bag(files: &Files, log: &Input) -> Result<bool, Failure> {
+    if is_folder(log.as_path()) {
+        return Ok(true);
+    }
     if log.is_standard() || !log.as_path().is_file() {
-        return Ok(log.as_path().is_dir());
+        return Ok(false);
     }
     let mut start = Vec::new();
     let opened = files.open(log)?;

@@ -8,9 +8,10 @@ use posegate_files::printable::printable;
 use posegate_replay::corners::MountedCamera;
 use posegate_replay::recording::{
     BAD_FOLDER, Bag, BagFile, BodyFrames, Format, ReaderDiagnostics, Recording, Role, TagLocalizer,
-    Text, Wanted, files_of, format_of,
+    Text, Wanted, files_of, format_of, is_folder,
 };
 use posegate_replay::replay::{Clock, Part};
+use posegate_replay::tum::Stamped;
 use posegate_replay::{Columns, KnownTags, Trajectory, estimates, trajectories};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -168,7 +169,7 @@ struct Beginning {
 impl Source {
     fn open(reading: &Reading<'_>, files: &Files) -> Result<Self, Failure> {
         let log = reading.log;
-        if log.as_path().is_dir() {
+        if is_folder(log.as_path()) {
             let paths =
                 files_of(log.as_path()).map_err(|fault| Failure::usage(fault, BAD_FOLDER))?;
             let lengths = paths.iter().filter_map(|path| path.metadata().ok());
@@ -191,6 +192,7 @@ impl Source {
             name: name.clone(),
             cause,
         })?;
+        refuse_other(start, &name)?;
         Ok(Self {
             format: format_of(start),
             input: Beginning { reader },
@@ -198,6 +200,24 @@ impl Source {
             length,
         })
     }
+}
+
+/// Refuses files that are no recordings but are often given as one.
+fn refuse_other(start: &[u8], name: &str) -> Result<(), Failure> {
+    let (what, help) = if start.starts_with(b"\x1f\x8b") || start.starts_with(b"PK") {
+        (
+            "is packed by gzip or zip",
+            "unpack it, and give what was in it",
+        )
+    } else if start.trim_ascii_start().starts_with(b"header:") {
+        (
+            "is the text of `ros2 topic echo`",
+            "record the topic: `ros2 bag record TOPIC`",
+        )
+    } else {
+        return Ok(());
+    };
+    Err(Failure::usage(format!("{} {what}", printable(name)), help))
 }
 
 impl Beginning {
@@ -312,6 +332,7 @@ fn truth(reading: &Reading<'_>, files: &Files, is_bag: bool) -> Result<Truth, Fa
                 .map(|(text, name)| (text.as_slice(), name.as_str()));
             let mut found = trajectories::read(&bytes, &name, times).map_err(Failure::input)?;
             duplicates = found.duplicates;
+            refuse_tilted(&found.poses, &name)?;
             for pose in &mut found.poses {
                 pose.position.x -= east;
                 pose.position.y -= north;
@@ -330,6 +351,23 @@ fn truth(reading: &Reading<'_>, files: &Files, is_bag: bool) -> Result<Truth, Fa
         duplicates,
         ..Truth::default()
     })
+}
+
+/// Refuses a truth most of whose poses lie on their side: its headings would be those of another axis.
+fn refuse_tilted(poses: &[Stamped], name: &str) -> Result<(), Failure> {
+    let is_tilted = |pose: &&Stamped| pose.upright() < core::f64::consts::FRAC_1_SQRT_2;
+    let tilted = poses.iter().filter(is_tilted).count();
+    if 2 * tilted <= poses.len() {
+        return Ok(());
+    }
+    Err(Failure::usage(
+        format!(
+            "--truth {}: {tilted} of {} poses are tilted by more than 45 degrees",
+            printable(name),
+            poses.len()
+        ),
+        "check the order of the quaternion (TUM: qx qy qz qw; EuRoC: qw, qx, qy, qz); the truth is the pose of the robot's base, with z up",
+    ))
 }
 
 /// Reads the times of a KITTI trajectory. Returns the file and its name.

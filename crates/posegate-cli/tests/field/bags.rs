@@ -101,7 +101,13 @@ fn every_storage_gives_the_same_summary() {
     {
         assert_eq!(replayed(&case, log), expected, "{log}");
     }
-    for log in ["single", "listed", "older", "packed/"] {
+    for log in [
+        "single",
+        "listed",
+        "listed/metadata.yaml",
+        "older",
+        "packed/",
+    ] {
         assert_eq!(replayed(&case, log), expected, "{log}");
     }
     // A split recording: only the second file has the picture.

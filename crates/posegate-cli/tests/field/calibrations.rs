@@ -198,6 +198,12 @@ fn unlikely_numbers_are_warnings_with_the_number() {
         "{message}"
     );
     assert!(warning["line"].is_u64());
+    let plain = ros("distortion_model: plumb_bob\n", &[0.0; 5]);
+    // Millimetres; thousandths of pixels; binned rows.
+    for (fx, fy) in [("4.0", "4.0"), ("520500", "521000"), ("260", "521")] {
+        let odd = plain.replace("520.5", fx).replace("521", fy);
+        assert_eq!(codes(&odd), ["focal_length_odd"], "{fx}");
+    }
     // At 14 % nothing is said.
     is_read(&ros("distortion_model: plumb_bob\n", &[0.0; 5]).replace("322", "231"));
     let folded = ros("distortion_model: plumb_bob\n", &[-0.5, 0.0, 0.0, 0.0, 0.0]);
@@ -390,11 +396,171 @@ fn settings_of_orb_slam_are_read() {
 }
 
 #[test]
-fn files_of_other_kinds_say_what_to_use() {
-    refused(
-        "<?xml version=\"1.0\"?>\n<opencv_storage>\n</opencv_storage>\n",
-        &["c.yaml:1", "is XML", ".yml"],
+fn xml_of_opencv_is_read_as_its_yaml() {
+    let sample = "<?xml version=\"1.0\"?>\n<opencv_storage>\n<calibration_time>\"Sat 28 Nov 2026 10:00:00 AM UTC\"</calibration_time>\n<nr_of_frames>25</nr_of_frames>\n<image_width>640</image_width>\n<image_height>480</image_height>\n<!-- made by hand -->\n<camera_matrix type_id=\"opencv-matrix\">\n  <rows>3</rows>\n\t<cols>3</cols>\n  <dt>d</dt>\n  <data>\n    5.205e+02 0. 322. 0. 521. 2.385e+02 0.\n    0. 1.</data></camera_matrix>\n<distortion_coefficients type_id=\"opencv-matrix\">\n  <rows>5</rows><cols>1</cols><dt>d</dt>\n  <data>1.e-01 -2.e-01 1.e-03 2.e-03 0.</data></distortion_coefficients>\n<avg_reprojection_error>3.1e-01</avg_reprojection_error>\n<distortion_model>plumb_bob</distortion_model><grid_points/>\n</opencv_storage>\n";
+    is_read(sample);
+    is_read(&format!("\u{feff}{}", sample.replace('\n', "\r\n")));
+    let size = "<image_width>640</image_width>\n<image_height>480</image_height>";
+    is_read(&sample.replace(size, "<image_size>640 480</image_size>"));
+    is_read(&sample.replace(size, "<image_size><_>640</_><_>480</_></image_size>"));
+    assert_eq!(
+        codes(&sample.replace("3.1e-01", "3.1")),
+        ["calibration_rms"]
     );
+    for (from, to, words) in [
+        ("5.205e+02", "x", &["c.yaml:13", "found `x`"][..]),
+        ("5.205e+02", ".Nan", &["c.yaml:13", "calibrate again"]),
+        (
+            "5.205e+02 0.",
+            "5.205e+02",
+            &["c.yaml:13", "camera_matrix has 8 numbers"],
+        ),
+        (
+            "<rows>3</rows>",
+            "3 <rows>3</rows>",
+            &["c.yaml:9", "beside elements"],
+        ),
+        (
+            "<nr_of_frames>25</nr_of_frames>",
+            "<image_width>641</image_width>",
+            &["c.yaml:5", "twice, first in line 4"],
+        ),
+        (
+            "</opencv_storage>",
+            "",
+            &["c.yaml:2", "<opencv_storage> has no end"],
+        ),
+        (
+            "</data></camera_matrix>",
+            "</camera_matrix>",
+            &["c.yaml:14", "not read"],
+        ),
+        (
+            "opencv_storage",
+            "calibration",
+            &["c.yaml:2", "<calibration>", "<opencv_storage>"],
+        ),
+    ] {
+        refused(&sample.replace(from, to), words);
+    }
+}
+
+#[test]
+fn settings_of_okvis_are_read() {
+    let camera = "     - {T_SC: [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],\n        image_dimension: [752, 480],\n        distortion_coefficients: [-0.28, 0.07, 0.0002, 0.00002],\n        distortion_type: radialtangential,\n        focal_length: [458.5, 457.5],\n        principal_point: [367.0, 248.5]}\n";
+    let one = format!("%YAML:1.0\ncameras:\n{camera}imu_params:\n    rate: 200\n");
+    is_read(&one);
+    is_read(&one.replace("radialtangential", "equidistant"));
+    refused(
+        &one.replace("458.5", "0.0"),
+        &["c.yaml:7", "focal lengths are 0 and"],
+    );
+    refused(
+        &one.replace("radialtangential", "fov"),
+        &["`fov` is not known"],
+    );
+    refused(
+        &one.replace("image_dimension", "dimension"),
+        &["`image_dimension` is missing", "width_px"],
+    );
+    let two = one.replace("imu_params", &format!("{camera}imu_params"));
+    refused(&two, &["`cam0`, `cam1`", "FILE#cam0"]);
+}
+
+#[test]
+fn calibrations_of_basalt_are_read() {
+    let file = |model: &str, terms: &str| {
+        format!(
+            "{{\"value0\": {{\"T_imu_cam\": [], \"intrinsics\": [{{\"camera_type\": \"{model}\", \"intrinsics\": {{\"fx\": 349.5, \"fy\": 348.5, \"cx\": 365.5, \"cy\": 249.5{terms}}}}}], \"resolution\": [[752, 480]]}}}}"
+        )
+    };
+    let kb4 = file(
+        "kb4",
+        ", \"k1\": -0.01, \"k2\": 0.02, \"k3\": 0.001, \"k4\": 0.0",
+    );
+    is_read(&kb4);
+    is_read(&file("pinhole", ""));
+    is_read(&file(
+        "pinhole-radtan8",
+        ", \"k1\": -0.01, \"k2\": 0.02, \"p1\": 0, \"p2\": 0, \"k3\": 0, \"k4\": 0.1, \"k5\": 0, \"k6\": 0",
+    ));
+    refused(
+        &file("ds", ", \"xi\": -0.2, \"alpha\": 0.5"),
+        &["`ds` is not supported", "kb4"],
+    );
+    refused(&kb4.replace("349.5", "-1"), &["fx is -1"]);
+    refused(&kb4.replace("\"k3\"", "\"k5\""), &["`k3` is missing"]);
+    refused(
+        &kb4.replace("[[752, 480]]", "[]"),
+        &["`resolution` is missing"],
+    );
+}
+
+#[test]
+fn notations_of_other_versions_are_read() {
+    let plumb = ros(
+        "distortion_model: plumb_bob\n",
+        &[0.1, -0.2, 0.001, 0.002, 0.0],
+    );
+    // OpenCV writes a number of type double with a point.
+    is_read(&plumb.replace("640", "640.").replace("480", "4.8e+02"));
+    refused(
+        &plumb.replace("640", "640.5"),
+        &["found `640.5`", "a whole number"],
+    );
+    // stella_vslam nests the keys of OpenVSLAM.
+    is_read(
+        "Camera:\n  model: perspective\n  fx: 458.5\n  fy: 457.5\n  cx: 367.0\n  cy: 248.5\n  k1: -0.28\n  k2: 0.07\n  p1: 0.0001\n  p2: 0.0\n  k3: 0.0\n  cols: 752\n  rows: 480\n",
+    );
+    refused("[image]\nwidth\n640\n", &["INI", "ost.yaml"]);
+    let chain = "cam0:\n  camera_model: pinhole\n  intrinsics: [458.0, 457.0, 367.0, 248.0]\n  distortion_model: radtan\n  distortion_coeffs: [-0.28, 0.07, 0.0, 0.0]\n";
+    refused(chain, &["`cam0.resolution` is missing", "width_px"]);
+}
+
+/// A month in the words of the user's language, in an older encoding; the numbers are plain.
+#[test]
+fn dates_may_have_any_encoding() {
+    let text = format!(
+        "# M\u{e4}rz\n{}",
+        ros("distortion_model: plumb_bob\n", &[0.0; 5])
+    );
+    let latin_1: Vec<u8> = text
+        .chars()
+        .map(|letter| u8::try_from(u32::from(letter)).expect("Latin 1"))
+        .collect();
+    let of = |bytes: &[u8]| {
+        let site = "[camera.front]\ncalibration = \"c.yaml\"\nmount = { x = 0.2, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }\n";
+        Case::new(&[("site.toml", site.as_bytes()), ("c.yaml", bytes)])
+            .run("check site.toml --json")
+    };
+    assert_eq!(of(&latin_1).json(0)["warnings"], serde_json::json!([]));
+    let utf_16: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    of(&utf_16).is_refused_with(&["not UTF-8", "encoding UTF-8"]);
+}
+
+#[test]
+fn lost_messages_of_an_echo_are_left_out() {
+    let message = "header:\n  frame_id: optical\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\nd: [0.1, -0.2, 0.0, 0.0, 0.0]\nk: [520.5, 0.0, 322.0, 0.0, 521.0, 238.5, 0.0, 0.0, 1.0]\n---\n";
+    let loss = "A message was lost!!!\n\ttotal count change:1\n\ttotal count: 1---\n";
+    let checked = check(&format!("{loss}{message}{loss}"), "--json").json(0);
+    assert_eq!(
+        checked["warnings"].as_array().map(Vec::len),
+        Some(1),
+        "{checked}"
+    );
+    let words = checked["warnings"][0]["message"]
+        .as_str()
+        .expect("a message");
+    assert!(words.contains("2 times"), "{words}");
+    // The line of a fault is that of the file.
+    refused(
+        &format!("{loss}{}", message.replace("640", "x")),
+        &["c.yaml:7:8"],
+    );
+}
+
+#[test]
+fn files_of_other_kinds_say_what_to_use() {
     refused(
         "# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n",
         &["INI", "ost.yaml"],

@@ -204,3 +204,22 @@ fn faults_of_parameters_are_named() {
         refused(&changed, "", &["d.yaml", words]);
     }
 }
+
+/// Other units are not seen in a file, but their numbers are unlikely.
+#[test]
+fn unlikely_numbers_are_remarks() {
+    let turned = import(&DATABASE.replace("2.0, 1.0]", "2.0, 5.0]"), "");
+    assert!(has_remark(&turned, "5 radians, -73.5 degrees"), "{turned}");
+    let far = import(&DATABASE.replace("1.0, 2.0", "1000.0, 2000.0"), "");
+    assert!(has_remark(&far, "`a` is 2236 m from the origin"), "{far}");
+    refused(
+        &PARAMETERS.replace("threshold: 0.03", "threshold: 30"),
+        "",
+        &["d.yaml:7", "docking_threshold is 30", "for 50 mm"],
+    );
+    refused(
+        &DATABASE.replace("docks:\n", ""),
+        "",
+        &["the file has no `docks`", "write `docks:` above"],
+    );
+}

@@ -53,7 +53,20 @@ fn limelight_map_is_read_with_its_own_sizes() {
     // With WPILib's origin.
     let moved = import(map, "--format fmap --pose x=8,y=4");
     assert_eq!(moved["tags"][0]["pose"]["x"], 5.5);
+    for (written, family) in [
+        ("standard41h12", "tagStandard41h12"),
+        ("apriltag3_circle49h12_classic", "tagCircle49h12"),
+        ("tag36h11", "tag36h11"),
+    ] {
+        let named = map.replace("apriltag3_16h5_classic", written);
+        assert_eq!(import(&named, "--format fmap")["tags"][0]["family"], family);
+    }
     for (from, to, words) in [
+        (
+            "apriltag3_16h5_classic",
+            "aruco_4x4",
+            "`fiducials[0].family` is not a known family",
+        ),
         ("152.4", "0.1524", "millimetres"),
         ("0,-1,0,-2.5", "0,-2,0,-2.5", "has no rotation"),
         ("0,0,0,1]", "0,0,0,2]", "last row"),
@@ -64,4 +77,17 @@ fn limelight_map_is_read_with_its_own_sizes() {
         case.run("import map --format fmap")
             .is_refused_with(&["map:", words]);
     }
+}
+
+#[test]
+fn layout_in_inches_is_a_remark() {
+    let inches = layout("tags", "field")
+        .replace("12.0", "651.0")
+        .replace("6.0", "323.0")
+        .replace("3.5", "600.0");
+    let found = import(&inches, "--format wpilib --size 0.2 --family 36h11");
+    let words = found["remarks"][0].as_str().expect("a remark");
+    assert!(words.contains("`t11` is 600 m from the origin"), "{words}");
+    // The name without its beginning is that of the known family.
+    assert_eq!(found["tags"][0]["family"], "tag36h11");
 }

@@ -100,6 +100,27 @@ fn public_trajectories_are_the_truth_and_the_recording() {
     }
 }
 
+/// With w first the heading would be read as a roll.
+#[test]
+fn truth_in_another_order_of_the_quaternion_is_refused() {
+    let site = include_str!("../../../../examples/sites/dock.toml");
+    let mut bag = Bag::new(None, true);
+    bag.pose("/amcl_pose", &Pose::AT_DOCK);
+    let case = Case::new(&[
+        ("site.toml", site.as_bytes()),
+        ("drive.mcap", &bag.finish()),
+        ("truth.txt", b"1 0 0 0 0.8 0 0 0.6\n2 0 0 0 1 0 0 0\n"),
+        ("drive.mcap.gz", b"\x1f\x8b\x08\x00"),
+        ("echo.yaml", b"header:\n  stamp:\n    sec: 5\n"),
+    ]);
+    case.run("replay site.toml drive.mcap --task dock --topic /amcl_pose --truth truth.txt")
+        .is_refused_with(&["2 of 2 poses are tilted", "qx qy qz qw"]);
+    case.run("replay site.toml drive.mcap.gz --task dock --topic /amcl_pose")
+        .is_refused_with(&["packed by gzip", "unpack it"]);
+    case.run("replay site.toml echo.yaml --task dock")
+        .is_refused_with(&["the text of `ros2 topic echo`", "ros2 bag record"]);
+}
+
 /// OKVIS has EuRoC's columns with w last, ORB-SLAM3 has TUM's with nanoseconds.
 #[test]
 fn relatives_of_the_formats_are_read() {
@@ -153,9 +174,8 @@ fn commas_and_headers_of_other_files_are_named() {
         ("names.txt", b"time x y z qx qy qz qw\n1.5 0 0 0 0 0 0 1\n"),
     ]);
     case.run("metrics good.txt commas.csv").is_refused_with(&[
-        "commas.csv:1:4: `,`",
-        "blanks between 8 numbers",
-        "whole nanoseconds",
+        "commas.csv:1:1: seconds, commas, and no header",
+        "#timestamp [s],x,y,z,qw,qx,qy,qz",
     ]);
     case.run("metrics good.txt names.txt")
         .is_refused_with(&["names.txt:1:1: `time`", "a header begins with #"]);

@@ -69,9 +69,13 @@ const PARAMETERS: &str = "/**:\n  docking_server:\n    ros__parameters:\n      d
     \x20       dock_direction: backward\n      docks: [home, b]\n      home: {type: charger, frame: map, pose: [1.5, -2.0, 1.57]}\n      b.pose: [0.5, 1.0, 0.0]\n";
 const OPENCV: &str = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 6.0e+02, 0., 3.2e+02, 0., 6.0e+02, 2.4e+02, 0., 0., 1. ]\n\
     distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 1.0e-01, -2.0e-01, 0., 0., 0. ]\navg_reprojection_error: 1.4\n";
+const XML: &str = "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_size>640 480</image_size>\n<camera_matrix type_id=\"opencv-matrix\">\n  <rows>3</rows>\n  <cols>3</cols>\n  <dt>d</dt>\n  <data>\n    6.0e+02 0. 3.2e+02 0. 6.0e+02 2.4e+02 0. 0. 1.</data></camera_matrix>\n\
+    <dist_coeffs><_>0.1</_><_>-0.2</_><_>0</_><_>0</_></dist_coeffs>\n<rms>\"1.4\"</rms><!-- a &amp; b --><images/>\n</opencv_storage>\n";
+const OKVIS: &str = "cameras:\n  - {T_SC: [1.0, 0.0], image_dimension: [640, 480],\n     distortion_coefficients: [-0.1, 0.07, 0.0002, 0.00002], distortion_type: radialtangential,\n     focal_length: [458.5, 457.5],\n     principal_point: [322.0, 248.5]}\n";
+const BASALT: &str = "{\"value0\": {\"intrinsics\": [{\"camera_type\": \"kb4\", \"intrinsics\": {\"fx\": 349.5, \"fy\": 348.5, \"cx\": 325.5, \"cy\": 249.5, \"k1\": -0.01, \"k2\": 0.02, \"k3\": 0, \"k4\": 0}}], \"resolution\": [[640, 480]]}}";
 const VINS: &str = "%YAML:1.0\nmodel_type: PINHOLE\ncamera_name: c\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n  k1: -0.29\n  k2: 0.08\n  p1: 0.0001\n  p2: 0.0\nprojection_parameters:\n  fx: 461.0\n  fy: 460.0\n  cx: 363.0\n  cy: 248.0\n";
 const ECHO: &str = "header:\n  frame_id: c\nheight: 480\nwidth: 640\ndistortion_model: rational_polynomial\nd: [0.1, 0.2, 0.0, 0.0, 0.01, 0.3, 0.1, 0.02, 0.0, 0.0, 0.0, 0.0]\nk: [600.0, 0.0, 320.0, 0.0, 600.0, 240.0, 0.0, 0.0, 1.0]\n\
-    binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, y_offset: 0, height: 480, width: 640}\n---\nheader: 1\n";
+    binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, y_offset: 0, height: 480, width: 640}\n---\nA message was lost!!!\n\ttotal count change:1\n\ttotal count: 1---\nheader: 1\n";
 const PHOTON: &str = "{\"resolution\":{\"width\":640.0,\"height\":480.0},\"cameraIntrinsics\":{\"rows\":3,\"cols\":3,\"type\":6,\"data\":[600,0,320,0,600,240,0,0,1]},\"distCoeffs\":{\"rows\":1,\"cols\":5,\"type\":6,\"data\":[0.1,-0.2,0,0,0]}}";
 const PHOTON_OLD: &str = "{\"resolution\":{\"width\":640,\"height\":480},\"cameraIntrinsics\":{\"data\":[600,0,320,0,600,240,0,0,1]},\"cameraExtrinsics\":{\"data\":[0.01,-0.02,0,0]},\"isFisheye\":true}";
 const ORB_SLAM: &str = "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera1.fx: 517.5\nCamera1.fy: 516.5\nCamera1.cx: 318.5\nCamera1.cy: 255.5\nCamera1.k1: 0.26\nCamera1.k2: -0.2\nCamera1.p1: -0.005\nCamera1.p2: 0.002\nCamera1.k3: 0.1\n\
@@ -283,6 +287,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
                     "timestamp, p_x, p_y, p_z, q_x, q_y, q_z, q_w, v_x\n{}",
                     euroc()
                 ),
+                "#timestamp [s],x,y,z,qw,qx,qy,qz\n0.5,1,2,0,1,0,0,0\n1.5,1,2.5,0,0.8,0,0,0.6\n",
             ]),
             &[
                 "metrics {} trajectory.txt --json",
@@ -360,11 +365,12 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             ],
         ),
         format(
-            "calibrations YAML",
+            "calibrations YAML and XML",
             Text,
             "mutant.yaml",
             text(&[
-                ROS, KALIBR, OPENCV, VINS, ECHO, PHOTON, PHOTON_OLD, ORB_SLAM, ROWS, SENSOR,
+                ROS, KALIBR, OPENCV, XML, OKVIS, BASALT, VINS, ECHO, PHOTON, PHOTON_OLD, ORB_SLAM,
+                ROWS, SENSOR,
             ]),
             &["check calibrated.toml", "check calibrated.toml --json"],
         ),

@@ -16,15 +16,25 @@ const ENDINGS: [&str; 5] = [".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd"];
 /// The most files of a bag.
 const MOST_FILES: usize = 1 << 14;
 
-/// Returns the files of a bag: the path itself, or the files of a folder in the order of its `metadata.yaml`. A folder without one may have a
-/// single recording.
+/// Returns `true` for a folder, and for the `metadata.yaml` of one.
+#[must_use]
+pub fn is_folder(path: &Path) -> bool {
+    path.is_dir() || path.file_name().is_some_and(|name| name == METADATA) && path.is_file()
+}
+
+/// Returns the files of a bag: the path itself, or the files of a folder in the order of its `metadata.yaml`, which may be named instead. A
+/// folder without one may have a single recording.
 ///
 /// # Errors
 /// A description of the fault; [`BAD_FOLDER`] says what to do.
 pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, String> {
-    if !path.is_dir() {
+    if !is_folder(path) {
         return Ok(vec![path.to_owned()]);
     }
+    let path = match path.parent() {
+        Some(folder) if !path.is_dir() => folder,
+        _ => path,
+    };
     let list = path.join(METADATA);
     if !list.is_file() {
         return only_recording(path);

@@ -1,5 +1,7 @@
 //! Detects the format of a file from its first bytes.
 
+use crate::trajectories::names_quaternion;
+
 /// The format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -10,7 +12,7 @@ pub enum Format {
     Csv,
     /// TUM: eight numbers per line.
     Tum,
-    /// EuRoC: nanoseconds and seven numbers per line, separated by commas.
+    /// EuRoC: the time and seven numbers per line, separated by commas.
     Euroc,
     /// KITTI: twelve numbers per line, without times.
     Kitti,
@@ -31,7 +33,8 @@ impl Format {
 }
 
 /// Returns the format of a file from its first bytes. A text has a header if its first line has a letter that is
-/// not part of a number. The header of a EuRoC trajectory begins with `timestamp`, also without the `#` of a comment.
+/// not part of a number. The header of a EuRoC trajectory begins with a time and names the parts of a quaternion, also without the `#` of a
+/// comment.
 #[must_use]
 pub fn format_of(start: &[u8]) -> Format {
     if start.starts_with(b"\x89MCAP") {
@@ -46,16 +49,25 @@ pub fn format_of(start: &[u8]) -> Format {
     if start.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
         return Format::Zstd;
     }
-    let mut lines = start
-        .split(|byte| *byte == b'\n')
-        .map(|line| line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line))
-        .filter(|line| !line.trim_ascii().is_empty() && !line.trim_ascii_start().starts_with(b"#"));
+    let names = |line: &[u8]| {
+        let header = String::from_utf8_lossy(line).to_ascii_lowercase();
+        let mut orders = ["wxyz", "xyzw"].iter();
+        orders.any(|order| names_quaternion(&header, order))
+    };
+    let all = || {
+        let lines = start.split(|byte| *byte == b'\n');
+        lines.map(|line| line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line))
+    };
+    let is_comment = |line: &&[u8]| {
+        let line = line.trim_ascii_start();
+        line.is_empty() || line.starts_with(b"#")
+    };
+    let is_named = all().take_while(is_comment).any(names);
+    let mut lines = all().filter(|line| !is_comment(line));
     let Some(first) = lines.next() else {
         return Format::Tum;
     };
-    let is_timestamp = first.trim_ascii().starts_with(b"timestamp");
-    let turn = first.split(|byte| *byte == b',').nth(4).unwrap_or_default();
-    let is_header = is_timestamp && turn.trim_ascii().starts_with(b"q");
+    let is_header = first.to_ascii_lowercase().starts_with(b"t") && names(first);
     if is_header && lines.next().map(format_of) == Some(Format::Euroc) {
         return Format::Euroc;
     }
@@ -66,11 +78,17 @@ pub fn format_of(start: &[u8]) -> Format {
             text.is_some_and(|text| text.trim().parse::<f64>().is_ok())
         };
         let mut fields = first.split(|byte| *byte == b',');
+        let count = fields.clone().count();
         let time = fields.next().unwrap_or_default().trim_ascii();
         let is_whole = !time.is_empty() && time.iter().all(u8::is_ascii_digit);
-        // Twelve are the rows of a KITTI pose with commas.
-        let is_kitti = first.split(|byte| *byte == b',').count() == 12;
-        return if is_whole && first.contains(&b',') && !is_kitti && fields.all(number) {
+        let is_pose = match count {
+            // Twelve are the rows of a KITTI pose with commas.
+            1 | 12 => false,
+            // With velocities and biases.
+            8 | 17 => number(time),
+            _ => is_whole || number(time) && is_named,
+        };
+        return if is_pose && fields.all(number) {
             Format::Euroc
         } else {
             Format::Csv
@@ -113,6 +131,10 @@ mod tests {
                 b"timestamp,t_s,x_m,y_m,yaw_rad\n1500000000,1.5,0.1,0,0\n",
                 Format::Csv,
             ),
+            (b"#timestamp [s],x,y,z,q_w,q_x,q_y,q_z\r\n1403636579.763,0.1,0.2,0.3,1,0,0,0,0,0\r\n", Format::Euroc),
+            (b"Time,tx,ty,tz,qx,qy,qz,qw\n1.5,0.1,0.2,0.3,0,0,0,1\n", Format::Euroc),
+            (b"1.5,0.1,0.2,0.3,1,0,0,0\n", Format::Euroc),
+            (b"1.5,0.1,0.2,0.3,0.01,0,0,0.01,0,0.01\n", Format::Csv),
             (b"1 0 0 0.1 0 1 0 0.2 0 0 1 0\n", Format::Kitti),
             (b"\x28\xb5\x2f\xfd", Format::Zstd),
         ] {

@@ -24,7 +24,7 @@
 pub use self::body::BodyFrames;
 pub use self::diagnostics::{ReaderDiagnostics, SkipReason, Skipped};
 pub use self::findings::Findings;
-pub use self::folder::{BAD_FOLDER, files_of};
+pub use self::folder::{BAD_FOLDER, files_of, is_folder};
 pub use self::intake::{Role, Wanted};
 pub use self::kind::{Format, format_of};
 pub use self::live::{LivePose, LivePoses, LiveTransform};

@@ -78,6 +78,9 @@ fn pose_of_another_frame_is_refused_or_moved_to_the_base() {
         words.contains("[frame.antenna]") && words.contains("child_frame_id:=antenna"),
         "{words}"
     );
+    let refused = plain.odometry(&odometry("robot1/gps", 0.0, 1e-4)).pose;
+    let words = refused.unwrap_err().to_string();
+    assert!(words.contains("[frame.\"robot1/gps\"]"), "{words}");
     let mut named = poses(&format!("{STILL} -p child_frame_id:=robot1/base_link"));
     assert!(
         named

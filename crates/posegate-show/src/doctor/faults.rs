@@ -17,6 +17,10 @@ pub const IMPOSSIBLE_ERROR: &str = "error_bound_impossible";
 const STEEP: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// The farthest that an optical axis is from the middle of an image, as a share of its width or height.
 const FARTHEST_AXIS: f64 = 0.15;
+/// The focal lengths of cameras, as shares of the image's width and height: angles of view from 180 degrees down to 2.
+const FOCAL_SHARES: [f64; 2] = [0.1, 30.0];
+/// The largest ratio of a camera's focal lengths: of a sensor that is binned in one direction.
+const LARGEST_ASPECT: f64 = 1.5;
 /// A wall that begins higher is above the robot, metres.
 const FLOOR: f64 = 0.05;
 
@@ -50,6 +54,7 @@ pub(super) fn warnings(site: &Site, findings: &Findings) -> Vec<Warning> {
     }
     for (name, camera) in &site.cameras {
         all.extend(off_centre(name, &camera.calibration));
+        all.extend(odd_focal_length(name, &camera.calibration));
     }
     all.extend(site.remarks.iter().map(|remark| {
         let [kind, name] = &remark.about;
@@ -81,6 +86,27 @@ fn off_centre(name: &str, calibration: &Calibration) -> Option<Warning> {
                 ["width", "height"][axis]
             ),
             "check that the calibration is of this resolution, and not of a cropped or binned image",
+        )
+    })
+}
+
+/// Returns a warning if a focal length cannot be in pixels, as one in millimetres, or those of rows and columns differ.
+fn odd_focal_length(name: &str, calibration: &Calibration) -> Option<Warning> {
+    let Calibration {
+        size_px, focal_px, ..
+    } = calibration;
+    let [least, most] = FOCAL_SHARES;
+    let is_odd = |axis: usize| !(least..=most).contains(&(focal_px[axis] / size_px[axis]));
+    let [fx, fy] = *focal_px;
+    (is_odd(0) || is_odd(1) || fx.max(fy) > LARGEST_ASPECT * fx.min(fy)).then(|| {
+        warn(
+            "focal_length_odd",
+            ["camera", name],
+            format!(
+                "its focal lengths are {fx} px and {fy} px, its image is {} x {} px",
+                size_px[0], size_px[1]
+            ),
+            "check that they are in pixels, and of this resolution",
         )
     })
 }

@@ -1,6 +1,6 @@
 //! Kalibr's camchain, and those of OpenVINS and TagSLAM: several cameras in one file. EuRoC's `sensor.yaml`: the same keys of one camera.
 
-use super::{ParsedCalibration, is_camera, lens_of_file};
+use super::{ParsedCalibration, is_camera, lens_of_file, listed_size};
 use crate::error::SiteError;
 use crate::suggest;
 use crate::yaml::{Document, Map, Node};
@@ -12,6 +12,7 @@ pub(super) fn read(
     document: &Document<'_>,
     file: Map<'_>,
     name: Option<&str>,
+    site_px: [Option<f64>; 2],
 ) -> Result<ParsedCalibration, SiteError> {
     // Users add keys of their own: transforms, notes.
     let mut cameras = file.sorted();
@@ -35,7 +36,8 @@ pub(super) fn read(
             .expected(format!("one of {}", names()))
             .help("write `calibration = \"FILE#cam0\"`"));
     };
-    of_camera(document, name, document.map(camera)?, camera.at.clone())
+    let keys = document.map(camera)?;
+    of_camera(document, name, keys, camera.at.clone(), site_px)
 }
 
 /// Returns `true` if the file has the keys of one camera.
@@ -47,8 +49,9 @@ pub(super) fn is_of(keys: Map<'_>) -> bool {
 pub(super) fn read_one(
     document: &Document<'_>,
     keys: Map<'_>,
+    site_px: [Option<f64>; 2],
 ) -> Result<ParsedCalibration, SiteError> {
-    of_camera(document, "the file", keys, 0..0)
+    of_camera(document, "the file", keys, 0..0, site_px)
 }
 
 fn of_camera(
@@ -56,6 +59,7 @@ fn of_camera(
     name: &str,
     keys: Map<'_>,
     at: Range<usize>,
+    site_px: [Option<f64>; 2],
 ) -> Result<ParsedCalibration, SiteError> {
     let required = |key: &str| {
         document.required(
@@ -86,10 +90,12 @@ fn of_camera(
             .expected("fu, fv, pu, pv in pixels, fu and fv above 0")
             .help("calibrate again"));
     }
-    let resolution = required("resolution")?;
-    let size_px: [f64; 2] = document.numbers(resolution, "resolution")?;
-
     let mut notes = Vec::new();
+    let in_file = format!("{name}.resolution");
+    let list = keys.get("resolution");
+    let place = (at.clone(), in_file.as_str());
+    let (size_at, size_px) = listed_size(document, list, place, site_px, &mut notes)?;
+
     let model = required("distortion_model")?;
     let list = match document.text(model)? {
         "none" => None,
@@ -100,8 +106,7 @@ fn of_camera(
         }),
     };
     let lens = lens_of_file(document, Some(model), list, "distortion_coeffs", &mut notes)?;
-    let mut parsed =
-        ParsedCalibration::of_raw(resolution.at.clone(), size_px, [fx, fy, cx, cy], lens);
+    let mut parsed = ParsedCalibration::of_raw(size_at, size_px, [fx, fy, cx, cy], lens);
     parsed.numbers.notes = notes;
     Ok(parsed)
 }

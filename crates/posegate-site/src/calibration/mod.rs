@@ -1,5 +1,6 @@
-//! Calibration files: those of ROS, OpenCV, Kalibr and their relatives in YAML, and PhotonVision's in JSON.
+//! Calibration files: those of ROS, OpenCV, Kalibr and their relatives in YAML, OpenCV's in XML, and those of PhotonVision and Basalt in JSON.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
 
@@ -7,12 +8,15 @@ use super::Note;
 use super::error::{SiteError, Source};
 use super::named::NamedFile;
 use super::reader;
+use super::suggest;
 use super::yaml::{Document, FormatMessages, Map, Node};
 use posegate::certify::Roi;
 use posegate::shape::Lens;
 use posegate_files::input::{self, Limit};
 
+mod basalt;
 mod kalibr;
+mod okvis;
 mod orb_slam;
 mod photonvision;
 mod ros;
@@ -27,6 +31,12 @@ const MESSAGES: FormatMessages = FormatMessages {
     length: "copy the calibration file again as it was saved",
     // `ros2 topic echo` writes `---` after each message.
     reads_first: true,
+};
+
+const XML: FormatMessages = FormatMessages {
+    what: "a calibration in XML of OpenCV, which is an <opencv_storage>",
+    written: "use the file as OpenCV wrote it",
+    ..MESSAGES
 };
 
 /// The camera parameters in a calibration.
@@ -86,10 +96,13 @@ pub(super) fn read(
     })?;
     let read = NamedFile::new(&path, &bytes);
     let name = path.to_string_lossy();
-    let text = String::from_utf8(bytes).map_err(|_| {
-        node.error(format!("the calibration {name} is not UTF-8"))
-            .help("save the file in the encoding UTF-8")
-    })?;
+    if bytes.contains(&0) {
+        return Err(node
+            .error(format!("the calibration {name} is not UTF-8"))
+            .help("save the file in the encoding UTF-8"));
+    }
+    // Comments, and dates in words, may have any encoding.
+    let text = String::from_utf8_lossy(&bytes);
     let source = Source {
         file: &name,
         text: &text,
@@ -100,30 +113,34 @@ pub(super) fn read(
         let numbers = photonvision::read(source)?;
         return Ok((numbers.for_size(source, size_px)?, read));
     }
-    let other = if start.starts_with('<') {
-        Some((
-            "XML",
-            "write it again in YAML: give OpenCV an output file whose name ends with .yml",
-        ))
-    } else if start.contains("\n[image]") {
-        Some((
-            "an INI file",
-            "use the file ost.yaml, which cameracalibrator saves with ost.txt",
-        ))
-    } else {
-        None
-    };
-    if let Some((kind, help)) = other {
-        let error = source.error(0..0, format!("the calibration is {kind}"));
-        return Err(error.expected(MESSAGES.what).help(help));
+    if start.starts_with("[image]") || start.contains("\n[image]") {
+        return Err(source
+            .error(0..0, "the calibration is an INI file")
+            .expected(MESSAGES.what)
+            .help("use the file ost.yaml, which cameracalibrator saves with ost.txt"));
     }
-    let document = Document::new(source, &MESSAGES)?;
-    let root = document.parse()?;
+    let (text, lost) = without_losses(source.text);
+    let source = Source {
+        text: &text,
+        ..source
+    };
+    let (document, root);
+    if start.starts_with('<') {
+        document = Document::indented(source, &XML);
+        root = document.parse_xml()?;
+    } else {
+        document = Document::new(source, &MESSAGES)?;
+        root = document.parse()?;
+    }
     let keys = document.map(&root)?;
     let mut numbers = if keys.keys().any(is_camera) {
-        kalibr::read(&document, keys, camera)?
+        kalibr::read(&document, keys, camera, size_px)?
+    } else if okvis::is_of(&document, keys) {
+        okvis::read(&document, keys, camera, size_px)?
+    } else if basalt::is_of(keys) {
+        basalt::read(&document, keys, camera)?
     } else if kalibr::is_of(keys) {
-        kalibr::read_one(&document, keys)?
+        kalibr::read_one(&document, keys, size_px)?
     } else if vins::is_of(keys) {
         vins::read(&document, keys)?
     } else if orb_slam::is_of(keys) {
@@ -139,7 +156,7 @@ pub(super) fn read(
         return Err(source
             .error(0..0, "the file is not a known kind of calibration")
             .expected(
-                "`camera_matrix` (ROS, OpenCV), `k` (a CameraInfo message), `cam0` (Kalibr), `projection_parameters` (VINS) or `Camera.fx` (ORB-SLAM)",
+                "`camera_matrix` (ROS, OpenCV), `k` (a CameraInfo message), `cam0` (Kalibr), `cameras` (OKVIS), `value0` (Basalt), `projection_parameters` (VINS) or `Camera.fx` (ORB-SLAM)",
             )
             .help(
                 "use the file that ROS's cameracalibrator saves as ost.yaml, a CameraInfo message of `ros2 topic echo --once`, an OpenCV calibration, \
@@ -150,7 +167,37 @@ pub(super) fn read(
         let message = "the calibration has several documents: the first one is read";
         numbers.numbers.notes.push(Note::assumed(message.into()));
     }
+    if lost > 0 {
+        let message = format!("`{LOSS}` is there {lost} times, and is left out");
+        numbers.numbers.notes.push(Note::assumed(message));
+    }
     Ok((numbers.for_size(source, size_px)?, read))
+}
+
+/// What `ros2 topic echo` writes among the messages, with two lines of counts.
+const LOSS: &str = "A message was lost!!!";
+
+/// Returns the text with blanks for the reports of lost messages, and their number.
+fn without_losses(text: &str) -> (Cow<'_, str>, usize) {
+    if !text.contains(LOSS) {
+        return (Cow::Borrowed(text), 0);
+    }
+    let (mut kept, mut losses, mut is_report) = (String::new(), 0, false);
+    for line in text.split_inclusive('\n') {
+        let words = line.trim();
+        losses += usize::from(words == LOSS);
+        is_report = words == LOSS || is_report && words.starts_with("total count");
+        if is_report {
+            // Positions remain those of the file.
+            kept.extend(
+                line.bytes()
+                    .map(|byte| if byte == b'\n' { '\n' } else { ' ' }),
+            );
+        } else {
+            kept.push_str(line);
+        }
+    }
+    (Cow::Owned(kept), losses)
 }
 
 /// Returns `true` if a key is the name of a camera in a Kalibr camchain.
@@ -209,9 +256,78 @@ impl ParsedCalibration {
     }
 }
 
+/// Returns the value of a key, with dots or nested.
+fn get<'n>(file: Map<'n>, key: &str) -> Option<&'n Node> {
+    file.get(key).or_else(|| {
+        let (outer, inner) = key.split_once('.')?;
+        file.get(outer)?.as_map()?.get(inner)
+    })
+}
+
 /// Returns the first of these keys that a file has, with its value.
 fn one_of<'n>(file: Map<'n>, names: &[&'static str]) -> Option<(&'static str, &'n Node)> {
-    names.iter().find_map(|name| Some((*name, file.get(name)?)))
+    names
+        .iter()
+        .find_map(|name| Some((*name, get(file, name)?)))
+}
+
+/// Returns one camera of a list, and its index. Its name is `cam` with the index.
+fn chosen<'n>(
+    document: &Document<'_>,
+    cameras: &'n [Node],
+    name: Option<&str>,
+) -> Result<(usize, &'n Node), SiteError> {
+    let all = (0..cameras.len()).map(|index| format!("cam{index}"));
+    let all: Vec<String> = all.collect();
+    let index = match (name, cameras.len()) {
+        (None, 1) => Some(0),
+        (None, _) => None,
+        (Some(name), _) => all.iter().position(|known| known == name),
+    };
+    let found = index.and_then(|index| Some((index, cameras.get(index)?)));
+    found.ok_or_else(|| {
+        let names = suggest::list(all.iter().map(String::as_str));
+        document
+            .error(0..0, format!("the file has the cameras {names}"))
+            .expected("the name of one of them after the file's name")
+            .help("write `calibration = \"FILE#cam0\"`")
+    })
+}
+
+/// Returns the size of the site's images as that of a calibration without one, with a note.
+fn assumed_size(site_px: [Option<f64>; 2], notes: &mut Vec<Note>) -> Option<[f64; 2]> {
+    let [Some(width), Some(height)] = site_px else {
+        return None;
+    };
+    notes.push(Note::assumed(
+        "the calibration does not state the size of its images: that of the site is assumed".into(),
+    ));
+    Some([width, height])
+}
+
+/// Returns the image's size from a list, and where it is; that of the site if there is no list. `at` is the camera, `name` the list's name.
+fn listed_size(
+    document: &Document<'_>,
+    list: Option<&Node>,
+    (at, name): (Range<usize>, &str),
+    site_px: [Option<f64>; 2],
+    notes: &mut Vec<Note>,
+) -> Result<(Range<usize>, [f64; 2]), SiteError> {
+    if let Some(list) = list {
+        return Ok((list.at.clone(), document.numbers(list, name)?));
+    }
+    let size_px = document.required(assumed_size(site_px, notes), at, name, NO_SIZE)?;
+    Ok((0..0, size_px))
+}
+
+/// Returns a width or height, pixels; OpenCV may write it with a decimal point.
+fn side(document: &Document<'_>, node: &Node) -> Result<f64, SiteError> {
+    let whole = document.whole(node);
+    let number = document.number(node).ok();
+    match number.filter(|number| (1.0..=100_000.0).contains(number) && number.fract() == 0.0) {
+        Some(number) => Ok(number),
+        None => whole.map(f64::from),
+    }
 }
 
 /// Returns the image's size, and where the file states it. A file without one is for the size of the site.
@@ -223,22 +339,18 @@ fn size(
     notes: &mut Vec<Note>,
 ) -> Result<(Range<usize>, [f64; 2]), SiteError> {
     let found = names.map(|names| one_of(file, names).map(|(_, node)| node));
-    match (found, site_px) {
-        ([None, None], [Some(width), Some(height)]) => {
-            notes.push(Note::assumed(
-                "the calibration does not state the size of its images: that of the site is assumed".into(),
-            ));
-            Ok((0..0, [width, height]))
-        }
-        ([width, height], _) => {
-            let required = |node: Option<&Node>, name: &str| {
-                let node = document.required(node, 0..0, name, NO_SIZE)?;
-                Ok::<_, SiteError>((node.at.clone(), f64::from(document.whole(node)?)))
-            };
-            let (at, width) = required(width, names[0][0])?;
-            Ok((at, [width, required(height, names[1][0])?.1]))
-        }
+    if let [None, None] = found
+        && let Some(size_px) = assumed_size(site_px, notes)
+    {
+        return Ok((0..0, size_px));
     }
+    let required = |node: Option<&Node>, name: &str| {
+        let node = document.required(node, 0..0, name, NO_SIZE)?;
+        Ok::<_, SiteError>((node.at.clone(), side(document, node)?))
+    };
+    let [width, height] = found;
+    let (at, width) = required(width, names[0][0])?;
+    Ok((at, [width, required(height, names[1][0])?.1]))
 }
 
 const NO_SIZE: &str = "copy the calibration again as the program saved it, as ost.yaml of cameracalibrator; if it has no size, write `width_px` and `height_px` of the images that \
@@ -261,8 +373,8 @@ const COUNTS: [usize; 5] = [4, 5, 8, 12, 14];
 /// `equidistant`.
 pub(super) fn lens(model: &str, coefficients: &[f64]) -> Option<Result<Lens, Misfit>> {
     let (own, is_fisheye) = match model {
-        "plumb_bob" | "radtan" | "radial-tangential" => (5, false),
-        "rational_polynomial" => (8, false),
+        "plumb_bob" | "radtan" | "radial-tangential" | "radialtangential" => (5, false),
+        "rational_polynomial" | "radialtangential8" => (8, false),
         "equidistant" | "equi" | "fisheye" | "kannala_brandt" => (4, true),
         _ => return None,
     };

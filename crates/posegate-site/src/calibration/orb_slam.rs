@@ -1,6 +1,6 @@
-//! The settings of ORB-SLAM 2 and 3, and of OpenVSLAM: keys `Camera.fx` or `Camera1.fx`.
+//! The settings of ORB-SLAM 2 and 3, and of OpenVSLAM: keys `Camera.fx` or `Camera1.fx`, or `fx` within `Camera`.
 
-use super::{Misfit, ParsedCalibration, lens, one_of, size};
+use super::{Misfit, ParsedCalibration, get, lens, one_of, size};
 use crate::error::SiteError;
 use crate::yaml::{Document, Map};
 
@@ -20,7 +20,7 @@ pub(super) fn is_of(file: Map<'_>) -> bool {
 
 /// Returns the beginning of the keys of the only camera, or of the left one.
 fn prefix(file: Map<'_>) -> Option<&'static str> {
-    let has = |prefix: &&str| file.get(&format!("{prefix}.fx")).is_some();
+    let has = |prefix: &&str| get(file, &format!("{prefix}.fx")).is_some();
     ["Camera1", "Camera"].into_iter().find(has)
 }
 
@@ -63,7 +63,7 @@ pub(super) fn read(
     };
     let number = |key: &&str| {
         let key = format!("{prefix}.{key}");
-        let node = document.required(file.get(&key), 0..0, &key, NUMBERS)?;
+        let node = document.required(get(file, &key), 0..0, &key, NUMBERS)?;
         let number = document.number(node)?;
         // fx and fy.
         let is_focal = key.ends_with(['x', 'y']) && key.contains(".f");
@@ -83,7 +83,7 @@ pub(super) fn read(
         *value = number(key)?;
     }
     let mut coefficients = keys.iter().map(number).collect::<Result<Vec<_>, _>>()?;
-    if model == "plumb_bob" && file.get(&format!("{prefix}.k3")).is_some() {
+    if model == "plumb_bob" && get(file, &format!("{prefix}.k3")).is_some() {
         coefficients.push(number(&"k3")?);
     }
     let lens = lens(model, &coefficients).unwrap_or(Err(Misfit::Count(keys.len())));

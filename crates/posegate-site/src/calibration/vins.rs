@@ -1,6 +1,6 @@
 //! The camera files of VINS-Mono and VINS-Fusion (camodocal).
 
-use super::ParsedCalibration;
+use super::{ParsedCalibration, side};
 use crate::error::SiteError;
 use crate::yaml::{Document, Map};
 use posegate::shape::Lens;
@@ -16,8 +16,8 @@ pub(super) fn read(document: &Document<'_>, file: Map<'_>) -> Result<ParsedCalib
     let required = |key: &str| document.required(file.get(key), 0..0, key, AS_SAVED);
     let width = required("image_width")?;
     let size_px = [
-        f64::from(document.whole(width)?),
-        f64::from(document.whole(required("image_height")?)?),
+        side(document, width)?,
+        side(document, required("image_height")?)?,
     ];
     let model = required("model_type")?;
     let numbers = |section: &str, keys: [&str; 4]| {

@@ -3,7 +3,9 @@
 use super::place::{Frame, LENGTH_SLACK, Matrix};
 use super::{Placed, is_size};
 use crate::error::{SiteError, Source};
+use crate::families::{FAMILIES, meant_family};
 use crate::json::Value;
+use crate::suggest;
 
 const FILE: &str = "{ \"fiducials\": [ ... ], \"type\": \"frc\" }, as Limelight's field maps are";
 const TAG: &str = "{ \"family\": \"apriltag3_36h11_classic\", \"id\": 7, \"size\": 165.1, \"transform\": [ ... ] }";
@@ -13,20 +15,25 @@ const TRANSFORM: &str =
 /// The tags of a file.
 pub(super) struct Found {
     /// The family of all tags, as detectors name it.
-    pub family: String,
+    pub family: &'static str,
     /// Each tag's number, size (m) and pose.
     pub tags: Vec<Placed<(u32, f64, Frame)>>,
 }
 
 pub(super) fn read(source: Source<'_>) -> Result<Found, SiteError> {
     let file = Value::root(source)?;
-    let mut family: Option<String> = None;
+    let mut family = None;
     let mut tags = Vec::new();
     for tag in file.required("fiducials", FILE)?.list("[ ... ]")? {
         let id = tag.required("id", TAG)?;
         let named = tag.required("family", TAG)?;
-        let own = detector_name(named.text("\"apriltag3_36h11_classic\"")?);
-        if family.get_or_insert_with(|| own.clone()) != &own {
+        let own = meant_family(named.text("\"apriltag3_36h11_classic\"")?).ok_or_else(|| {
+            named
+                .error(format!("{} is not a known family", named.title()))
+                .expected(format!("one of {}", suggest::list(FAMILIES.into_iter())))
+                .help("write the name of the family that is printed, as tag36h11")
+        })?;
+        if *family.get_or_insert(own) != own {
             return Err(named
                 .error(format!(
                     "{} is another family than that of the tags before",
@@ -53,17 +60,6 @@ pub(super) fn read(source: Source<'_>) -> Result<Found, SiteError> {
         family: family.unwrap_or_default(),
         tags,
     })
-}
-
-/// Returns the family's name as detectors write it: `tag36h11` for `apriltag3_36h11_classic`.
-fn detector_name(name: &str) -> String {
-    let bare = name.strip_prefix("apriltag3_").unwrap_or(name);
-    let bare = bare.strip_suffix("_classic").unwrap_or(bare);
-    if bare.starts_with(|first: char| first.is_ascii_digit()) {
-        format!("tag{bare}")
-    } else {
-        bare.to_owned()
-    }
 }
 
 fn frame(list: &Value<'_>) -> Result<Frame, SiteError> {

@@ -200,6 +200,20 @@ struct Placed<T> {
     value: T,
 }
 
+/// Returns a remark for the farthest of some named places if it is so far away that the file may have other units.
+fn far_remark<'n>(places: impl Iterator<Item = (&'n str, f64, f64)>) -> Option<String> {
+    /// Metres; more than the size of a hall.
+    const FAR: f64 = 300.0;
+    let all = places.map(|(name, x, y)| (name, x.hypot(y)));
+    let (name, distance) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (distance > FAR).then(|| {
+        format!(
+            "`{name}` is {distance:.0} m from the origin: if the file has other units than metres, convert it; if the map's origin is far away, \
+             write [origin] in the site"
+        )
+    })
+}
+
 /// Returns `true` if a tag can have this size, metres. Larger numbers must be in other units.
 fn is_size(size: f64) -> bool {
     size > 0.0 && size <= 10.0
@@ -249,7 +263,7 @@ impl Import {
                     let pose = world.then(&frame).with_axes(convention.axes()).pose();
                     (tag.at, Tag { id, size, pose })
                 });
-                let mut imported = self.numbered(source, &found.family, tags.collect())?;
+                let mut imported = self.numbered(source, found.family, tags.collect())?;
                 if self.pose.is_none() {
                     imported.remarks.push(
                         "the origin is the middle of the field, as in the file (WPILib's is a corner): --pose moves it".into(),
@@ -299,7 +313,9 @@ impl Import {
                 imported.tasks = tasks
                     .map(|(name, task)| (format!("{prefix}{name}"), task))
                     .collect();
-                imported.remarks = found.remarks;
+                let places = imported.goals.iter();
+                let far = far_remark(places.map(|(name, goal)| (name.as_str(), goal.x, goal.y)));
+                imported.remarks = found.remarks.into_iter().chain(far).collect();
                 Ok(imported)
             }
             Format::Posegate => {
@@ -367,7 +383,12 @@ impl Import {
             (name, Placed { at, value })
         });
         let tags = unique(source, named.collect())?;
+        let places = tags.iter().map(|(name, tag)| {
+            let pose = tag.tag.pose;
+            (name.as_str(), pose.x, pose.y)
+        });
         Ok(Imported {
+            remarks: far_remark(places).into_iter().collect(),
             tags,
             ..Imported::default()
         })

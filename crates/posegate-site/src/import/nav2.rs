@@ -1,7 +1,7 @@
 //! Nav2's docks (opennav_docking): a database, or the parameters of the docking server. Poses are those of the robot's base.
 
 use std::collections::BTreeSet;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::place::{tidy, tidy_angle};
 use super::{DockDirection, DockTask, Import, Placed};
@@ -21,6 +21,8 @@ const MESSAGES: FormatMessages = FormatMessages {
 
 /// The frame of a dock without `frame`.
 const DEFAULT_FRAME: &str = "map";
+/// The largest `docking_threshold`, metres. A larger number has another unit.
+const LARGEST_THRESHOLD: f64 = 1.0;
 /// The most maps inside one another above `ros__parameters`: namespaces.
 const MOST_NAMESPACES: u32 = 8;
 
@@ -89,6 +91,12 @@ pub(super) fn read(source: Source<'_>, import: &Import) -> Result<Docks, SiteErr
                 )
                 .expected("radians, from -6.2832 to 6.2832")
                 .help("90 degrees are 1.5708"));
+        }
+        if theta.abs() > PI + 1e-3 {
+            found.remarks.push(format!(
+                "the heading of `{name}` is {theta} radians, {:.1} degrees: if the file has degrees, convert them",
+                tidy_angle(theta.to_degrees())
+            ));
         }
         plugin.remark(name, [x, y, theta], &mut found.remarks);
         let direction = match (import.dock_direction, &plugin.direction) {
@@ -176,7 +184,8 @@ fn docks_of<'n>(
         let (message, help) = if servers.is_empty() {
             (
                 "the file has no `docks`",
-                "name the file of the docking server's parameter `dock_database`, or its parameters, which have `docks: [\"dock1\"]`",
+                "name the file of the docking server's parameter `dock_database`, or its parameters, which have `docks: [\"dock1\"]`; write `docks:` above docks \
+                 without it, and indent them",
             )
         } else {
             (
@@ -414,13 +423,13 @@ impl Plugin {
         };
         let threshold = number("docking_threshold")?;
         if let Some(metres) = threshold
-            && !(metres > 0.0 && metres.is_finite())
+            && !(metres > 0.0 && metres <= LARGEST_THRESHOLD)
         {
             let at = of_plugin("docking_threshold").map_or(0..0, |node| node.at.clone());
             return Err(document
                 .error(at, format!("docking_threshold is {metres}"))
-                .expected("a distance in metres, above 0")
-                .help("Nav2's default is 0.05"));
+                .expected(format!("metres, above 0 and at most {LARGEST_THRESHOLD}"))
+                .help("write 0.05, Nav2's default, for 50 mm"));
         }
         let detection = if truth(of_plugin("use_external_detection_pose"))? {
             let [x, y] =

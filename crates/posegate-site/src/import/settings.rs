@@ -2,6 +2,7 @@
 
 use super::place::Frame;
 use super::{Convention, Format, Import, ImportError, is_size};
+use crate::families::meant_family;
 use crate::keys;
 use posegate::shape::Pose3Deg;
 
@@ -52,7 +53,8 @@ impl Import {
         let key = &keys::FAMILY;
         match self.family.as_deref() {
             Some("") | None => Err(self.missing(key.name, key.what, key.like)),
-            Some(family) => Ok(family),
+            // Families of one's own keep their names.
+            Some(family) => Ok(meant_family(family).unwrap_or(family)),
         }
     }
 

@@ -1,6 +1,7 @@
-//! YAML with the position of every value.
+//! YAML with the position of every value, and OpenCV's XML.
 
 mod tree;
+mod xml;
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -119,11 +120,16 @@ impl<'a> Document<'a> {
             }
             start += line.len();
         }
-        Ok(Self {
+        Ok(Self::indented(source, messages))
+    }
+
+    /// Returns a text in which tabs are blanks as others: XML.
+    pub(super) const fn indented(source: Source<'a>, messages: &'static FormatMessages) -> Self {
+        Self {
             source,
             messages,
             has_more: Cell::new(false),
-        })
+        }
     }
 
     /// Returns `true` if the file has more documents than the one that was read.
@@ -139,6 +145,24 @@ impl<'a> Document<'a> {
     /// Parses the file.
     pub(super) fn parse(&self) -> Result<Node, SiteError> {
         tree::parse(self)
+    }
+
+    /// Parses a file that OpenCV wrote in XML.
+    pub(super) fn parse_xml(&self) -> Result<Node, SiteError> {
+        xml::parse(self)
+    }
+
+    /// Returns the error of a key whose first one is at a byte of the text.
+    fn twice(&self, key_at: Range<usize>, first: usize) -> SiteError {
+        let before = self.source.text.get(..first).unwrap_or_default();
+        let line = 1 + before.matches('\n').count();
+        let name = self.source.quote(key_at.clone());
+        self.error(
+            key_at,
+            format!("`{name}` is there twice, first in line {line}"),
+        )
+        .expected("each key once")
+        .help(format!("remove one; {}", self.messages.written))
     }
 
     /// Returns the text of a value, shortened to a part of one line.

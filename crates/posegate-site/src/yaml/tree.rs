@@ -11,11 +11,11 @@ use super::{Document, TABS};
 use crate::error::{SiteError, Source};
 
 /// The most values of a file. An alias counts as all values that it names, because readers follow it.
-const MAX_VALUES: usize = 250_000;
+pub(super) const MAX_VALUES: usize = 250_000;
 /// The most bytes of all texts of a file. An alias counts as the texts that it names.
 const MAX_TEXT: usize = 64 << 20;
 /// The most lists and maps inside one another.
-const MAX_DEPTH: usize = 64;
+pub(super) const MAX_DEPTH: usize = 64;
 const NESTS: &str = "the file nests too deep";
 
 /// A value with its position in the text.
@@ -133,7 +133,7 @@ fn short(name: &str) -> String {
     name.chars().take(40).collect()
 }
 
-fn too_large(error: SiteError) -> SiteError {
+pub(super) fn too_large(error: SiteError) -> SiteError {
     error
         .expected(format!(
             "at most {MAX_VALUES} values, nested at most {MAX_DEPTH} deep"
@@ -375,16 +375,7 @@ impl<'a> Tree<'a> {
                 Some((_, _, true)) => merged.push(node),
                 Some((key, key_at, false)) => {
                     if let Some(first) = keys.insert(Rc::clone(&key), key_at.start) {
-                        let before = source.text.get(..first).unwrap_or_default();
-                        let line = 1 + before.matches('\n').count();
-                        let name = source.quote(key_at.clone());
-                        return Err(source
-                            .error(
-                                key_at,
-                                format!("`{name}` is there twice, first in line {line}"),
-                            )
-                            .expected("each key once")
-                            .help(format!("remove one; {}", self.document.messages.written)));
+                        return Err(self.document.twice(key_at, first));
                     }
                     entries.push(Entry { key, key_at, node });
                 }
