@@ -921,14 +921,14 @@ fn a_change_of_the_table_waits_for_no_reset() {
         let status = unsafe { posegate_gate_init(gate, table, length, settings, leaked(0), 0) };
         assert_eq!(status, posegate_status::Ok);
         let opened = |from: u32| {
-            let last = (from..from + 30).map(|sequence| {
+            let states = (from..from + 30).map(|sequence| {
                 let now = 10 * sequence;
                 let mut belief = belief_of_c(0.0, 0.0, 0.0);
                 belief.spread = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-7];
                 let report = report_of_c(sequence, now, belief);
                 step_on(gate, now, &evidence_of_c(report, &[])).1.state.kind
             });
-            last.last()
+            states.collect::<Vec<_>>().pop()
         };
         assert_eq!(opened(1), Some(posegate_state_kind::Permitted as u32));
         // SAFETY: valid pointers.
