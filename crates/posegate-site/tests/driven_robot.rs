@@ -28,8 +28,8 @@ const POINT: [[f64; 2]; 1] = [[0.0, 0.0]];
 /// Ticks of the simulation in a millisecond, and a tick in seconds.
 const TICKS_PER_MS: u64 = 10;
 const TICK_S: f64 = 1e-4;
-/// A true robot drives at most so many ticks at once.
-const TICKS_AT_ONCE: u64 = 10;
+/// The longest step of a true robot, ticks.
+const LONGEST_STEP: u64 = 10;
 /// True robots of each fix.
 const ROBOTS: usize = 12;
 
@@ -420,7 +420,7 @@ impl Fix {
     /// Drives the robots to a tick, as a twist is reported.
     fn drive_to(&mut self, now: u64, twist: [f64; 3], errors: &OdometryErrors) {
         while self.newest < now {
-            let ticks = TICKS_AT_ONCE.min(now - self.newest);
+            let ticks = LONGEST_STEP.min(now - self.newest);
             self.newest += ticks;
             for robot in &mut self.robots {
                 robot.drive(twist, errors, ticks as f64 * TICK_S);
