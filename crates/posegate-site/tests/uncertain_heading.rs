@@ -1,7 +1,7 @@
 //! A pose-set with an uncertain heading is decided like any other: permitted if every pose of it succeeds, denied
 //! with a pose that does not succeed.
 
-use posegate::contain::{Decision, decide, examine, second};
+use posegate::contain::{Decision, decide, decide_with_sharp_margin, examine, second};
 use posegate::report::PoseEstimate;
 use posegate::set::{Estimate, PoseSet, Trust, Uncertainty};
 use posegate::table::Table;
@@ -129,6 +129,8 @@ fn worst_pose_near_a_wall_fails() {
             };
             let set = set(estimate, uncertainty, &table);
             let found = examine(&table, &set);
+            let sharp = decide_with_sharp_margin(&table, &set);
+            assert_eq!(sharp, (found.decision, found.margin));
             if found.decision == Decision::Inside {
                 continue;
             }
