@@ -32,7 +32,7 @@ use core::num::NonZeroU64;
 
 pub(crate) use self::inverse::Inverse;
 pub(crate) use self::leading::Leading;
-pub(crate) use self::product::{product, shifted_product, wide};
+pub(crate) use self::product::{long_product, product, shifted_product, wide};
 pub(crate) use self::quotient::{quotient, towards_zero};
 pub(crate) use self::reciprocal::Reciprocal;
 pub(crate) use self::root::{sqrt_ceil, sqrt_floor};

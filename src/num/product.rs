@@ -26,7 +26,38 @@ pub const fn wide(a: u32, b: u32) -> u64 {
 #[must_use]
 #[inline(never)]
 pub fn shifted_product<const DOWN: u32>(a: i64, b: i64) -> i64 {
-    i128::from(a).wrapping_mul(i128::from(b)).wrapping_shr(DOWN) as i64
+    long_product(a, b).wrapping_shr(DOWN) as i64
+}
+
+/// Returns the product of two 64-bit numbers. Exact.
+#[must_use]
+#[inline(always)]
+pub fn long_product(a: i64, b: i64) -> i128 {
+    if cfg!(narrow_products) {
+        of_words(a, b)
+    } else {
+        i128::from(a).wrapping_mul(i128::from(b))
+    }
+}
+
+/// Returns the product from four products of words; the low words have no sign.
+#[inline(always)]
+fn of_words(a: i64, b: i64) -> i128 {
+    let (a_high, a_low) = ((a >> 32) as i32, a as u32);
+    let (b_high, b_low) = ((b >> 32) as i32, b as u32);
+    let middle = i128::from(by_low(a_high, b_low)).wrapping_add(by_low(b_high, a_low).into());
+    i128::from(product(a_high, b_high))
+        .wrapping_shl(64)
+        .wrapping_add(middle.wrapping_shl(32))
+        .wrapping_add(wide(a_low, b_low).into())
+}
+
+/// Returns the product of a number with a sign and one without.
+#[inline(always)]
+const fn by_low(signed: i32, low: u32) -> i64 {
+    // As a number without a sign, a negative one is larger by 2^32.
+    let more = if signed < 0 { (low as u64) << 32 } else { 0 };
+    wide(signed as u32, low).wrapping_sub(more) as i64
 }
 
 /// Returns the product from four products of halves.
@@ -75,6 +106,10 @@ mod tests {
         assert_eq!(of_signed_halves(a, b), product(a, b));
     }
 
+    fn check_words(a: i64, b: i64) {
+        assert_eq!(of_words(a, b), i128::from(a) * i128::from(b));
+    }
+
     #[test]
     fn products_of_halves_are_exact_at_the_ends() {
         let ends = [
@@ -94,11 +129,22 @@ mod tests {
         for a in ends {
             for b in ends {
                 check(a, b);
+                for (high, low) in ends.iter().flat_map(|high| ends.map(|low| (*high, low))) {
+                    let word =
+                        |high: u32, low: u32| (u64::from(high) << 32 | u64::from(low)) as i64;
+                    check_words(word(a, low), word(high, b));
+                }
             }
         }
     }
 
     proptest! {
+        #[test]
+        fn products_of_words_are_exact(a in any::<i64>(), b in any::<i64>(), less in 0..64u32) {
+            check_words(a, b);
+            check_words(a >> less, b);
+        }
+
         #[test]
         fn products_of_halves_are_exact(a in any::<u32>(), b in any::<u32>(), less in 0..32u32) {
             check(a, b);

@@ -29,9 +29,9 @@ const UM: Unit = (9_671_406_556_917_033_398, -83);
 const TURN: Unit = (14_488_038_916_154_245_685, -93);
 /// 2 pi times 2^32: 2^-24 turn in radians, unit 2^-56.
 const LEVER_Q56: i64 = 26_986_075_409;
-/// The longest path, micrometres, and the largest variance of the yaw.
+/// The longest path, micrometres, and a number that exceeds each entry.
 const LONGEST: i64 = 1 << 26;
-const LARGEST: i64 = 1 << 56;
+const LARGER: i64 = 1 << 56;
 /// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding in entries below 2^40.
 pub(super) const ROUNDED: i64 = 9;
 
@@ -70,8 +70,9 @@ pub(crate) fn carried(
     let is_small = dx.unsigned_abs().max(dy.unsigned_abs()) <= LONGEST.unsigned_abs();
     let entries = [p.xx, p.yy, p.tt, p.xy, p.xt, p.yt];
     let noises = [noise.xx, noise.yy, noise.tt, noise.xy, noise.xt, noise.yt];
-    let mut all = entries.iter().chain(&noises);
-    if !(is_small && all.all(|entry| entry.unsigned_abs() <= LARGEST.unsigned_abs())) {
+    // The bits of a negative number, inverted, are those of a magnitude.
+    let all = entries.iter().chain(&noises);
+    if !(is_small && all.fold(0, |bits, entry| bits | (entry ^ (entry >> 63))) < LARGER) {
         return Err(InputError::CovarianceTooLarge);
     }
     // Um per 2^-24 turn of the yaw's error, unit 2^-56: below 2^60.7.

@@ -75,7 +75,7 @@ impl TruePath {
 
     /// Returns how far a path is from the true one, micrometres.
     fn apart(&self, way: &Way, yaw: BinaryAngle) -> f64 {
-        let found = way.in_world(yaw);
+        let found = way.in_world(yaw.cos_sin_q30());
         let off = |exact: &Exact, found: i64| {
             (&(exact * &Exact::int(1_000_000)) - &Exact::int(found)).to_f64()
         };
@@ -631,7 +631,9 @@ fn part_of_an_increment_after_a_fix() {
         );
         tracker.fix(&fix).unwrap();
         let way = tracker.fix.unwrap().way;
-        let [x, y] = way.in_world(BinaryAngle(0)).map(|um| um as f64 * 1e-6);
+        let [x, y] = way
+            .in_world(BinaryAngle(0).cos_sin_q30())
+            .map(|um| um as f64 * 1e-6);
         let bound = way.slip(&tracker.noise);
         let off = f64::hypot(second[0] - x, second[1] - y);
         place.case(f64::from(bound.translation_um()) * 1e-6, off);

@@ -417,11 +417,12 @@ impl<const N: usize> Tracker<N> {
 
     fn carried(&self, start: &Start, way: &Way) -> Result<(PoseEstimate, Growth), Reason> {
         let mean = start.mean;
-        let [dx, dy] = way.in_world(mean.yaw);
+        let facing = mean.yaw.cos_sin_q30();
+        let [dx, dy] = way.in_world(facing);
         let x = i64::from(mean.x_um).wrapping_add(dx);
         let y = i64::from(mean.y_um).wrapping_add(dy);
         let yaw = mean.yaw.plus(BinaryAngle(way.turn()));
-        let noise = way.noise_in_world(mean.yaw);
+        let noise = way.noise_in_world(facing);
         let mut beside = way.slip(&self.noise);
         // A cylinder has no covariance that the path could turn.
         let by = if start.cylinder == Growth::NONE {
@@ -455,13 +456,9 @@ fn unevenness([after, whole]: [u32; 2]) -> u32 {
     (ms as u32).saturating_add(2)
 }
 
-/// Returns the noise of a path, in the robot's axes at its start, rotated into world axes.
+/// Returns the noise of a path, in the robot's axes at its start, rotated into world axes: by twice the angle about the mean of both variances.
 fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
     let (c, s) = (i64::from(c), i64::from(s));
-    // Below 2^60 each, so a product is at most as large as its entry.
-    let [cc, cs, ss] = [c.wrapping_mul(c), c.wrapping_mul(s), s.wrapping_mul(s)];
-    let by = shifted_product::<60>;
-    let once = shifted_product::<30>;
     let PathNoise {
         xx,
         xy,
@@ -470,22 +467,23 @@ fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
         yt,
         tt,
     } = *noise;
-    // Cosine and sine are within 2 of 2^-30: 2^-27 of the largest entry.
+    // Below 2^60 each, so a product is at most as large as its entry.
+    let cosine = c.wrapping_mul(c).wrapping_sub(s.wrapping_mul(s));
+    let sine = c.wrapping_mul(s).wrapping_mul(2);
+    let by = shifted_product::<60>;
+    let once = shifted_product::<30>;
+    // Variances are not below zero. Sums saturate: what is out of range is refused later and must not come back into it.
+    let apart = xx.saturating_sub(yy);
+    let mean = (xx >> 1).saturating_add(yy >> 1);
+    let deviation = (by(cosine, apart) >> 1).saturating_sub(by(sine, xy));
+    // Cosine and sine are within 2 of 2^-30, so those of twice the angle together within 2^-27.5, and the matrix is off by as much of its mean.
     let slack = (xx.max(yy) >> 26).wrapping_add(8);
     let across = (xt.saturating_abs().max(yt.saturating_abs()) >> 28).wrapping_add(2);
+    let wider = slack.wrapping_add(across);
     PathNoise {
-        xx: by(cc, xx)
-            .wrapping_sub(by(cs, xy).wrapping_mul(2))
-            .wrapping_add(by(ss, yy))
-            .wrapping_add(slack.wrapping_add(across)),
-        yy: by(ss, xx)
-            .wrapping_add(by(cs, xy).wrapping_mul(2))
-            .wrapping_add(by(cc, yy))
-            .wrapping_add(slack.wrapping_add(across)),
-        xy: by(cs, xx)
-            .wrapping_sub(by(cs, yy))
-            .wrapping_add(by(cc, xy))
-            .wrapping_sub(by(ss, xy)),
+        xx: mean.saturating_add(deviation).saturating_add(wider),
+        yy: mean.saturating_sub(deviation).saturating_add(wider),
+        xy: (by(sine, apart) >> 1).saturating_add(by(cosine, xy)),
         xt: once(c, xt).wrapping_sub(once(s, yt)),
         yt: once(s, xt).wrapping_add(once(c, yt)),
         tt: tt.wrapping_add(across.wrapping_mul(2)),

@@ -608,3 +608,30 @@ fn short_increments_are_kept_as_one() {
         );
     }
 }
+
+/// A noise beyond all that is carried, also one of which sums overflow, is refused in whatever direction the robot stands.
+#[test]
+fn noise_beyond_its_range_is_refused() {
+    let covariance = [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-8]];
+    let sizes = [0, 1 << 40, 1 << 58, 1 << 62, i64::MAX - 1, i64::MAX];
+    let start = Carriable::of(&covariance, Trust::FULL).unwrap();
+    for (xx, yy) in sizes.iter().flat_map(|xx| sizes.map(|yy| (*xx, yy))) {
+        for xy in sizes.iter().flat_map(|size| [*size, -size]) {
+            if xx.max(yy).max(xy.abs()) < 1 << 58 {
+                continue;
+            }
+            let noise = PathNoise {
+                xx,
+                yy,
+                xy,
+                tt: 1,
+                ..PathNoise::default()
+            };
+            for heading in (0..64).map(|k| BinaryAngle(k << 26)) {
+                let noise = turned(&noise, heading.cos_sin_q30());
+                let found = set::carried(&start, [0, 0], &noise);
+                assert!(found.is_err(), "{xx} {yy} {xy} {heading:?}: {found:?}");
+            }
+        }
+    }
+}

@@ -21,7 +21,7 @@ use super::increment::Step;
 use super::model::Noise;
 use super::ring::TOGETHER_MS;
 use super::turned;
-use crate::num::{BinaryAngle, Float, Rounding, product, wide};
+use crate::num::{BinaryAngle, Float, Rounding, long_product, product, wide};
 use crate::set::{Growth, PathNoise, RadiusSquared};
 
 /// 2 pi times 2^32, a 2^-24 turn in radians with the unit 2^-56, without its whole 6 * 2^32.
@@ -208,20 +208,20 @@ impl Way {
         self.turn
     }
 
-    /// Returns the position in world axes, micrometres, for a heading at the fix.
-    pub fn in_world(&self, yaw: BinaryAngle) -> [i64; 2] {
-        let [c, s] = yaw.cos_sin_q30().map(i128::from);
-        let (x, y) = (i128::from(self.x), i128::from(self.y));
+    /// Returns the position in world axes, micrometres, for the cosine and sine of the heading at the fix, 2^-30.
+    pub fn in_world(&self, facing: [i32; 2]) -> [i64; 2] {
+        let [c, s] = facing.map(i64::from);
+        let (x, y) = (self.x, self.y);
         let whole = |sum: i128| (sum.wrapping_add(1 << 37) >> 38) as i64;
         [
-            whole(c.wrapping_mul(x).wrapping_sub(s.wrapping_mul(y))),
-            whole(s.wrapping_mul(x).wrapping_add(c.wrapping_mul(y))),
+            whole(long_product(c, x).wrapping_sub(long_product(s, y))),
+            whole(long_product(s, x).wrapping_add(long_product(c, y))),
         ]
     }
 
-    /// Returns the covariance that the noise adds, in world axes, for a heading at the fix.
-    pub fn noise_in_world(&self, yaw: BinaryAngle) -> PathNoise {
-        turned(&self.noise, yaw.cos_sin_q30())
+    /// Returns the covariance that the noise adds, in world axes, for the cosine and sine of the heading at the fix, 2^-30.
+    pub fn noise_in_world(&self, facing: [i32; 2]) -> PathNoise {
+        turned(&self.noise, facing)
     }
 
     /// Returns the bound of the slip and of all roundings, by their number: an error of a turn rotates the whole path after it.
@@ -257,9 +257,9 @@ impl Way {
 
     /// Returns the path's length times a turn, micrometres, rounded up.
     fn chord(&self, turn_q24: u64) -> u64 {
-        let product = u128::from(self.length_q8).wrapping_mul(u128::from(turn_q24));
-        // 2 pi / 2^24 from above.
-        let swung = product.saturating_mul(411_775) >> 48;
+        // 2 pi / 2^24 from above, unit 2^-40. What saturates is 2^16 times the length: the chord is at most twice the length.
+        let turn = u128::from(turn_q24.saturating_mul(411_775));
+        let swung = u128::from(self.length_q8).wrapping_mul(turn) >> 48;
         u64::try_from(swung).unwrap_or(u64::MAX).saturating_add(1)
     }
 

@@ -222,11 +222,11 @@ impl Body {
                 self.is_cylinder = true;
             }
         }
-        if layout.lever.is_some() {
+        if layout.lever.is_some() || self.aside < self.moved {
             self.facing = cosine_and_sine(heading);
-            if !self.is_cylinder {
-                self.robot = turned(&self.world, self.facing);
-            }
+        }
+        if layout.lever.is_some() && !self.is_cylinder {
+            self.robot = turned(&self.world, self.facing);
         }
         Some(())
     }
@@ -250,9 +250,6 @@ impl Body {
         self.aside = length(question.side_um)
             .wrapping_add(turned.wrapping_sub(turned >> 10))
             .min(self.moved);
-        if self.aside < self.moved {
-            self.facing = cosine_and_sine(self.heading);
-        }
     }
 
     /// Returns a bound of a movement along a normal in world axes, 2^-28 units, down.
@@ -375,16 +372,6 @@ impl Body {
         let mut spare = (i64::from(number(b0, b1)) << 28)
             .wrapping_add(seen.clearance)
             .wrapping_sub(dot(normal, seen.at));
-        if self.moved != 0 {
-            let [nx, ny] = normal;
-            let [c, s] = self.facing;
-            let in_world = if seen.is_robot {
-                [both(c, nx, s.wrapping_neg(), ny), both(s, nx, c, ny)]
-            } else {
-                normal
-            };
-            spare = spare.wrapping_sub(self.moved_along(in_world));
-        }
         if self.alpha != 0 {
             // L is 2^(16 - up) units.
             let turned = (dot(normal, seen.lever) >> 14) as i32;
@@ -392,6 +379,27 @@ impl Body {
             let turned = turned.wrapping_shr(17u32.wrapping_add(self.up));
             spare = spare.wrapping_sub(turned as i64);
         }
+        let beyond = |moved: i64| self.spares(spare.wrapping_sub(moved), normal, seen);
+        if self.moved == 0 {
+            return beyond(0);
+        }
+        // A longer normal needs no root and no angle, and most facets hold with it.
+        let [x, y] = normal;
+        let [long, short] = [x, y].map(i32::unsigned_abs);
+        let length = long.max(short).wrapping_add(long.min(short) >> 1);
+        if beyond(i64::from(length.wrapping_add(1)).wrapping_mul(self.moved)) {
+            return true;
+        }
+        let [c, s] = self.facing;
+        beyond(self.moved_along(match seen.is_robot {
+            true => [both(c, x, s.wrapping_neg(), y), both(s, x, c, y)],
+            false => normal,
+        }))
+    }
+
+    /// Returns `true` if the set reaches no farther along a normal than a length of 2^-28 units.
+    #[inline(always)]
+    fn spares(&self, spare: i64, normal: [i32; 2], seen: &FrameProjection) -> bool {
         if !(spare >= 0) {
             return false;
         }
