@@ -398,7 +398,8 @@ impl Body {
     }
 
     /// Returns `true` if the set reaches no farther along a normal than a length of 2^-28 units.
-    #[inline(always)]
+    #[cfg_attr(small_code, inline(never))]
+    #[cfg_attr(not(small_code), inline(always))]
     fn spares(&self, spare: i64, normal: [i32; 2], seen: &FrameProjection) -> bool {
         if !(spare >= 0) {
             return false;
