@@ -210,6 +210,22 @@ pub enum SettingsError {
 /// farther in the future.
 pub const CLOCKS_MS: u32 = 20;
 
+/// How long a permit is held unless `permit_hold_ms` states it, milliseconds.
+struct Holds {
+    /// Odometry comes 10 to 50 times a second.
+    odometry: u32,
+    /// A detector of tags misses some of the images.
+    detections: u32,
+    /// AMCL reports every 0.6 s while the robot moves.
+    poses: u32,
+}
+
+const HOLDS_MS: Holds = Holds {
+    odometry: 200,
+    detections: 500,
+    poses: 800,
+};
+
 impl NodeSettings {
     /// Creates the settings from the arguments and the bytes of the table.
     ///
@@ -251,6 +267,14 @@ impl NodeSettings {
             aging: Aging::NONE,
             motion: bounds,
         };
+        let permit_hold_ms = reader.ms(
+            "permit_hold_ms",
+            match (&tracker, &detector) {
+                (Some(_), _) => HOLDS_MS.odometry,
+                (None, Some(_)) => HOLDS_MS.detections,
+                (None, None) => HOLDS_MS.poses,
+            },
+        )?;
         let settings = Self {
             task,
             task_digest: digest,
@@ -262,9 +286,9 @@ impl NodeSettings {
             frame,
             trust,
             bounds,
-            maximum_age_ms: reader.ms("maximum_age_ms", 1_000)?,
-            report_period_ms: reader.ms("report_period_ms", reader.ms("permit_hold_ms", 500)?)?,
-            permit_hold_ms: reader.ms("permit_hold_ms", 500)?,
+            maximum_age_ms: reader.ms("maximum_age_ms", 1_500)?,
+            report_period_ms: reader.ms("report_period_ms", permit_hold_ms)?,
+            permit_hold_ms,
             inhibit_hold_ms: reader.ms("inhibit_hold_ms", 500)?,
             permits_in_a_row: reader.whole(
                 "permits_in_a_row",

@@ -42,14 +42,17 @@ fn hold_that_would_open_is_named() {
         (590.0..=610.0).contains(&period) && (jitter - 35.0).abs() < 0.1,
         "{period} {jitter}"
     );
-    let words = slow.hold(&settings("")).unwrap();
+    let words = slow.hold(&settings("-p permit_hold_ms:=500")).unwrap();
     assert!(
         words.contains("held for 500 ms") && words.contains("permit_hold_ms of 601 or more"),
         "{words}"
     );
     assert!(slow.hold(&settings("-p permit_hold_ms:=601")).is_none());
+    assert!(slow.hold(&settings("")).is_none());
     // The hold that is named has a maximum age with which it is accepted.
-    let words = slow.hold(&settings("-p maximum_age_ms:=900")).unwrap();
+    let words = slow
+        .hold(&settings("-p permit_hold_ms:=500 -p maximum_age_ms:=900"))
+        .unwrap();
     assert!(words.contains("maximum_age_ms of 991 or more"), "{words}");
     let _ = settings("-p permit_hold_ms:=601 -p maximum_age_ms:=991");
     let mut fast = received();

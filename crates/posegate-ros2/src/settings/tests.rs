@@ -55,7 +55,7 @@ fn parameters_become_settings() {
     assert_eq!(gate.task, "dock");
     assert_eq!(gate.restart, Restart::OnReset);
     assert_eq!(gate.look_at, Some(7));
-    assert_eq!((gate.response_ms, gate.maximum_age_ms), (290, 1_000));
+    assert_eq!((gate.response_ms, gate.maximum_age_ms), (290, 1_500));
     assert_eq!(
         gate.sources[0].motion,
         MotionBounds::in_any_direction(0.3, 30f64.to_radians()).unwrap()

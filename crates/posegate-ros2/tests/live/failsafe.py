@@ -12,7 +12,7 @@ RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 10
 STATED_MS = 250
 LATE_MS = 5
 # The node notices a silent source when its last permit has been held for permit_hold_ms; it then publishes a denial.
-HOLD_MS = 500
+HOLD_MS = 800
 
 
 def stops(name, stop, limit_ms, go_on=None):
