@@ -29,9 +29,9 @@ const UM: Unit = (9_671_406_556_917_033_398, -83);
 const TURN: Unit = (14_488_038_916_154_245_685, -93);
 /// 2 pi times 2^32: 2^-24 turn in radians, unit 2^-56.
 const LEVER_Q56: i64 = 26_986_075_409;
-/// The longest path, micrometres, and a number that exceeds each entry.
+/// The longest path, micrometres, and the number below which each entry is: then no product below exceeds 2^61.4.
 const LONGEST: i64 = 1 << 26;
-const LARGER: i64 = 1 << 56;
+const LARGER: i64 = 1 << 52;
 /// The bound of the errors of a row, without those that grow with the lever: 7, and 2 for the lever's own rounding in entries below 2^40.
 pub(super) const ROUNDED: i64 = 9;
 
@@ -89,7 +89,7 @@ pub(crate) fn carried(
     // lever's whole swing, for every e. With a third of the last rounding below for e, and both axes, that is 2^-35.7 of the longer swing.
     let swung = aatt.max(bbtt).saturating_abs() >> 35;
     let plane = slack.saturating_add(swung);
-    // Twice the cross term and the square of the lever: each below 2^62 in magnitude, else the sum is refused.
+    // Twice the cross term and the square of the lever are below 2^62 in magnitude.
     let sum = |parts: [i64; 5]| {
         let sum = parts
             .iter()
@@ -148,6 +148,21 @@ mod tests {
     use super::*;
     use core::f64::consts::TAU;
     use proptest::prelude::*;
+
+    /// A yaw that is off by turns, carried along a path: the square of the lever would exceed 64 bits.
+    #[test]
+    fn products_that_could_wrap_are_refused() {
+        for yaw in [1e2, 1e3, 4_100.138451401141, 1e4] {
+            let p = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, yaw]];
+            let start = Carriable::of(&p, Trust::FULL).unwrap();
+            for path in [1 << 20, 1 << 24, 1 << 26].map(|um| [0, um]) {
+                if let Ok([[xx, ..], ..]) = carried(&start, path, &PathNoise::default()) {
+                    let swung = path[1] as f64 * 1e-6;
+                    assert!(xx >= swung * swung * yaw, "{yaw} {path:?}: {xx}");
+                }
+            }
+        }
+    }
 
     proptest! {
         #[test]

@@ -467,12 +467,12 @@ fn turned(noise: &PathNoise, [c, s]: [i32; 2]) -> PathNoise {
         yt,
         tt,
     } = *noise;
-    // Below 2^60 each, so a product is at most as large as its entry.
+    // Hardly above 2^60 each, so a product is about as large as its entry.
     let cosine = c.wrapping_mul(c).wrapping_sub(s.wrapping_mul(s));
     let sine = c.wrapping_mul(s).wrapping_mul(2);
     let by = shifted_product::<60>;
     let once = shifted_product::<30>;
-    // Variances are not below zero. Sums saturate: what is out of range is refused later and must not come back into it.
+    // Variances are not below zero. What is out of range is refused later: where a sum could wrap back into the range, it saturates.
     let apart = xx.saturating_sub(yy);
     let mean = (xx >> 1).saturating_add(yy >> 1);
     let deviation = (by(cosine, apart) >> 1).saturating_sub(by(sine, xy));

@@ -255,9 +255,9 @@ impl Way {
         u32::try_from(swung).unwrap_or(u32::MAX)
     }
 
-    /// Returns the path's length times a turn, micrometres, rounded up.
+    /// Returns the path's length times a turn, micrometres, rounded up; for an absurd turn more than twice the length.
     fn chord(&self, turn_q24: u64) -> u64 {
-        // 2 pi / 2^24 from above, unit 2^-40. What saturates is 2^16 times the length: the chord is at most twice the length.
+        // 2 pi / 2^24 from above, unit 2^-40. It saturates at 2^24 rad; the end moves by at most twice the length.
         let turn = u128::from(turn_q24.saturating_mul(411_775));
         let swung = u128::from(self.length_q8).wrapping_mul(turn) >> 48;
         u64::try_from(swung).unwrap_or(u64::MAX).saturating_add(1)

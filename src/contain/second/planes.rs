@@ -379,28 +379,29 @@ impl Body {
             let turned = turned.wrapping_shr(17u32.wrapping_add(self.up));
             spare = spare.wrapping_sub(turned as i64);
         }
-        let beyond = |moved: i64| self.spares(spare.wrapping_sub(moved), normal, seen);
+        let holds = |moved| self.has_room(spare.wrapping_sub(moved), normal, seen);
         if self.moved == 0 {
-            return beyond(0);
+            return holds(0);
         }
-        // A longer normal needs no root and no angle, and most facets hold with it.
+        // A longer normal needs no root and no angle: its length is at most this, also if it is turned and rounded. Most facets hold with it, and what
+        // holds with it holds with the exact one.
         let [x, y] = normal;
         let [long, short] = [x, y].map(i32::unsigned_abs);
         let length = long.max(short).wrapping_add(long.min(short) >> 1);
-        if beyond(i64::from(length.wrapping_add(1)).wrapping_mul(self.moved)) {
+        if holds(i64::from(length.wrapping_add(1)).wrapping_mul(self.moved)) {
             return true;
         }
         let [c, s] = self.facing;
-        beyond(self.moved_along(match seen.is_robot {
+        holds(self.moved_along(match seen.is_robot {
             true => [both(c, x, s.wrapping_neg(), y), both(s, x, c, y)],
             false => normal,
         }))
     }
 
-    /// Returns `true` if the set reaches no farther along a normal than a length of 2^-28 units.
+    /// Returns `true` if the set reaches along a normal at most as far as `spare`, unit 2^-28 length units, also if the set bends ([`Body::bends`]).
     #[cfg_attr(small_code, inline(never))]
     #[cfg_attr(not(small_code), inline(always))]
-    fn spares(&self, spare: i64, normal: [i32; 2], seen: &FrameProjection) -> bool {
+    fn has_room(&self, spare: i64, normal: [i32; 2], seen: &FrameProjection) -> bool {
         if !(spare >= 0) {
             return false;
         }
