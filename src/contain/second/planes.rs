@@ -368,7 +368,7 @@ impl Body {
     #[cfg_attr(not(small_code), inline(always))]
     fn admits(&self, [x0, x1, y0, y1, b0, b1]: &Facet, seen: &FrameProjection) -> bool {
         let number = |low: &u8, high: &u8| i32::from(i16::from_le_bytes([*low, *high]));
-        let normal = [number(x0, x1), number(y0, y1)];
+        let normal @ [x, y] = [number(x0, x1), number(y0, y1)];
         let mut spare = (i64::from(number(b0, b1)) << 28)
             .wrapping_add(seen.clearance)
             .wrapping_sub(dot(normal, seen.at));
@@ -385,8 +385,7 @@ impl Body {
         }
         // A longer normal needs no root and no angle: its length is at most this, also if it is turned and rounded. Most facets hold with it, and what
         // holds with it holds with the exact one.
-        let [x, y] = normal;
-        let [long, short] = [x, y].map(i32::unsigned_abs);
+        let [long, short] = normal.map(i32::unsigned_abs);
         let length = long.max(short).wrapping_add(long.min(short) >> 1);
         if holds(i64::from(length.wrapping_add(1)).wrapping_mul(self.moved)) {
             return true;
