@@ -10,13 +10,13 @@ use std::time::Instant;
 
 /// Programs that take longest. They begin first, so that no core waits for one at the end.
 const SLOW: [&str; 7] = [
-    "posegate-cli test cover",
+    "posegate-replay test worst_pose",
     "posegate-cli test learn",
-    "posegate-cli test tag_tolerance",
+    "posegate-cli test valid_sites",
     "posegate-replay test other_tags",
+    "posegate-boards test fault_injection",
+    "posegate-cli test site_build",
     "posegate-place lib posegate_place",
-    "posegate-boards test interrupt_gate",
-    "posegate-cli test page",
 ];
 
 /// A test program that is built.
