@@ -180,7 +180,11 @@ impl Scene {
 
     fn bounds(&self) -> MotionBounds {
         let [speed, rate] = self.fastest();
-        MotionBounds::new(speed, 0.0, rate).expect("bounds")
+        let bounds = match self.is_omnidirectional {
+            true => MotionBounds::in_any_direction(speed, rate),
+            false => MotionBounds::new(speed, 0.0, rate),
+        };
+        bounds.expect("bounds")
     }
 
     /// The largest true speeds: errors come on top of commands.
@@ -459,16 +463,27 @@ impl Found {
     }
 }
 
-/// The largest distance of any corner of any robot beyond any wall, after a movement at the largest speeds for a time.
-fn beyond(poses: &[[f64; 3]], hall: &Hall, [speed, rate]: [f64; 2], seconds: f64) -> f64 {
-    let mut most = f64::NEG_INFINITY;
+/// The largest distance of any corner of any robot beyond any wall, after a movement at the largest speeds for a time, or `least` if that is
+/// larger: in any direction, or along the robot's axis.
+fn beyond(poses: &[[f64; 3]], hall: &Hall, scene: &Scene, seconds: f64, least: f64) -> f64 {
+    let [length, swing] = scene.fastest().map(|speed| speed * seconds);
+    let mut most = least;
     for pose in poses {
         for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
-            let (s, c) = (pose[2] + share * rate * seconds).sin_cos();
-            for [vx, vy] in hall.corners {
-                let tip = [pose[0] + c * vx - s * vy, pose[1] + s * vx + c * vy];
-                let out = tip[0].abs().max(tip[1].abs());
-                most = most.max(out + speed * seconds - hall.to_wall_m);
+            let (s, c) = (pose[2] + share * swing).sin_cos();
+            for wall in WALLS {
+                let ahead = |[vx, vy]: &[f64; 2]| {
+                    let tip = [pose[0] + c * vx - s * vy, pose[1] + s * vx + c * vy];
+                    wall[0] * tip[0] + wall[1] * tip[1] - hall.to_wall_m
+                };
+                let out = hall.corners.iter().map(ahead).fold(f64::MIN, f64::max);
+                if out + length > most {
+                    let driven = match scene.is_omnidirectional {
+                        true => length,
+                        false => hall::farthest(wall, length, swing, [pose[2], share]),
+                    };
+                    most = most.max(out + driven);
+                }
             }
         }
     }
@@ -689,7 +704,8 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
         let (poses, stamp) = permitted.as_ref().expect("an open gate has permitted");
         // Valid until the output has followed the next answer.
         let seconds = (now - stamp) as f64 * TICK_S + f64::from(scene.response_ms) * 1e-3;
-        let beyond = beyond(poses, hall, scene.fastest(), seconds);
+        let least = (found.least_um as f64 * -1e-6).min(0.0);
+        let beyond = beyond(poses, hall, &scene, seconds, least);
         found.least_um = found.least_um.min((-beyond * 1e6).min(1e9) as i64);
         if beyond > 1e-9 {
             found.outside += 1;
