@@ -210,22 +210,6 @@ pub enum SettingsError {
 /// farther in the future.
 pub const CLOCKS_MS: u32 = 20;
 
-/// How long a permit is held unless `permit_hold_ms` states it, milliseconds.
-struct Holds {
-    /// Odometry comes 10 to 50 times a second.
-    odometry: u32,
-    /// A detector of tags misses some of the images.
-    detections: u32,
-    /// AMCL reports every 0.6 s while the robot moves.
-    poses: u32,
-}
-
-const HOLDS_MS: Holds = Holds {
-    odometry: 200,
-    detections: 500,
-    poses: 800,
-};
-
 impl NodeSettings {
     /// Creates the settings from the arguments and the bytes of the table.
     ///
@@ -267,14 +251,13 @@ impl NodeSettings {
             aging: Aging::NONE,
             motion: bounds,
         };
-        let permit_hold_ms = reader.ms(
-            "permit_hold_ms",
-            match (&tracker, &detector) {
-                (Some(_), _) => HOLDS_MS.odometry,
-                (None, Some(_)) => HOLDS_MS.detections,
-                (None, None) => HOLDS_MS.poses,
-            },
-        )?;
+        // Odometry comes 10 to 50 times a second, a detector of tags misses some images, and AMCL reports every 0.6 s while the robot moves.
+        let usual_hold_ms = match (&tracker, &detector) {
+            (Some(_), _) => 200,
+            (None, Some(_)) => 500,
+            (None, None) => 800,
+        };
+        let permit_hold_ms = reader.ms("permit_hold_ms", usual_hold_ms)?;
         let settings = Self {
             task,
             task_digest: digest,
