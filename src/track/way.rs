@@ -243,7 +243,7 @@ impl Way {
             .saturating_add(5);
         let length = length
             .saturating_add(u64::from(self.left_out.translation_um().unsigned_abs()))
-            .saturating_add(self.chord(turn))
+            .saturating_add(self.arc(turn))
             .saturating_add(rounded);
         let limited = |v: u64| u32::try_from(v).unwrap_or(u32::MAX);
         Growth::new(limited(length), limited(turn))
@@ -251,12 +251,12 @@ impl Way {
 
     /// Returns the largest movement of the end by a turn of up to `yaw_q24` at the start, micrometres, rounded up.
     pub fn swung(&self, yaw_q24: i32) -> u32 {
-        let swung = self.chord(u64::from(yaw_q24.unsigned_abs()));
+        let swung = self.arc(u64::from(yaw_q24.unsigned_abs()));
         u32::try_from(swung).unwrap_or(u32::MAX)
     }
 
     /// Returns the path's length times a turn, micrometres, rounded up; for an absurd turn more than twice the length.
-    fn chord(&self, turn_q24: u64) -> u64 {
+    fn arc(&self, turn_q24: u64) -> u64 {
         // 2 pi / 2^24 from above, unit 2^-40. It saturates at 2^24 rad; the end moves by at most twice the length.
         let turn = u128::from(turn_q24.saturating_mul(411_775));
         let swung = u128::from(self.length_q8).wrapping_mul(turn) >> 48;
