@@ -15,9 +15,15 @@ pub(super) struct CorruptWord;
 impl RedundantWord {
     #[inline(always)]
     pub const fn new(word: u32) -> Self {
+        Self::of_two(word, word)
+    }
+
+    /// Stores a word that was read twice: if the readings differ, the pair is corrupt.
+    #[inline(always)]
+    pub const fn of_two(word: u32, again: u32) -> Self {
         Self {
             word,
-            complement: !word,
+            complement: !again,
         }
     }
 
@@ -56,6 +62,12 @@ impl RedundantWord {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_readings_that_differ_are_damaged() {
+        assert_eq!(RedundantWord::of_two(7, 7).get(), Ok(7));
+        assert_eq!(RedundantWord::of_two(7, 6).get(), Err(CorruptWord));
+    }
 
     /// Detects every flipped bit of either copy, and zeroed or erased memory.
     #[test]

@@ -24,7 +24,7 @@ pub struct Step {
     /// The state of the gate.
     pub state: State,
     /// With a report: `Ok` if this report permits, or the reason why not. Without a report: `Ok` if the gate is open,
-    /// or the reason why not.
+    /// or the reason why not. With a latched fault: that fault.
     pub verdict: Result<(), Reason>,
 }
 
@@ -95,6 +95,8 @@ impl defmt::Format for Gate<'_> {
 
 /// The source number if no report has come since the start or the reset.
 const NO_SOURCE: u32 = 0x0001_0000;
+/// The state while a step runs: not a state.
+const UNFINISHED: RedundantWord = RedundantWord::of_two(0, 0);
 /// Half the range of the clock: a longer step counts as backwards.
 const BACKWARDS_MS: u32 = 1 << 31;
 
@@ -356,7 +358,7 @@ impl<'a> Gate<'a> {
     /// Returns what to do, or `None` if the gate is open.
     #[must_use]
     pub fn advice(&self) -> Option<Advice> {
-        let reason = self.output(None).verdict.err()?;
+        let reason = self.verdict_without_report(self.state()).err()?;
         Some(reason.advice(self.settings.look_at))
     }
 
@@ -365,17 +367,15 @@ impl<'a> Gate<'a> {
         let mut before = self.revoke()?;
         let source = self.source_of(report);
         let passed = self.advance_time(now_ms, &mut before)?;
-        let newest = self.is_newest(report.stamp_ms)?;
-        let verdict = match passed {
-            Ok(()) => self.take(evidence, source, newest, &before)?,
+        let newest = self.is_newest(now_ms, report.stamp_ms)?;
+        match passed {
+            Ok(()) => self.take(now_ms, evidence, source, newest, &before),
             // The report is remembered, but not evaluated.
-            Err(reason) => Err(reason),
-        };
-        // A report of an undeclared source or in another frame is not remembered.
-        if source.is_ok() {
-            self.remember(report, newest.is_ok())?;
+            Err(reason) => {
+                self.remember(report, source, newest)?;
+                Ok(Err(reason))
+            }
         }
-        Ok(verdict)
     }
 
     /// Returns the declared source of a report.
@@ -406,11 +406,12 @@ impl<'a> Gate<'a> {
     }
 
     /// Revokes the permit before anything is checked, then checks the settings before any of them is used. Returns
-    /// the state from before.
+    /// the state from before. Until a new state is stored, the last thing that a step does, the state is a corrupt word: a step that is not
+    /// completed, or that stores what it found elsewhere, leaves a fault.
     fn revoke(&mut self) -> Result<StateSnapshot, CorruptWord> {
         let before = StateSnapshot::of(self.state)?;
         if !matches!(before.standing, DecodedState::Latched(_)) {
-            self.state = DecodedState::Inhibited(Reason::Silent).word();
+            self.state = UNFINISHED;
         }
         self.check_settings()?;
         if !self.table_is_the_same()? {
@@ -475,6 +476,9 @@ impl<'a> Gate<'a> {
             if let Some(reason) = ended {
                 self.close(before, reason);
                 *before = StateSnapshot::of(self.state)?;
+                if !matches!(before.standing, DecodedState::Latched(_)) {
+                    self.state = UNFINISHED;
+                }
             }
         }
         // Never kept as longer ago than the hold time, so that the clock's wrap does not make the closing recent
@@ -489,52 +493,75 @@ impl<'a> Gate<'a> {
     /// Evaluates a report and changes the state accordingly.
     fn take(
         &mut self,
+        now_ms: u32,
         evidence: &Evidence<'_>,
         source: Result<&Source, Reason>,
-        newest: Result<(), Reason>,
+        newest: Result<u32, Reason>,
         before: &StateSnapshot,
     ) -> Weighed {
+        let report = evidence.report;
         if let DecodedState::Latched(reason) = before.standing {
+            self.remember(report, source, newest)?;
             return Ok(Err(reason));
         }
-        let report = evidence.report;
         let mut flow = FlowSignature::start();
-        let weighed = self.weigh(evidence, source, newest, &mut flow)?;
+        let weighed = self.weigh(now_ms, evidence, source, newest, &mut flow)?;
         match weighed {
             Ok(()) => {
+                if self.follows_again(report) {
+                    flow.past(Check::FollowedAgain);
+                }
+                self.remember(report, source, newest)?;
                 let held = self.is_held_long_enough()?;
-                self.permit(report, before, held, flow)?;
+                self.permit(before, held, flow)?;
             }
+            // The gate remembers it already.
             Err(Reason::Repeated) => self.repeat(report, before),
             Err(Reason::EvaluationsDisagree) => self.fault(Reason::EvaluationsDisagree),
-            Err(reason) => self.close(before, reason),
+            Err(reason) => {
+                self.remember(report, source, newest)?;
+                self.close(before, reason);
+            }
         }
         Ok(weighed)
     }
 
-    /// Returns the current permission and state, with the verdict on a report if there is one.
-    fn output(&self, verdict: Option<Result<(), Reason>>) -> Step {
-        let standing =
+    /// Returns the current permission and state, with the verdict on a report if there is one. A permit, or permits in a row, that should
+    /// have ended are a fault: the first check of the times was skipped, or it is wrong.
+    fn output(&mut self, mut verdict: Option<Result<(), Reason>>) -> Step {
+        let mut standing =
             DecodedState::of(self.state).unwrap_or(DecodedState::Latched(Reason::MemoryDamaged));
-        let permission = match standing {
-            DecodedState::Permitted(mut flow) if self.stands() => {
+        let mut permission = Permission::DENIED;
+        if standing.is_earning() {
+            if !self.stands() {
+                self.fault(Reason::MemoryDamaged);
+                standing = DecodedState::Latched(Reason::MemoryDamaged);
+                verdict = None;
+            } else if let DecodedState::Permitted(mut flow) = standing {
                 flow.past(Check::Stands);
-                Permission::after(flow, self.now_ms.by_complement())
+                permission = Permission::after(flow, self.now_ms.by_complement());
             }
-            _ => Permission::DENIED,
-        };
+        } else if let DecodedState::Latched(_) = standing {
+            // Not what a report found after the fault.
+            verdict = None;
+        }
         let state = standing.state();
         Step {
             permission,
             state,
-            verdict: verdict.unwrap_or_else(|| match state {
-                State::Permitted => Ok(()),
-                State::Qualifying(_) => Err(match self.is_held_long_enough() {
-                    Ok(true) => Reason::Qualifying,
-                    _ => Reason::Holding,
-                }),
-                State::Inhibited(reason) | State::Latched(reason) => Err(reason),
+            verdict: verdict.unwrap_or_else(|| self.verdict_without_report(state)),
+        }
+    }
+
+    /// Returns `Ok` if the gate is open in a state, or the reason why not.
+    fn verdict_without_report(&self, state: State) -> Result<(), Reason> {
+        match state {
+            State::Permitted => Ok(()),
+            State::Qualifying(_) => Err(match self.is_held_long_enough() {
+                Ok(true) => Reason::Qualifying,
+                _ => Reason::Holding,
             }),
+            State::Inhibited(reason) | State::Latched(reason) => Err(reason),
         }
     }
 }

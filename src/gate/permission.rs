@@ -124,8 +124,6 @@ pub(super) enum Check {
     Second = 0x6b58,
     /// The frame and the sequence are correct, read from the complements.
     FollowedAgain = 0x4cb2,
-    /// The stamp is fresh, read from the complements.
-    FreshAgain = 0x1d97,
     /// There were enough consecutive permits, and the hold time is over.
     Qualified = 0xe2c4,
     /// The permit has not expired. Checked in every step and tick.
@@ -141,8 +139,7 @@ impl FlowSignature {
         .and(Check::Fresh)
         .and(Check::First)
         .and(Check::Second)
-        .and(Check::FollowedAgain)
-        .and(Check::FreshAgain);
+        .and(Check::FollowedAgain);
 
     /// The only signature of a permit.
     pub const COMPLETE: Self = Self::WEIGHED
@@ -238,7 +235,6 @@ mod tests {
             Check::First,
             Check::Second,
             Check::FollowedAgain,
-            Check::FreshAgain,
             Check::Qualified,
             Check::Stands,
         ];

@@ -7,13 +7,8 @@ use crate::gate::{Restart, Settings};
 use core::hint::black_box;
 
 impl Gate<'_> {
-    /// Returns `true` if a stamp is not older than the maximum age when a permission of this cycle ends, and not from
+    /// Returns `true` if a stamp is not older than the maximum age when a permission of the cycle at `now_ms` ends, and not from
     /// the future. A stamp from the future has an age of half the clock's range or more.
-    pub(super) fn is_fresh(&self, stamp_ms: u32) -> Result<bool, CorruptWord> {
-        Ok(self.is_fresh_at(self.now_ms.get()?, stamp_ms))
-    }
-
-    /// As [`Gate::is_fresh`], in a cycle at `now_ms`.
     pub(super) fn is_fresh_at(&self, now_ms: u32, stamp_ms: u32) -> bool {
         now_ms.wrapping_sub(stamp_ms) <= self.settings.oldest_ms()
     }
@@ -28,32 +23,25 @@ impl Gate<'_> {
         }
     }
 
-    /// Adds one permit, and opens the gate if there are enough. Repeats the first checks from the complements:
-    /// `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree, or if the signature is not that of every check before.
+    /// Adds one permit, and opens the gate if there are enough. The report is the last one already. Repeats the first checks from the
+    /// complements: `before`, `held`, and that the report permits. Returns [`CorruptWord`] if they disagree, or if the signature is not that of every check before.
     pub(super) fn permit(
         &mut self,
-        report: &Report,
         before: &StateSnapshot,
         held: bool,
         mut flow: FlowSignature,
     ) -> Result<(), CorruptWord> {
-        if !self.follows_again(report) {
-            return Err(CorruptWord);
-        }
-        flow.past(Check::FollowedAgain);
-        // The age again, from the complements.
-        let seen = black_box(&*self);
-        let settings = seen.settings;
-        let now = seen.now_ms.by_complement_of_opaque();
-        if settings.oldest_ms() < now.wrapping_sub(report.stamp_ms) {
-            return Err(CorruptWord);
-        }
-        flow.past(Check::FreshAgain);
-        // Else a denial that is taken for a permit would qualify the next report.
+        // Else a denial that is taken for a permit would qualify the next report. The gate must remember this report. Its age is checked
+        // again by [`Gate::output`].
         if flow != FlowSignature::WEIGHED {
             return Err(CorruptWord);
         }
+        // This report does not count on earlier permits that should have ended.
+        if before.standing.is_earning() && !self.stands() {
+            return Err(CorruptWord);
+        }
         self.permitted_at_ms = self.now_ms;
+        let settings = black_box(&*self).settings;
         let needed = u32::from(settings.permits_in_a_row);
         let so_far = match before.standing {
             DecodedState::Inhibited(_) => 0,
@@ -116,8 +104,8 @@ impl Gate<'_> {
         self.state = DecodedState::Inhibited(reason).word();
     }
 
-    /// Returns `true` if a permit is still valid: a second check of the times, from the complements, independent of
-    /// the first.
+    /// Returns `true` if a permit that is valid or being earned has not ended: a second check of the times, from the complements, independent
+    /// of the first.
     #[cfg_attr(small_code, inline(never))]
     pub(super) fn stands(&self) -> bool {
         let seen = black_box(self);

@@ -104,26 +104,107 @@ fn settings<'a>(table: &Table<'a>, permits_in_a_row: u16) -> Settings<'a> {
     }
 }
 
-/// The validity of a permit is checked again from the complements, independently of the first check.
+/// The validity of what was earned is checked again from the complements, independently of the first check. What the first check left
+/// standing for too long is a fault, for a permit and for permits in a row.
 #[test]
-fn a_permit_that_was_left_standing_ends() {
+fn what_was_left_standing_too_long_is_a_fault() {
+    let table = Table::parse(SEE_T7).unwrap();
+    for permits_in_a_row in [1, 2] {
+        let settings = settings(&table, permits_in_a_row);
+        // A report with its stamp 1010, at 1010. Then the time and the newest stamp are as if the first check had not run.
+        let stands = |now_ms: u32, newest_stamp_ms: u32| {
+            let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+            let earned = gate.step(1010, &report(1, 0.0)).state;
+            assert_eq!(earned == State::Permitted, permits_in_a_row == 1);
+            gate.now_ms = RedundantWord::new(now_ms);
+            gate.newest_stamp_ms = RedundantWord::new(newest_stamp_ms);
+            let step = gate.output(Some(Ok(())));
+            if step.state == earned {
+                assert_eq!(step.permission.is_permit(), permits_in_a_row == 1);
+                assert_eq!(step.verdict, Ok(()));
+                return true;
+            }
+            assert!(!step.permission.is_permit());
+            assert_eq!(step.state, State::Latched(Reason::MemoryDamaged));
+            assert_eq!(step.verdict, Err(Reason::MemoryDamaged));
+            assert_eq!(gate.state(), State::Latched(Reason::MemoryDamaged));
+            false
+        };
+        assert!(stands(1035, 1010) && !stands(1036, 1010));
+        assert!(stands(1035, 1035 - 175) && !stands(1035, 1035 - 176));
+        // From the future, by less than the response time.
+        assert!(stands(1035, 1035) && !stands(1035, 1036));
+    }
+}
+
+/// A report that is too old, and that the first check of its age let through, is a fault when it is remembered.
+#[test]
+fn an_old_report_that_was_let_through_is_a_fault() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let oldest = 1400 - settings.oldest_ms();
+    for (stamp_ms, is_fault) in [(oldest, false), (oldest - 1, true), (1401, true)] {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        let _ = gate.tick(1400);
+        let old = Report {
+            stamp_ms,
+            ..report(1, 0.0)
+        };
+        let before = gate.revoke().unwrap();
+        gate.remember(&old, Ok(&MAP), Ok(stamp_ms)).unwrap();
+        gate.permit(&before, true, past(|_| true)).unwrap();
+        let step = gate.output(Some(Ok(())));
+        assert_eq!(step.permission.is_permit(), !is_fault, "{stamp_ms}");
+        let latched = step.state == State::Latched(Reason::MemoryDamaged);
+        assert_eq!(latched, is_fault, "{stamp_ms}");
+    }
+}
+
+/// A stamp that changes in the caller's memory after it was checked is not remembered.
+#[test]
+fn a_stamp_that_changes_after_its_check_is_a_fault() {
     let table = Table::parse(SEE_T7).unwrap();
     let settings = settings(&table, 1);
     let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
-    assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
-    for (now_ms, stands) in [(1035, true), (1036, false)] {
+    let changed = Report {
+        stamp_ms: 1010 ^ 1 << 31,
+        ..report(1, 0.0)
+    };
+    gate.remember(&changed, Ok(&MAP), Ok(1010)).unwrap();
+    assert_eq!(gate.newest_stamp_ms.get(), Err(CorruptWord));
+    let step = gate.step(1020, &report(2, 0.0));
+    assert_eq!(step.verdict, Err(Reason::MemoryDamaged));
+}
+
+/// Whatever a later report or clock brings, the first fault is the reported one.
+#[test]
+fn a_latched_gate_reports_its_fault() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+    gate.fault(Reason::CodeDamaged);
+    let first = Err(Reason::CodeDamaged);
+    assert_eq!(gate.step(1010, &report(1, 0.0)).verdict, first);
+    assert_eq!(gate.step(500, &report(2, 0.0)).verdict, first);
+    gate.last_sequence = UNFINISHED;
+    assert_eq!(gate.step(510, &report(3, 0.0)).verdict, first);
+    assert_eq!(gate.tick(520).verdict, first);
+}
+
+/// Permits that should have ended do not count for the next report.
+#[test]
+fn a_report_does_not_count_on_permits_that_have_ended() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 2);
+    for (now_ms, counts) in [(1035, true), (1036, false)] {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        assert_eq!(gate.step(1010, &report(1, 0.0)).state, State::Qualifying(1));
+        let before = gate.revoke().unwrap();
+        // The first check of the times is skipped.
         gate.now_ms = RedundantWord::new(now_ms);
-        assert!(matches!(gate.state(), State::Permitted));
-        assert_eq!(gate.output(None).permission.is_permit(), stands);
+        let counted = gate.permit(&before, true, past(|_| true));
+        assert_eq!(counted.is_ok(), counts, "{now_ms}");
     }
-    gate.now_ms = RedundantWord::new(1035);
-    gate.newest_stamp_ms = RedundantWord::new(1035 - 175);
-    assert!(gate.output(None).permission.is_permit());
-    gate.newest_stamp_ms = RedundantWord::new(1035 - 176);
-    assert!(!gate.output(None).permission.is_permit());
-    // From the future, by less than the response time.
-    gate.newest_stamp_ms = RedundantWord::new(1036);
-    assert!(!gate.output(None).permission.is_permit());
 }
 
 /// Both checks of the hold time agree, and a wrap of the clock does not make the last denial recent.
@@ -160,15 +241,25 @@ fn a_step_takes_the_permit_back_first() {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
         let before = gate.revoke().unwrap();
-        assert_eq!(gate.state(), State::Inhibited(Reason::Silent));
+        assert_eq!(gate.state(), State::Latched(Reason::MemoryDamaged));
         assert!(!gate.output(None).permission.is_permit());
         gate.restore(&before);
         assert!(gate.output(None).permission.is_permit());
+        // A step that ends before it stores a state leaves a fault for the next one.
+        let _ = gate.revoke().unwrap();
+        let step = gate.step(1020, &report(2, 0.0));
+        assert_eq!(step.state, State::Latched(Reason::MemoryDamaged));
     }
 }
 
 /// The checks of a report before it counts.
-const CHECKS: [Check; 4] = [Check::Followed, Check::Fresh, Check::First, Check::Second];
+const CHECKS: [Check; 5] = [
+    Check::Followed,
+    Check::Fresh,
+    Check::First,
+    Check::Second,
+    Check::FollowedAgain,
+];
 
 /// Returns the signature of some of [`CHECKS`].
 fn past(passed: impl Fn(usize) -> bool) -> FlowSignature {
@@ -192,7 +283,7 @@ fn a_report_that_skipped_a_check_counts_for_nothing() {
         gate.newest_stamp_ms = RedundantWord::new(1000);
         let before = gate.revoke().unwrap();
         let flow = past(|number| number != skipped);
-        let counted = gate.permit(&report(1, 0.0), &before, true, flow);
+        let counted = gate.permit(&before, true, flow);
         let counts = skipped == CHECKS.len();
         assert_eq!(counted.is_ok(), counts, "{skipped}");
         assert_eq!(
@@ -239,8 +330,9 @@ fn a_repetition_never_completes_the_signature() {
         gate.last_sequence = RedundantWord::new(sequence);
         gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms - 1 + sequence);
         let mut flow = FlowSignature::start();
-        let newest = gate.is_newest(last.stamp_ms).unwrap();
+        let newest = gate.is_newest(1010, last.stamp_ms).unwrap();
         let weighed = gate.weigh(
+            1010,
             &Evidence::of(&last),
             gate.source_of(&last),
             newest,
@@ -251,7 +343,10 @@ fn a_repetition_never_completes_the_signature() {
         gate.last_sequence = RedundantWord::new(0);
         gate.newest_stamp_ms = RedundantWord::new(last.stamp_ms - 1);
         let before = StateSnapshot::of(gate.state).unwrap();
-        let counted = gate.permit(&last, &before, true, flow);
+        if gate.follows_again(&last) {
+            flow.past(Check::FollowedAgain);
+        }
+        let counted = gate.permit(&before, true, flow);
         assert_eq!(counted.is_ok(), verdict.is_ok());
         if counted.is_err() {
             continue;
@@ -316,10 +411,10 @@ fn both_looks(gate: &mut Gate<'_>, now_ms: u32, (source, sequence): (u32, u32)) 
                 let fresh = age <= oldest;
                 let right = source == NO_SOURCE || source == 0 && steps == 1;
                 let expected = fresh && frame == "map" && right && newer;
-                let stamp = gate.is_newest(next.stamp_ms).unwrap();
+                let stamp = gate.is_newest(now_ms, next.stamp_ms).unwrap();
                 let first = gate.source_of(&next).is_ok()
                     && gate.follows(&next, stamp).unwrap().is_ok()
-                    && gate.is_fresh(next.stamp_ms).unwrap();
+                    && gate.is_fresh_at(now_ms, next.stamp_ms);
                 let what = (now_ms, source, newest, &next);
                 assert_eq!(first, expected, "{what:?}");
                 assert_eq!(gate.follows_again(&next) && fresh, expected, "{what:?}");
@@ -390,6 +485,9 @@ fn second_checks_refuse_what_first_checks_let_through() {
     let table = Table::parse(SEE_T7).unwrap();
     let mut settings = settings(&table, 3);
     settings.inhibit_hold_ms = 500;
+    // What was earned at 1020 still stands at 1400.
+    settings.maximum_age_ms = 600;
+    settings.permit_hold_ms = 600;
     let earned = |count| {
         let word = DecodedState::Qualifying(count).word();
         // The first reading of the state was corrupted: it found two permits.
@@ -404,7 +502,9 @@ fn second_checks_refuse_what_first_checks_let_through() {
         let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
         let _ = gate.step(1020, &super::tests::report(1, 0.0));
         gate.now_ms = RedundantWord::new(now_ms);
-        let permitted = gate.permit(report, &before, true, past(|_| true));
+        let follows = gate.follows_again(report);
+        let flow = past(|number| number < 4 || follows);
+        let permitted = gate.permit(&before, true, flow);
         let is_open = matches!(gate.state(), State::Permitted);
         assert_eq!(permitted.is_ok(), is_open, "{permitted:?}");
         is_open
@@ -414,19 +514,16 @@ fn second_checks_refuse_what_first_checks_let_through() {
         ..report(2, 0.0)
     };
     assert!(permit(1400, &at(1400), earned(2)));
-    // Not enough permits in a row; hold time not over; too old; the hold time and the age at their limits.
+    // Not enough permits in a row; hold time not over.
     assert!(!permit(1400, &at(1400), earned(1)));
     assert!(!permit(1399, &at(1399), earned(2)));
-    assert!(permit(1400, &at(1410 - settings.oldest_ms()), earned(2)));
-    assert!(!permit(1400, &at(1409 - settings.oldest_ms()), earned(2)));
-    // Another sequence number, source or frame; a stamp that is not newer, or from the future.
-    let faults: [fn(&mut Report); 6] = [
+    // Another sequence number, source or frame; a stamp that is not newer.
+    let faults: [fn(&mut Report); 5] = [
         |report| report.sequence = 3,
         |report| report.sequence = 1,
         |report| report.source = 1,
         |report| report.frame = FrameId::of("odom"),
         |report| report.stamp_ms = 1010,
-        |report| report.stamp_ms = 1401,
     ];
     for (number, fault) in faults.into_iter().enumerate() {
         let mut report = at(1400);

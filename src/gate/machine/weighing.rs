@@ -17,9 +17,10 @@ impl Gate<'_> {
     /// [`Check::Followed`], so its signature is never complete.
     pub(super) fn weigh(
         &self,
+        now_ms: u32,
         evidence: &Evidence<'_>,
         source: Result<&Source, Reason>,
-        newest: Result<(), Reason>,
+        newest: Result<u32, Reason>,
         flow: &mut FlowSignature,
     ) -> Weighed {
         let source = match source {
@@ -33,7 +34,7 @@ impl Gate<'_> {
             Err(Reason::Repeated) => {}
             Err(reason) => return Ok(Err(reason)),
         }
-        if !self.is_fresh(report.stamp_ms)? {
+        if !self.is_fresh_at(now_ms, report.stamp_ms) {
             return Ok(Err(Reason::Stale));
         }
         flow.past(Check::Fresh);
@@ -48,7 +49,7 @@ impl Gate<'_> {
         let movement = if source.motion.stands_still() {
             &evidence.beside
         } else {
-            let age_ms = self.now_ms.get()?.wrapping_sub(report.stamp_ms);
+            let age_ms = now_ms.wrapping_sub(report.stamp_ms);
             let driven = self.settings.movement(source.motion, age_ms);
             grown = driven.plus(evidence.beside);
             &grown
