@@ -16,6 +16,16 @@ pub fn say(text: &str) {
     eprintln!("\n== {text}");
 }
 
+/// Prints the output of a command that has ended: its JSON lines to stdout, the others to stderr.
+pub fn show(text: &str) {
+    for line in text.lines() {
+        match is_json(line) {
+            true => println!("{line}"),
+            false => eprintln!("{line}"),
+        }
+    }
+}
+
 /// Returns a command of these words, which are separated by spaces; [`Cmd::arg`] takes one that contains spaces.
 pub fn cmd(words: &str) -> Cmd {
     let mut words = words.split_whitespace();
