@@ -124,7 +124,7 @@ pub struct Arguments {
     /// reads them (CSV); `-` for standard output
     #[arg(long)]
     pub csv: Option<Output>,
-    /// Write a picture (SVG): the gate, the interlock with its reasons and the rules in use today over time, and the Stanford diagram if the
+    /// Write a picture (SVG): a map of the estimates; the gate, the interlock with its reasons and the rules in use today over time, and the Stanford diagram if the
     /// truth is known
     #[arg(short, long)]
     pub output: Option<Output>,

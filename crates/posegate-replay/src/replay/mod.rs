@@ -60,6 +60,7 @@ pub use self::channels::Channels;
 pub use self::clock::{Clock, NOT_FRESH};
 pub use self::interlock::{InterlockTimes, WhyShut};
 pub use self::lanes::{LaneSpan, Lanes};
+pub use self::map::{Map, MapPose};
 pub use self::odometry::{Odometry, OdometryError, OdometryExtremes, OdometryPose, odometry_csv};
 pub use self::open::OpenMoments;
 pub use self::play::{Part, PlayError, play};
@@ -75,6 +76,7 @@ mod channels;
 mod clock;
 mod interlock;
 mod lanes;
+mod map;
 mod odometry;
 mod open;
 mod play;
@@ -95,7 +97,7 @@ use posegate::contain::Margin;
 use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::Trust;
+use posegate::set::{RadiusSquared, Trust};
 use posegate::shape::SuccessSet;
 use posegate::track::{Tracker, TrackerSettings};
 use rayon::prelude::*;
@@ -147,6 +149,7 @@ pub struct Replay<'a> {
     counts: tally::Counts,
     timeline: Timeline,
     stanford: Stanford,
+    map: Map,
     carry: Option<Box<Carry>>,
     open: OpenMoments,
 }
@@ -186,6 +189,7 @@ impl<'a> Replay<'a> {
             counts: tally::Counts::default(),
             timeline: Timeline::default(),
             stanford: Stanford::default(),
+            map: Map::default(),
             carry: None,
             open: OpenMoments::default(),
         })
@@ -288,11 +292,16 @@ impl<'a> Replay<'a> {
 
     /// Returns a pose of a sample with the uncertainty that the gate uses.
     fn spread(&self, belief: &PoseEstimate, sample: &Sample) -> PoseEstimate {
-        let trust = self.trust(sample);
-        let inflation = f64::from(trust.map_or(0, |trust| trust.inflation.q16())) / 65536.0;
+        let inflation = self.inflation(sample);
         let radius_squared = f64::from(self.judge.radius_squared().q16()) / 65536.0;
         let radius_squared = radius_squared * inflation;
         of_base(belief, self.setup.bounded, sample.lever_m, radius_squared)
+    }
+
+    /// Returns the factor of a sample's covariance.
+    fn inflation(&self, sample: &Sample) -> f64 {
+        let trust = self.trust(sample);
+        f64::from(trust.map_or(0, |trust| trust.inflation.q16())) / 65536.0
     }
 
     /// Returns the trust in a sample's source; `None` if the source is not known.
@@ -500,6 +509,7 @@ impl<'a> Replay<'a> {
         });
         row.index = self.next;
         self.next += 1;
+        self.map.note(&row, self.inflation(sample));
         row.permitted = step.permission.is_permit();
         row.state = step.state;
         row.step = step.verdict;
@@ -600,6 +610,24 @@ impl<'a> Replay<'a> {
     #[must_use]
     pub const fn clock(&self) -> Option<Clock> {
         self.clock
+    }
+
+    /// Returns the success set.
+    #[must_use]
+    pub const fn success(&self) -> &SuccessSet {
+        self.setup.success
+    }
+
+    /// Returns the squared radius of Gaussian pose-sets.
+    #[must_use]
+    pub fn radius_squared(&self) -> RadiusSquared {
+        self.judge.radius_squared()
+    }
+
+    /// Returns a share of the estimates for a map.
+    #[must_use]
+    pub const fn map(&self) -> &Map {
+        &self.map
     }
 
     /// Returns the verdicts over time.

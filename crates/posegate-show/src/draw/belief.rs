@@ -57,6 +57,23 @@ impl PoseSetF64 {
         f64::from(self.radius_squared.q16()) / 65_536.0
     }
 
+    /// Returns the border of the set's projection onto the floor: points in the world, metres, counter-clockwise.
+    #[must_use]
+    pub fn projection(&self) -> Vec<[f64; 2]> {
+        let [x, y, _] = self.estimate;
+        let [a, b] = match self.spread {
+            Uncertainty::Bounded { translation_m, .. } => {
+                [[translation_m, 0.0], [0.0, translation_m]]
+            }
+            Uncertainty::Gaussian(p) => lower(
+                [p[0][0], p[1][0], p[1][1]],
+                libm::sqrt(self.squared_radius()),
+            ),
+        };
+        let on_circle = |[c, s]: [f64; 2]| [x + a[0] * c, y + b[0] * c + b[1] * s];
+        around().map(on_circle).collect()
+    }
+
     /// Returns the border of the section at a world heading (rad): points in the world, metres, counter-clockwise. `None`
     /// if the set does not contain that heading.
     #[must_use]
@@ -65,17 +82,13 @@ impl PoseSetF64 {
         let off = yaw - self.estimate[2];
         let off = off - turn * libm::round(off / turn);
         let [x, y, _] = self.estimate;
-        let around = (0..AROUND).map(|k| {
-            let angle = f64::from(k) / f64::from(AROUND) * turn;
-            [libm::cos(angle), libm::sin(angle)]
-        });
         match self.spread {
             // The tolerance includes a heading that is written as the end of the arc.
             Uncertainty::Bounded {
                 translation_m: r,
                 yaw_rad,
             } => (off.abs() <= yaw_rad + 1e-9)
-                .then(|| around.map(|[c, s]| [x + r * c, y + r * s]).collect()),
+                .then(|| around().map(|[c, s]| [x + r * c, y + r * s]).collect()),
             Uncertainty::Gaussian(p) => {
                 // The conditional mean and covariance of the position, given the yaw.
                 let rest = self.squared_radius() - off * off / p[2][2];
@@ -86,7 +99,7 @@ impl PoseSetF64 {
                 let [a, b] = lower([given(0, 0), given(1, 0), given(1, 1)], libm::sqrt(rest));
                 let (x, y) = (x + p[0][2] / p[2][2] * off, y + p[1][2] / p[2][2] * off);
                 Some(
-                    around
+                    around()
                         .map(|[c, s]| [x + a[0] * c, y + b[0] * c + b[1] * s])
                         .collect(),
                 )
@@ -152,6 +165,14 @@ impl PoseSetF64 {
             }
         })
     }
+}
+
+/// Yields points of the unit circle, counter-clockwise.
+fn around() -> impl Iterator<Item = [f64; 2]> {
+    (0..AROUND).map(|k| {
+        let angle = f64::from(k) / f64::from(AROUND) * core::f64::consts::TAU;
+        [libm::cos(angle), libm::sin(angle)]
+    })
 }
 
 /// Returns the rows of the lower triangular root of a 2x2 covariance (xx, xy, yy), times a scale.
@@ -220,6 +241,25 @@ mod tests {
         }
         for pose in belief.poses() {
             assert!(squared(off(pose), p) < 11.0 + 1e-6);
+        }
+    }
+
+    /// No pose of the set is beside its projection, and each border of the projection is reached.
+    #[test]
+    fn projection_is_the_sets_shadow() {
+        let belief = gaussian();
+        let shadow = belief.projection();
+        for angle in (0..36).map(|k| f64::from(k) / 36.0 * core::f64::consts::TAU) {
+            let [c, s] = [libm::cos(angle), libm::sin(angle)];
+            let farthest = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+                points.fold(f64::NEG_INFINITY, |most, [x, y]| most.max(c * x + s * y))
+            };
+            let of_set = farthest(&mut belief.border().into_iter().map(|[x, y, _]| [x, y]));
+            let of_shadow = farthest(&mut shadow.iter().copied());
+            assert!(
+                (of_set - of_shadow).abs() < 0.02,
+                "{angle}: {of_set} {of_shadow}"
+            );
         }
     }
 

@@ -63,6 +63,7 @@ mod plan;
 mod portrait;
 mod replay;
 mod replay_lanes;
+mod replay_map;
 pub mod report;
 mod section;
 mod sheet;

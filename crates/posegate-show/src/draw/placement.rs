@@ -261,11 +261,11 @@ fn to_border(set: &SuccessSet) -> Option<f64> {
 fn words(picture: &mut Picture, [left, top]: [f64; 2], column: &Column) {
     let placed = &column.placed;
     let pose = placed.pose;
+    // Rounded, and without a minus sign before zero.
+    let [x, y, z] = [pose.x, pose.y, pose.z].map(|metres| libm::round(metres * 1e3) / 1e3 + 0.0);
+    let yaw = libm::round(pose.yaw_deg * 10.0) / 10.0 + 0.0;
     let mut lines = std::vec![
-        format!(
-            "x {:.3}, y {:.3}, z {:.3} m, yaw {:.1}°",
-            pose.x, pose.y, pose.z, pose.yaw_deg
-        ),
+        format!("x {x:.3}, y {y:.3}, z {z:.3} m, yaw {yaw:.1}°"),
         format!(
             "{:.3} m from the goal, cost there {:.2}",
             placed.distance, placed.cost_at_goal

@@ -1,4 +1,4 @@
-//! Draws a replay: lanes over time for the gate, the interlock, the reasons and the rules in use today; margins; and the Stanford
+//! Draws a replay: a map of its estimates; lanes over time for the gate, the interlock, the reasons and the rules in use today; margins; and the Stanford
 //! diagram if the truth is known.
 
 use super::legend::{LINE, Sample, legend};
@@ -7,6 +7,7 @@ use super::palette;
 use super::replay_lanes::{
     Axis, DENIAL, HEIGHT, LEFT, PERMIT, SHUT, SPARSE, WIDTH, WRONG, lanes, shades,
 };
+use super::replay_map::{self, ReplayMap};
 use super::stanford;
 use super::svg::{Anchor, Font, Picture, Style, literal};
 use posegate_replay::replay::Replay;
@@ -23,13 +24,18 @@ const MARGIN: Style = Style::outlined("#0072b2", 1.4);
 const POINT: Style = Style::filled("#0072b2");
 const LIMIT: Style = Style::outlined("#222222", 1.0).dashed("5 3");
 
-/// Returns an SVG of a replay: margins, rules and the interlock over time.
+/// Returns an SVG of a replay: its map; margins, rules and the interlock over time.
 #[must_use]
 pub fn replay_picture(title: &str, replay: &Replay<'_>) -> String {
     let with_truth = replay.stanford().points() > 0;
-    let entries = entries(replay, with_truth);
+    let map = ReplayMap::of(replay);
+    let mut entries = entries(replay, with_truth);
+    if let Some(map) = &map {
+        entries.splice(0..0, map.entries());
+    }
     let entries: Vec<(Sample, &str)> = entries.iter().map(|(s, words)| (*s, &**words)).collect();
-    let bottom = TOP + HEIGHT;
+    let top = TOP + map.as_ref().map_or(0.0, |_| replay_map::HEIGHT);
+    let bottom = top + HEIGHT;
     let legend_top = bottom + CURVE + TIMES;
     let legend_end = legend_top + entries.len() as f64 * LINE + 12.0;
     let diagram_top = legend_end + 22.0;
@@ -42,7 +48,10 @@ pub fn replay_picture(title: &str, replay: &Replay<'_>) -> String {
     let bold = Font::new(17.0, palette::INK).bold();
     picture.text([20.0, 30.0], &literal(title), &bold);
     let axis = Axis::of(replay);
-    lanes(&mut picture, replay, axis, TOP);
+    if let Some(map) = &map {
+        map.draw(&mut picture, TOP - 14.0);
+    }
+    lanes(&mut picture, replay, axis, top);
     margins(&mut picture, replay, axis, bottom);
     times(&mut picture, axis, bottom + CURVE);
     legend(&mut picture, [LEFT, legend_top], &entries);
@@ -68,7 +77,10 @@ fn entries(replay: &Replay<'_>, with_truth: bool) -> Vec<(Sample, String)> {
             "interlock shut, for the reasons below it:".into(),
         ),
     ]);
-    for (reason, style, seconds) in shades(replay) {
+    // A reason of less than half the last digit has no visible part of a lane.
+    let visible = shades(replay);
+    let visible = visible.into_iter().filter(|(.., seconds)| *seconds >= 0.05);
+    for (reason, style, seconds) in visible {
         let name = reason.map_or("other reasons", |reason| reason.name());
         let words = format!("{}, {seconds:.1} s", literal(name));
         entries.push((Sample::Patch(style), words));

@@ -26,16 +26,36 @@ pub(super) const WRONG: Style = Style::filled("#000000");
 const OLD: Style = Style::filled("none").with_fill_opacity("#009e73", 0.35);
 pub(super) const SHUT: Style = Style::filled("#e3e6ea");
 const TICK: Style = Style::outlined("#222222", 0.7);
-/// The colours of the commonest reasons, and of all others.
-const REASONS: [Style; 6] = [
-    Style::filled("#d55e00"),
-    Style::filled("#56b4e9"),
-    Style::filled("#e69f00"),
-    Style::filled("#0072b2"),
-    Style::filled("#cc79a7"),
-    Style::filled("#f0e442"),
-];
+/// The most reasons that are named; all others have one colour.
+const MOST_NAMED: usize = 6;
 const OTHERS: Style = Style::filled("#999999");
+/// The colours of reasons that are rare, by their codes.
+const RARE: [Style; 7] = [
+    Style::filled("#7f5539"),
+    Style::filled("#4d4d4d"),
+    Style::filled("#e7298a"),
+    Style::filled("#17becf"),
+    Style::filled("#a6761d"),
+    Style::filled("#1b4965"),
+    Style::filled("#b5838d"),
+];
+
+/// Returns the colour of a reason: the same in every picture.
+fn colour(reason: Reason) -> Style {
+    match reason {
+        Reason::NotContained => Style::filled("#d55e00"),
+        Reason::OutsideTable => Style::filled("#56b4e9"),
+        Reason::Stale => Style::filled("#e69f00"),
+        Reason::Silent => Style::filled("#0072b2"),
+        Reason::Qualifying => Style::filled("#cc79a7"),
+        Reason::Holding => Style::filled("#f0e442"),
+        Reason::PoseSetTooLarge => Style::filled("#8172b3"),
+        other => {
+            let place = usize::from(other.code()) % RARE.len();
+            RARE.get(place).copied().unwrap_or(OTHERS)
+        }
+    }
+}
 
 /// Converts times to x coordinates of a picture.
 #[derive(Clone, Copy, Debug)]
@@ -93,10 +113,10 @@ pub(super) type Shade = (Option<Reason>, Style, f64);
 pub(super) fn shades(replay: &Replay<'_>) -> Vec<Shade> {
     let mut all = replay.interlock().shut_s_by();
     all.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-    let rest: f64 = all.iter().skip(REASONS.len()).map(|(_, s)| s).sum();
-    let named = all.iter().zip(REASONS);
+    let rest: f64 = all.iter().skip(MOST_NAMED).map(|(_, s)| s).sum();
+    let named = all.iter().take(MOST_NAMED);
     let mut shades: Vec<Shade> = named
-        .map(|((reason, seconds), style)| (Some(*reason), style, *seconds))
+        .map(|(reason, seconds)| (Some(*reason), colour(*reason), *seconds))
         .collect();
     if rest > 0.0 {
         shades.push((None, OTHERS, rest));
