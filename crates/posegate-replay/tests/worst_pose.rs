@@ -3,7 +3,7 @@
 use posegate_testkit::{counts, oracle};
 
 use oracle::{Pose, PoseSet as Given, Rng, level};
-use posegate::contain::{Decision, examine};
+use posegate::contain::{Decision, decide, examine};
 use posegate::set::{CrossTerms, Estimate, Inflation, PoseSet, SplitWeight, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_replay::coordinates;
@@ -83,7 +83,7 @@ fn worst_poses_are_in_the_given_set() {
                     goal[2] + turn,
                 ];
                 let set = PoseSet::bounded(estimate_of(pose), 1e-6, 1e-7).unwrap();
-                (pose, examine(&table, &set).decision == Decision::Inside)
+                (pose, decide(&table, &set) == Decision::Inside)
             };
             let (mut low, mut high) = (0.0, 6.0);
             if !tiny(low).1 || tiny(high).1 {
