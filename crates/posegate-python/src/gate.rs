@@ -1,14 +1,15 @@
 //! The gate of a controller, and the tracker that carries fixes along odometry.
 
-use crate::arrays::Numbers;
 use crate::error::refused_argument;
 use crate::table::PyTable;
 use crate::trust::trust;
-use posegate::gate::{Gate, Reason, Settings, Source, State, Step};
+use crate::uncertainty::belief;
+use posegate::gate::{Evidence, Gate, Reason, Settings, Source, State, Step};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
-use posegate::set::{Aging, Estimate, Uncertainty};
+use posegate::set::Aging;
 use posegate::table::Table;
+use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -116,6 +117,67 @@ impl PyGateStep {
     }
 }
 
+/// An estimate with its stamp, and other hypotheses about the robot's pose: the gate permits only if the pose-set of every one is inside.
+///
+/// `others` are estimates (x, y, yaw, cov) of the same moment; `elsewhere` is the probability that the robot is at none of them.
+///
+/// >>> import posegate
+/// >>> gate = posegate.Gate(posegate.Table.open("demo-out/dock.posegate"), permits_in_a_row=1)
+/// >>> cov = [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]
+/// >>> gate.step_on(100, posegate.Evidence(100, 0.0, 0.0, 0.0, cov, others=[(0.01, 0.0, 0.0, cov)])).reason is None
+/// True
+/// >>> gate.step_on(150, posegate.Evidence(150, 0.0, 0.0, 0.0, cov, others=[(0.3, 0.0, 0.0, cov)])).reason
+/// 'not_contained'
+#[pyclass(frozen, name = "Evidence", module = "posegate")]
+pub struct PyEvidence {
+    stamp_ms: u32,
+    belief: PoseEstimate,
+    others: Vec<PoseEstimate>,
+    elsewhere: Risk,
+    sequence: Option<u32>,
+}
+
+#[pymethods]
+impl PyEvidence {
+    #[new]
+    #[pyo3(signature = (stamp_ms, x, y, yaw, cov, *, others=vec![], elsewhere=0.0, sequence=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        stamp_ms: u32,
+        x: f64,
+        y: f64,
+        yaw: f64,
+        cov: &Bound<'_, PyAny>,
+        others: Vec<(f64, f64, f64, Bound<'_, PyAny>)>,
+        elsewhere: f64,
+        sequence: Option<u32>,
+    ) -> PyResult<Self> {
+        let elsewhere = match elsewhere {
+            0.0 => Some(Risk::NONE),
+            _ if elsewhere > 0.0 => Risk::from_confidence(1.0 - elsewhere),
+            _ => None,
+        };
+        let elsewhere = elsewhere.ok_or_else(|| {
+            refused_argument(
+                py,
+                "elsewhere is no probability".into(),
+                "give a number from 0 to below 1",
+            )
+        })?;
+        let others = others
+            .iter()
+            .map(|(x, y, yaw, cov)| belief([*x, *y, *yaw], cov));
+        Ok(Self {
+            stamp_ms,
+            belief: belief([x, y, yaw], cov)?,
+            others: others.collect::<PyResult<_>>()?,
+            elsewhere,
+            sequence,
+        })
+    }
+}
+
 #[pymethods]
 impl PyGate {
     #[new]
@@ -183,7 +245,7 @@ impl PyGate {
         })
     }
 
-    /// Evaluates an estimate at the time `now_ms`: its stamp, m, m, rad, and its covariance by rows. `sequence` is the source's number of the
+    /// Evaluates an estimate at the time `now_ms`: its stamp, m, m, rad, and its covariance by rows or a `Bounded`. `sequence` is the source's number of the
     /// report; without it, no report counts as lost.
     #[pyo3(signature = (now_ms, stamp_ms, x, y, yaw, cov, sequence=None))]
     #[allow(clippy::too_many_arguments)]
@@ -202,9 +264,28 @@ impl PyGate {
         Ok(self.with(|gate| gate.step(now_ms, &report)).into())
     }
 
-    /// Evaluates what a tracker carries to the time `now_ms`. Without a usable fix the gate closes, with the reason.
-    fn step_on(&mut self, now_ms: u32, tracker: &mut PyTracker) -> PyGateStep {
-        let tracker = &mut tracker.tracker;
+    /// Evaluates, at the time `now_ms`, what a tracker carries to it, or an `Evidence`. Without a usable fix of a tracker the gate closes, with the
+    /// reason.
+    fn step_on(&mut self, now_ms: u32, evidence: &Bound<'_, PyAny>) -> PyResult<PyGateStep> {
+        if let Ok(evidence) = evidence.cast::<PyEvidence>() {
+            let evidence = evidence.get();
+            self.sequence = evidence.sequence.unwrap_or(self.sequence.wrapping_add(1));
+            let report = Report {
+                source: 0,
+                frame: self.frame,
+                sequence: self.sequence,
+                stamp_ms: evidence.stamp_ms,
+                belief: evidence.belief,
+            };
+            let evidence = Evidence {
+                others: &evidence.others,
+                elsewhere: evidence.elsewhere,
+                ..Evidence::of(&report)
+            };
+            return Ok(self.with(|gate| gate.step_on(now_ms, &evidence)).into());
+        }
+        let tracker: &Bound<'_, PyTracker> = evidence.cast()?;
+        let tracker = &mut tracker.try_borrow_mut()?.tracker;
         let step = self.with(|gate| {
             // The tracker may have been made for another table.
             if let Ok(table) = gate.table() {
@@ -215,7 +296,7 @@ impl PyGate {
                 Err(reason) => gate.inhibit(now_ms, reason),
             }
         });
-        step.into()
+        Ok(step.into())
     }
 
     /// Advances the time without a report.
@@ -334,7 +415,7 @@ impl PyTracker {
         Ok(self.tracker.odometry(increment).err().map(Reason::name))
     }
 
-    /// Takes a fix with its stamp: m, m, rad, and its covariance by rows. Returns the name of the reason if it cannot be carried.
+    /// Takes a fix with its stamp: m, m, rad, and its covariance by rows or a `Bounded`. Returns the name of the reason if it cannot be carried.
     #[pyo3(signature = (stamp_ms, x, y, yaw, cov))]
     fn fix(
         &mut self,
@@ -383,20 +464,14 @@ fn report(
     frame: FrameId,
     sequence: u32,
     stamp_ms: u32,
-    [x_m, y_m, yaw_rad]: [f64; 3],
+    pose: [f64; 3],
     cov: &Bound<'_, PyAny>,
 ) -> PyResult<Report> {
-    let cov = Numbers::new(cov, "cov", &[Some(3), Some(3)])?;
-    let numbers = cov.numbers()?.as_chunks().0;
-    let covariance: [[f64; 3]; 3] = std::array::from_fn(|row| numbers[row]);
     Ok(Report {
         source: 0,
         frame,
         sequence,
         stamp_ms,
-        belief: PoseEstimate::new(
-            Estimate { x_m, y_m, yaw_rad },
-            Uncertainty::Gaussian(covariance),
-        ),
+        belief: belief(pose, cov)?,
     })
 }

@@ -16,6 +16,7 @@ mod site;
 mod table;
 mod threads;
 mod trust;
+mod uncertainty;
 mod verdict;
 
 /// Runs a command line and returns its exit code. `library` is the file of this module.
@@ -40,6 +41,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<table::PyTable>()?;
     module.add_class::<verdict::PyVerdict>()?;
     module.add_class::<site::PySite>()?;
+    module.add_class::<uncertainty::PyBounded>()?;
+    module.add_class::<gate::PyEvidence>()?;
     module.add_class::<gate::PyGate>()?;
     module.add_class::<gate::PyGateStep>()?;
     module.add_class::<gate::PyTracker>()?;

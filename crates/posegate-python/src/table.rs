@@ -4,6 +4,7 @@ use crate::arrays::Numbers;
 use crate::error::{refused, refused_argument};
 use crate::threads::on_all_cores;
 use crate::trust::trust;
+use crate::uncertainty::{PyBounded, belief};
 use crate::verdict::PyVerdict;
 use numpy::IntoPyArray;
 use posegate::contain::Decision;
@@ -11,7 +12,7 @@ use posegate::contain::many::decide_many;
 use posegate::gate::{Reason, Verdict};
 use posegate::recordings::Evaluator;
 use posegate::report::PoseEstimate;
-use posegate::set::{Estimate, InputError, PoseSet, RadiusSquared, Trust, Uncertainty};
+use posegate::set::{Estimate, InputError, RadiusSquared, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_cli::calls::{self, Refusal};
 use posegate_replay::factor;
@@ -124,8 +125,8 @@ impl PyTable {
         format!("<posegate.Table {:?}, {length} bytes>", self.task())
     }
 
-    /// Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2. `cross_terms` says which
-    /// terms of it the source fills; `inflation` multiplies it.
+    /// Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2, or a `Bounded`. `cross_terms` says which
+    /// terms of the covariance the source fills; `inflation` multiplies it.
     #[pyo3(signature = (x, y, yaw, cov, epsilon=None, cross_terms="filled", inflation=1.0))]
     #[allow(clippy::too_many_arguments)]
     fn decide(
@@ -142,21 +143,12 @@ impl PyTable {
         let trust = trust(py, cross_terms, inflation)?;
         let (table, evaluator) = self.checked.borrow_dependent();
         let radius = calls::radius(table, epsilon).map_err(|error| refused(py, error))?;
-        let cov = Numbers::new(cov, "cov", &[Some(3), Some(3)])?;
-        let numbers = cov.numbers()?.as_chunks().0;
-        let covariance: [[f64; 3]; 3] = std::array::from_fn(|row| numbers[row]);
-        let verdict = py.detach(|| {
-            let estimate = Estimate {
-                x_m: x,
-                y_m: y,
-                yaw_rad: yaw,
-            };
-            evaluator.evaluate(0, 0, set(estimate, covariance, radius, trust))
-        });
+        let belief = belief([x, y, yaw], cov)?;
+        let verdict = py.detach(|| evaluator.evaluate(0, 0, belief.pose_set(radius, trust)));
         Ok(verdict.into())
     }
 
-    /// Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3). Returns two arrays: `True` for each that is permitted, and the
+    /// Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3), or one `Bounded` for all. Returns two arrays: `True` for each that is permitted, and the
     /// code of its reason, an index of `REASONS`. With `margins` also the margins, NaN where a reason has none.
     #[pyo3(signature = (poses, covs, epsilon=None, margins=false, cross_terms="filled", inflation=1.0))]
     #[allow(clippy::too_many_arguments)]
@@ -174,10 +166,18 @@ impl PyTable {
         let (table, evaluator) = self.checked.borrow_dependent();
         let radius = calls::radius(table, epsilon).map_err(|error| refused(py, error))?;
         let poses = Numbers::new(poses, "poses", &[None, Some(3)])?;
-        let covs = Numbers::new(covs, "covs", &[None, Some(3), Some(3)])?;
         let poses: &[[f64; 3]] = poses.numbers()?.as_chunks().0;
-        let covs: &[[[f64; 3]; 3]] = covs.numbers()?.as_chunks().0.as_chunks().0;
-        if poses.len() != covs.len() {
+        let bounded = covs.cast::<PyBounded>().ok();
+        let bounded = bounded.map(|bounded| bounded.get().uncertainty());
+        let covs = match bounded {
+            Some(_) => None,
+            None => Some(Numbers::new(covs, "covs", &[None, Some(3), Some(3)])?),
+        };
+        let covs: &[[[f64; 3]; 3]] = match &covs {
+            Some(covs) => covs.numbers()?.as_chunks().0.as_chunks().0,
+            None => &[],
+        };
+        if bounded.is_none() && poses.len() != covs.len() {
             let message = format!("{} poses have {} covariances", poses.len(), covs.len());
             return Err(refused_argument(
                 py,
@@ -186,14 +186,11 @@ impl PyTable {
             ));
         }
         let with_margins = || {
-            let all = poses.par_iter().zip(covs).with_min_len(MANY / 16);
-            let each = all.map(|([x_m, y_m, yaw_rad], covariance)| {
-                let estimate = Estimate {
-                    x_m: *x_m,
-                    y_m: *y_m,
-                    yaw_rad: *yaw_rad,
-                };
-                let set = set(estimate, *covariance, radius, trust);
+            let all = poses.par_iter().enumerate().with_min_len(MANY / 16);
+            let each = all.map(|(row, &[x_m, y_m, yaw_rad])| {
+                let estimate = Estimate { x_m, y_m, yaw_rad };
+                let spread = bounded.unwrap_or_else(|| Uncertainty::Gaussian(covs[row]));
+                let set = PoseEstimate::new(estimate, spread).pose_set(radius, trust);
                 if margins {
                     return code_and_margin(evaluator.evaluate(0, 0, set));
                 }
@@ -203,7 +200,7 @@ impl PyTable {
             each.unzip()
         };
         let (codes, found): (Vec<u8>, Vec<f64>) = py.detach(|| {
-            if margins || trust != Trust::FULL {
+            if margins || bounded.is_some() || trust != Trust::FULL {
                 return on_all_cores(with_margins);
             }
             let decide = || decide_many(table, radius, poses, covs);
@@ -222,16 +219,6 @@ impl PyTable {
             (permits, codes).into_pyobject(py)
         }
     }
-}
-
-/// Returns the pose-set of an estimate.
-fn set(
-    estimate: Estimate,
-    covariance: [[f64; 3]; 3],
-    radius: RadiusSquared,
-    trust: Trust,
-) -> Result<PoseSet, InputError> {
-    PoseEstimate::new(estimate, Uncertainty::Gaussian(covariance)).pose_set(radius, trust)
 }
 
 /// Returns the code of a verdict's reason, and its margin or NaN.

@@ -70,6 +70,19 @@ def main() -> None:
         poses = random.uniform(-0.1, 0.1, (300, 3))
         covs = np.tile(np.diag([1e-4, 2e-4, 1e-4]), (300, 1, 1))
         covs[0, 0, 0] = np.nan
+        # A bound for all rows, and each alone; and as the program decides.
+        bound = posegate.Bounded(0.02, 0.01)
+        require(pickle.loads(pickle.dumps(bound)) == bound, "a pickled bound is equal")
+        permit, reason, margin = table.decide_many(poses, bound, margins=True)
+        require(permit.any() and not permit.all(), "bounds permit some")
+        for row, (x, y, yaw) in enumerate(poses):
+            one = table.decide(float(x), float(y), float(yaw), bound)
+            require((one.permit, one.reason) == (permit[row], posegate.REASONS[reason[row]]), row)
+        # The speed is that in any direction: a pose-set grows across the robot's axis, too.
+        shut = posegate.Gate(table, permits_in_a_row=1, max_speed=0.5)
+        beside = shut.step(100, 100, 0.0, 0.03, 0.0, posegate.Bounded(0.001, 0.001))
+        still = posegate.Gate(table, permits_in_a_row=1).step(100, 100, 0.0, 0.03, 0.0, posegate.Bounded(0.001, 0.001))
+        require(still.is_open and beside.reason == "not_contained", (still, beside))
         trusts: tuple[Literal["filled", "yaw_unknown", "all_unknown"], ...] = ("filled", "yaw_unknown", "all_unknown")
         for terms in trusts:
             for inflation in (1.0, 2.5):

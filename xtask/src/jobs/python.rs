@@ -72,6 +72,11 @@ pub fn python(given: &Arguments) -> Result {
     test("examples.py").json()?;
     let folder = Scratch::new()?;
     in_target(test("page.py")).arg(folder.path()).json()?;
+    say("the notebook");
+    program_at(&python)
+        .words("-m pip install -q nbclient ipykernel")
+        .run()?;
+    test("notebook.py").arg(folder.path()).json()?;
     report.finish()
 }
 

@@ -9,11 +9,13 @@ import copyreg
 from typing import Any
 
 from ._calls import Drawing, cover, draw, learn_bounds, learn_inflation, metrics, place, plan, replay
-from ._core import REASONS, Gate, GateStep, PosegateError, Site, Table, Tracker, Verdict, __version__
+from ._core import REASONS, Bounded, Evidence, Gate, GateStep, PosegateError, Site, Table, Tracker, Verdict, __version__
 
 __all__ = [
     "REASONS",
+    "Bounded",
     "Drawing",
+    "Evidence",
     "Gate",
     "GateStep",
     "PosegateError",
@@ -41,11 +43,16 @@ def _pickled_table(table: Table) -> tuple[Any, ...]:
     return Table, (bytes(table),)
 
 
+def _pickled_bound(bound: Bounded) -> tuple[Any, ...]:
+    return Bounded, (bound.translation, bound.yaw)
+
+
 def _pickled_verdict(verdict: Verdict) -> tuple[Any, ...]:
     return Verdict, (verdict.permit, verdict.reason, verdict.margin, verdict.worst_pose)
 
 
 # A gate has a state that must not be copied, so it is not pickled.
+copyreg.pickle(Bounded, _pickled_bound)
 copyreg.pickle(Site, _pickled_site)
 copyreg.pickle(Table, _pickled_table)
 copyreg.pickle(Verdict, _pickled_verdict)

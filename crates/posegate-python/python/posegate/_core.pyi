@@ -13,6 +13,7 @@ REASONS: Final[tuple[Optional[str], ...]]
 """The names of the reasons by their codes. Code 0 is a permit: None."""
 
 _Path = Union[str, os.PathLike[str]]
+_Spread = Union[ArrayLike, "Bounded"]
 _Terms = Literal["filled", "yaw_unknown", "all_unknown"]
 
 class PosegateError(ValueError):
@@ -74,12 +75,12 @@ class Table:
         x: float,
         y: float,
         yaw: float,
-        cov: ArrayLike,
+        cov: _Spread,
         epsilon: Optional[float] = None,
         cross_terms: _Terms = "filled",
         inflation: float = 1.0,
     ) -> Verdict:
-        """Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2.
+        """Decides on one estimate: m, m, rad, and its covariance by rows in m^2, m rad and rad^2, or a `Bounded`.
 
         `cross_terms` says which terms of it the source fills; `inflation` (1 to 4096) multiplies it.
         """
@@ -88,7 +89,7 @@ class Table:
     def decide_many(
         self,
         poses: ArrayLike,
-        covs: ArrayLike,
+        covs: _Spread,
         epsilon: Optional[float] = None,
         margins: Literal[False] = False,
         cross_terms: _Terms = "filled",
@@ -98,14 +99,14 @@ class Table:
     def decide_many(
         self,
         poses: ArrayLike,
-        covs: ArrayLike,
+        covs: _Spread,
         epsilon: Optional[float] = None,
         *,
         margins: Literal[True],
         cross_terms: _Terms = "filled",
         inflation: float = 1.0,
     ) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.float64]]:
-        """Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3).
+        """Decides on many estimates: arrays of shape (n, 3) and (n, 3, 3), or one `Bounded` for all.
 
         With `margins` also returns the margins, NaN where a reason has none.
         Returns `True` for each that is permitted, and the codes of the reasons, indices of `REASONS`. Uses all cores and does not hold
@@ -165,6 +166,42 @@ class GateStep:
     def __ne__(self, other: object, /) -> bool: ...
 
 @final
+class Bounded:
+    """A bounded error, wherever a covariance is taken: the robot is within `translation` metres and `yaw` radians of the estimate."""
+
+    @property
+    def translation(self) -> float:
+        """The radius in the plane, metres."""
+
+    @property
+    def yaw(self) -> float:
+        """The half width in yaw, radians."""
+
+    def __new__(cls, translation: float, yaw: float) -> "Bounded": ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class Evidence:
+    """An estimate with its stamp, and other hypotheses about the robot's pose: a gate permits only if the pose-set of every one is inside.
+
+    `others` are estimates (x, y, yaw, cov) of the same moment; `elsewhere` is the probability that the robot is at none of them.
+    """
+
+    def __new__(
+        cls,
+        stamp_ms: int,
+        x: float,
+        y: float,
+        yaw: float,
+        cov: _Spread,
+        *,
+        others: list[tuple[float, float, float, _Spread]] = [],
+        elsewhere: float = 0.0,
+        sequence: Optional[int] = None,
+    ) -> "Evidence": ...
+
+@final
 class Gate:
     """The state machine of the motion controller: it opens after consecutive permits, and closes at once on a denial."""
 
@@ -183,12 +220,12 @@ class Gate:
         now_ms: int = 0,
     ) -> "Gate": ...
     def step(
-        self, now_ms: int, stamp_ms: int, x: float, y: float, yaw: float, cov: ArrayLike, sequence: Optional[int] = None
+        self, now_ms: int, stamp_ms: int, x: float, y: float, yaw: float, cov: _Spread, sequence: Optional[int] = None
     ) -> GateStep:
-        """Evaluates an estimate at the time `now_ms`: its stamp, m, m, rad, and its covariance by rows."""
+        """Evaluates an estimate at the time `now_ms`: its stamp, m, m, rad, and its covariance by rows or a `Bounded`."""
 
-    def step_on(self, now_ms: int, tracker: "Tracker") -> GateStep:
-        """Evaluates what a tracker carries to the time `now_ms`. Without a usable fix the gate closes."""
+    def step_on(self, now_ms: int, evidence: Union["Tracker", Evidence]) -> GateStep:
+        """Evaluates, at the time `now_ms`, what a tracker carries to it, or an `Evidence`. Without a usable fix of a tracker the gate closes."""
 
     def tick(self, now_ms: int) -> GateStep:
         """Advances the time without a report."""
@@ -221,7 +258,7 @@ class Tracker:
     def odometry(self, ahead: float, left: float, turn: float, from_ms: int, to_ms: int) -> Optional[str]:
         """Adds a movement between two times: metres ahead, metres to the left, radians to the left."""
 
-    def fix(self, stamp_ms: int, x: float, y: float, yaw: float, cov: ArrayLike) -> Optional[str]:
+    def fix(self, stamp_ms: int, x: float, y: float, yaw: float, cov: _Spread) -> Optional[str]:
         """Takes a fix with its stamp: m, m, rad, and its covariance by rows."""
 
     def tracked(self, now_ms: int) -> dict[str, Any]:
