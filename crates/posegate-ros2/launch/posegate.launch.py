@@ -35,6 +35,9 @@ def generate_launch_description():
                     ["odom:=", LaunchConfiguration("odom")],
                 ],
                 output="screen",
+                # A node that has ended starts again, closed.
+                respawn=True,
+                respawn_delay=2.0,
             ),
         ]
     )

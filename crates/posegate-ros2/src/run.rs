@@ -6,6 +6,7 @@ use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
 use crate::diagnostics::{diagnostics, wrong_frame};
 use crate::graph::{Environment, Graph, GraphError, Input};
+use crate::lifecycle::State;
 use crate::message::{Bool, TriggerResponse};
 use crate::names::Names;
 use crate::permission::Heartbeat;
@@ -52,6 +53,8 @@ pub struct Runner<'a, D> {
     composed: i64,
     camera_info: Option<Received>,
     odometry: Option<Received>,
+    /// Active, unless a manager decides on it.
+    lifecycle: State,
     was_open: bool,
     has_report: bool,
     sent: Sent,
@@ -115,6 +118,10 @@ impl<'a, D: Decider> Runner<'a, D> {
             heartbeat: Heartbeat::new(),
             watch: ClockWatch::new(),
             clock_steps: 0,
+            lifecycle: match settings.is_managed {
+                true => State::Unconfigured,
+                false => State::Active,
+            },
             was_open: false,
             has_report: false,
             sent: Sent::default(),
@@ -159,7 +166,7 @@ impl<'a, D: Decider> Runner<'a, D> {
     pub fn run(&mut self, stop: &AtomicBool) -> Result<(), GraphError> {
         let mut events = Events::with_capacity(16);
         let cycle = Duration::from_millis(u64::from(self.settings.cycle_ms));
-        while !stop.load(Ordering::Relaxed) {
+        while !(stop.load(Ordering::Relaxed) || self.lifecycle == State::Finalized) {
             // A report that came directly after a heartbeat waits no longer than necessary.
             let timeout = if self.has_report { SHORTEST } else { cycle };
             let timeout = self
@@ -201,9 +208,17 @@ impl<'a, D: Decider> Runner<'a, D> {
         self.take_odometry();
         self.take_camera_info();
         self.take_reports();
-        let answer = self.gate.tick(Now::read());
+        let answer = self.now();
         self.publish(&answer, Instant::now(), false);
         self.serve();
+    }
+
+    /// Returns the answer at this moment. A node that is not active denies.
+    fn now(&mut self) -> Answer {
+        match self.lifecycle {
+            State::Active => self.gate.tick(Now::read()),
+            _ => self.gate.inhibit(Now::read(), Reason::Silent),
+        }
     }
 
     /// Takes the last name that was asked for. The denial is published before any report is evaluated for the other
@@ -219,7 +234,7 @@ impl<'a, D: Decider> Runner<'a, D> {
             return;
         };
         self.gate.ask(Now::read(), &name);
-        let answer = self.gate.tick(Now::read());
+        let answer = self.now();
         self.publish(&answer, Instant::now(), true);
     }
 
@@ -251,8 +266,12 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
     }
 
-    /// Takes poses or detections. After one that could not be read the next has a gap before it, and is denied.
+    /// Takes poses or detections. After one that could not be read the next has a gap before it, and is denied. A node that is not active
+    /// drops them.
     fn take_reports(&mut self) {
+        if self.lifecycle != State::Active {
+            return self.drop_reports();
+        }
         let (received, poses) = (&mut self.pose, &mut self.poses);
         let (gate, has_report) = (&mut self.gate, &mut self.has_report);
         let (refused, composed) = (&mut self.refused, &mut self.composed);
@@ -304,11 +323,28 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
     }
 
+    fn drop_reports(&mut self) {
+        let received = &mut self.pose;
+        match &self.graph.input {
+            Input::Poses(topic) => drain(topic, BATCH, received, |_, _| ()),
+            Input::Odometry(topic) => drain(topic, BATCH, received, |_, _| ()),
+            Input::Plain(topic) => drain(topic, BATCH, received, |_, _| ()),
+            Input::Transforms(topic) => drain(topic, BATCH, received, |_, _| ()),
+            Input::Detections(topic, _) => drain(topic, BATCH, received, |_, _| ()),
+        }
+    }
+
     /// Returns the action that the node knows and the gate does not: the fault of the topic, of the last pose, of stamps,
     /// or the hold that would open.
     fn hint(&self, answer: &Answer) -> Option<String> {
         let (pose, settings) = (&self.pose, self.settings);
         let reason = answer.reason()?;
+        if self.lifecycle != State::Active {
+            let state = self.lifecycle.labelled().label;
+            return Some(format!(
+                "the node is {state}: it decides when its manager of lifecycles has made it active"
+            ));
+        }
         if let Some(problem) = self.gate.problem() {
             return Some(problem);
         }
@@ -393,8 +429,19 @@ impl<'a, D: Decider> Runner<'a, D> {
     }
 
     fn serve(&mut self) {
+        if let Some(servers) = &self.graph.lifecycle {
+            let state = servers.serve(self.lifecycle);
+            if state != self.lifecycle {
+                self.lifecycle = state;
+                let answer = self.now();
+                self.publish(&answer, Instant::now(), false);
+            }
+        }
+        if let Some(servers) = &self.graph.parameters {
+            servers.serve(&self.settings.parameters);
+        }
         while let Ok(Some((id, _))) = self.graph.explain.receive_request() {
-            let answer = self.gate.tick(Now::read());
+            let answer = self.now();
             let response = TriggerResponse {
                 success: true,
                 message: self.gate.explain(&answer, self.hint(&answer).as_deref()),
@@ -404,7 +451,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         while let Ok(Some((id, _))) = self.graph.reset.receive_request() {
             let now = Now::read();
             let reset = self.gate.reset(now);
-            let answer = self.gate.tick(Now::read());
+            let answer = self.now();
             self.publish(&answer, Instant::now(), false);
             let success = reset.is_ok();
             let (Ok(message) | Err(message)) = reset;

@@ -2,6 +2,7 @@
 
 use self::reader::Reader;
 use crate::arguments::Arguments;
+use crate::parameter_services::Known;
 use crate::poses::PoseSettings;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
@@ -81,6 +82,10 @@ pub struct NodeSettings {
     pub tracker: Option<TrackerSettings>,
     /// `true` if markers are published.
     pub markers: bool,
+    /// `true` if the node denies until a manager of lifecycles has made it active.
+    pub is_managed: bool,
+    /// The parameters as services report them.
+    pub parameters: Known,
     /// The line to the controller that decides; `None` if the node decides.
     pub serial: Option<Serial>,
 }
@@ -216,7 +221,7 @@ impl NodeSettings {
     /// # Errors
     /// [`SettingsError`]. No accepted value disables a check.
     pub fn new(arguments: &Arguments, table: &[u8]) -> Result<Self, SettingsError> {
-        let reader = Reader(&arguments.parameters);
+        let reader = Reader::new(&arguments.parameters);
         reader.check_names()?;
         if reader.bool("use_sim_time", false)? {
             return Err(SettingsError::SimulatedTime);
@@ -291,17 +296,16 @@ impl NodeSettings {
             cycle_ms: reader.ms("cycle_ms", 20)?,
             heartbeat_ms: reader.ms("heartbeat_ms", 50)?,
             valid_ms: reader.ms("valid_ms", 250)?,
-            pose_delivery: reader.delivery("pose_reliability", "pose_durability", false)?,
-            odom_delivery: reader.delivery("odom_reliability", "odom_durability", false)?,
-            detections_delivery: reader.delivery(
-                "detections_reliability",
-                "detections_durability",
-                false,
-            )?,
+            pose_delivery: reader.delivery("pose_reliability", "pose_durability")?,
+            odom_delivery: reader.delivery("odom_reliability", "odom_durability")?,
+            detections_delivery: reader
+                .delivery("detections_reliability", "detections_durability")?,
             camera_info_delivery: reader.best_effort("camera_info_reliability")?,
             detector,
             tracker,
             markers: reader.bool("markers", true)?,
+            is_managed: reader.bool("lifecycle", false)?,
+            parameters: reader.known(serial.is_some()),
             serial,
         };
         settings.check()?;

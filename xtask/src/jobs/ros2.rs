@@ -25,9 +25,9 @@ struct Release {
 const JAZZY: Release = Release {
     name: "Jazzy",
     environment: "ros2-tools",
-    modules: "cyclonedds",
+    modules: "cyclonedds, lifecycle_msgs.srv",
     wheels: "ros-rclpy==7.1.6 ros-rmw-fastrtps-cpp==8.4.3 ros-geometry-msgs==5.3.6 ros-nav-msgs==5.3.6 ros-std-msgs==5.3.6 \
-             ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 mcap==1.6.0 cyclonedds==11.0.1",
+             ros-std-srvs==5.3.6 ros-diagnostic-msgs==5.3.6 ros-visualization-msgs==5.3.6 ros-lifecycle-msgs==2.0.3 mcap==1.6.0 cyclonedds==11.0.1",
 };
 const KILTED: Release = Release {
     name: "Kilted",
@@ -82,6 +82,7 @@ pub fn ros2(given: &Arguments) -> Result {
     live(&jazzy, "cyclone").json()?;
     live(&jazzy, "fleet").json()?;
     live(&jazzy, "docks").json()?;
+    live(&jazzy, "managed").json()?;
     live(&jazzy, "detections").json()?;
     say("a controller on a serial line");
     let firmware = board::build(Level::Fast, CORE, "interrupt_gate")?;

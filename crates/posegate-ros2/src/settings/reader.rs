@@ -2,6 +2,7 @@
 
 use super::{Delivery, Serial, SettingsError, hex};
 use crate::arguments::Arguments;
+use crate::parameter_services::Known;
 use crate::parameters::{Parameters, Value};
 use crate::poses::{PoseSettings, PoseType};
 use posegate::gate::task_digest;
@@ -12,11 +13,12 @@ use posegate::track::{OdometryErrors, TrackerSettings};
 use posegate_replay::detector::{Detector, DetectorSettings};
 use posegate_replay::recording::{BodyFrames, FrameNames};
 use posegate_site::Site;
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Every parameter.
-const NAMES: [&str; 51] = [
+const NAMES: [&str; 52] = [
     "camera",
     "camera_info_reliability",
     "child_frame_id",
@@ -29,6 +31,7 @@ const NAMES: [&str; 51] = [
     "heartbeat_ms",
     "inflation",
     "inhibit_hold_ms",
+    "lifecycle",
     "link_timeout_ms",
     "look_at",
     "markers",
@@ -72,11 +75,12 @@ const NAMES: [&str; 51] = [
 
 /// The parameters of a node with a controller. All others are settings of the gate or of odometry, which such a node
 /// does not have.
-const WITH_CONTROLLER: [&str; 16] = [
+const WITH_CONTROLLER: [&str; 17] = [
     "child_frame_id",
     "cycle_ms",
     "frame_id",
     "heartbeat_ms",
+    "lifecycle",
     "link_timeout_ms",
     "odom_frame_id",
     "pose_durability",
@@ -121,11 +125,34 @@ const TIME: &str = "milliseconds, a whole number from 1 to 60000";
 const NUMBER: &str = "a number that is not below zero";
 
 /// Reads parameters by name.
-pub(super) struct Reader<'p>(pub(super) &'p Parameters);
+pub(super) struct Reader<'p> {
+    given: &'p Parameters,
+    /// Every parameter that was read, with its value or default.
+    used: RefCell<BTreeMap<&'static str, Value>>,
+}
 
-impl Reader<'_> {
+impl<'p> Reader<'p> {
+    pub(super) fn new(given: &'p Parameters) -> Self {
+        Self {
+            given,
+            used: RefCell::default(),
+        }
+    }
+
+    /// Returns the parameters that the node has, with their values or defaults.
+    pub(super) fn known(self, is_serial: bool) -> Known {
+        let mut used = self.used.into_inner();
+        used.retain(|name, _| !is_serial || WITH_CONTROLLER.contains(name));
+        Known(used)
+    }
+
+    fn used<T>(&self, name: &'static str, value: Value, is: T) -> T {
+        self.used.borrow_mut().insert(name, value);
+        is
+    }
+
     pub(super) fn check_names(&self) -> Result<(), SettingsError> {
-        let unknown = self.0.names().find(|name| !NAMES.contains(name));
+        let unknown = self.given.names().find(|name| !NAMES.contains(name));
         let Some(name) = unknown else {
             return Ok(());
         };
@@ -136,7 +163,7 @@ impl Reader<'_> {
         let hint = similar.filter(|(distance, _)| *distance <= 3);
         Err(SettingsError::Unknown {
             name: name.to_owned(),
-            place: self.0.place(name).to_owned(),
+            place: self.given.place(name).to_owned(),
             hint: hint.map_or(String::new(), |(_, known)| {
                 format!(" (did you mean `{known}`?)")
             }),
@@ -146,19 +173,19 @@ impl Reader<'_> {
 
     pub(super) fn serial(&self, arguments: &Arguments) -> Result<Option<Serial>, SettingsError> {
         let Some((path, baud)) = &arguments.serial else {
-            return match self.0.get("link_timeout_ms") {
+            return match self.given.get("link_timeout_ms") {
                 None => Ok(None),
                 Some(_) => Err(SettingsError::NoSerial),
             };
         };
-        let names = self.0.names().filter(|name| *name != "use_sim_time");
+        let names = self.given.names().filter(|name| *name != "use_sim_time");
         let foreign = names
             .into_iter()
             .find(|name| !WITH_CONTROLLER.contains(name));
         match foreign {
             Some(name) => Err(SettingsError::OfTheController {
                 name: name.to_owned(),
-                place: self.0.place(name).to_owned(),
+                place: self.given.place(name).to_owned(),
             }),
             None => Ok(Some(Serial {
                 path: path.clone(),
@@ -174,7 +201,7 @@ impl Reader<'_> {
     }
 
     fn invalid(&self, name: &'static str, expected: &'static str) -> SettingsError {
-        let given = match self.0.get(name) {
+        let given = match self.given.get(name) {
             Some(Value::Bool(value)) => value.to_string(),
             Some(Value::Integer(value)) => value.to_string(),
             Some(Value::Double(value)) => format!("{value:?}"),
@@ -183,35 +210,37 @@ impl Reader<'_> {
         };
         SettingsError::Invalid {
             name,
-            place: self.0.place(name).to_owned(),
+            place: self.given.place(name).to_owned(),
             given,
             expected,
         }
     }
 
     pub(super) fn bool(&self, name: &'static str, default: bool) -> Result<bool, SettingsError> {
-        match self.0.get(name) {
-            None => Ok(default),
-            Some(Value::Bool(value)) => Ok(*value),
+        match self.given.get(name) {
+            None => Ok(self.used(name, Value::Bool(default), default)),
+            Some(Value::Bool(value)) => Ok(self.used(name, Value::Bool(*value), *value)),
             Some(_) => Err(self.invalid(name, "true or false")),
         }
     }
 
     pub(super) fn text(&self, name: &'static str, default: &str) -> Result<String, SettingsError> {
-        match self.0.get(name) {
-            None => Ok(default.to_owned()),
-            Some(Value::Text(value)) if !value.is_empty() => Ok(value.clone()),
-            Some(_) => Err(self.invalid(name, "a text that is not empty")),
-        }
+        let text = match self.given.get(name) {
+            None => default.to_owned(),
+            Some(Value::Text(value)) if !value.is_empty() => value.clone(),
+            Some(_) => return Err(self.invalid(name, "a text that is not empty")),
+        };
+        Ok(self.used(name, Value::Text(text.clone()), text))
     }
 
     fn number(&self, name: &'static str) -> Result<Option<f64>, SettingsError> {
-        match self.0.get(name) {
-            None => Ok(None),
-            Some(Value::Double(value)) if value.is_finite() && *value >= 0.0 => Ok(Some(*value)),
-            Some(Value::Integer(value)) if *value >= 0 => Ok(Some(*value as f64)),
-            Some(_) => Err(self.invalid(name, NUMBER)),
-        }
+        let number = match self.given.get(name) {
+            None => return Ok(None),
+            Some(Value::Double(value)) if value.is_finite() && *value >= 0.0 => *value,
+            Some(Value::Integer(value)) if *value >= 0 => *value as f64,
+            Some(_) => return Err(self.invalid(name, NUMBER)),
+        };
+        Ok(Some(self.used(name, Value::Double(number), number)))
     }
 
     pub(super) fn whole(
@@ -221,13 +250,14 @@ impl Reader<'_> {
         expected: &'static str,
         range: std::ops::RangeInclusive<i64>,
     ) -> Result<u32, SettingsError> {
-        match self.0.get(name) {
-            None => Ok(default),
+        let whole = match self.given.get(name) {
+            None => default,
             Some(Value::Integer(value)) if range.contains(value) => {
-                u32::try_from(*value).map_err(|_| self.invalid(name, expected))
+                u32::try_from(*value).map_err(|_| self.invalid(name, expected))?
             }
-            Some(_) => Err(self.invalid(name, expected)),
-        }
+            Some(_) => return Err(self.invalid(name, expected)),
+        };
+        Ok(self.used(name, Value::Integer(i64::from(whole)), whole))
     }
 
     pub(super) fn ms(&self, name: &'static str, default: u32) -> Result<u32, SettingsError> {
@@ -241,12 +271,18 @@ impl Reader<'_> {
         choices: [&str; N],
         expected: &'static str,
     ) -> Result<usize, SettingsError> {
-        let given = match self.0.get(name) {
-            None => return Ok(0),
+        let chosen = match self.given.get(name) {
+            None => Some(0),
             Some(Value::Text(given)) => choices.iter().position(|choice| choice == given),
             Some(_) => None,
         };
-        given.ok_or_else(|| self.invalid(name, expected))
+        let word = chosen.and_then(|chosen| choices.get(chosen));
+        match (chosen, word) {
+            (Some(chosen), Some(word)) => {
+                Ok(self.used(name, Value::Text((*word).to_owned()), chosen))
+            }
+            _ => Err(self.invalid(name, expected)),
+        }
     }
 
     pub(super) fn site(
@@ -256,11 +292,11 @@ impl Reader<'_> {
     ) -> Result<([u8; 32], bool), SettingsError> {
         let expected = "the 64 hexadecimal digits that `posegate table info` prints";
         // The older name of the parameter.
-        let name = match self.0.get("task_digest") {
+        let name = match self.given.get("task_digest") {
             None => "site_digest",
             Some(_) => "task_digest",
         };
-        let parameter = match self.0.get(name) {
+        let parameter = match self.given.get(name) {
             None => None,
             Some(Value::Text(digits)) => Some(digits.as_str()),
             Some(_) => return Err(self.invalid(name, expected)),
@@ -273,7 +309,7 @@ impl Reader<'_> {
             place: if option.is_some() {
                 "--task-digest"
             } else {
-                self.0.place(name)
+                self.given.place(name)
             }
             .to_owned(),
             given: format!("`{digits}`"),
@@ -319,10 +355,10 @@ impl Reader<'_> {
     ) -> Result<Option<Detector>, SettingsError> {
         let is_used = self.bool("use_detections", false)?;
         let foreign: &[&str] = if is_used { &OF_POSES } else { &OF_DETECTIONS };
-        if let Some(name) = foreign.iter().find(|name| self.0.get(name).is_some()) {
+        if let Some(name) = foreign.iter().find(|name| self.given.get(name).is_some()) {
             return Err(SettingsError::OtherInput {
                 name: (*name).to_owned(),
-                place: self.0.place(name).to_owned(),
+                place: self.given.place(name).to_owned(),
                 of: if is_used {
                     "poses"
                 } else {
@@ -335,7 +371,7 @@ impl Reader<'_> {
             return Ok(None);
         }
         let site = site.ok_or(SettingsError::NoSite)?;
-        let camera = match self.0.get("camera") {
+        let camera = match self.given.get("camera") {
             None => None,
             Some(_) => Some(self.text("camera", "")?),
         };
@@ -390,7 +426,7 @@ impl Reader<'_> {
                 Some([translation, yaw.to_radians()])
             }
         };
-        let child = match self.0.get("child_frame_id") {
+        let child = match self.given.get("child_frame_id") {
             None => None,
             Some(_) => Some(self.text("child_frame_id", "")?),
         };
@@ -483,7 +519,7 @@ impl Reader<'_> {
 
     pub(super) fn look_at(&self) -> Result<Option<u32>, SettingsError> {
         let expected = "the id of a tag, a whole number that is not below zero";
-        match self.0.get("look_at") {
+        match self.given.get("look_at") {
             None => Ok(None),
             Some(_) => self
                 .whole("look_at", 0, expected, 0..=i64::from(u32::MAX))
@@ -495,7 +531,6 @@ impl Reader<'_> {
         &self,
         reliability: &'static str,
         durability: &'static str,
-        is_latched: bool,
     ) -> Result<Delivery, SettingsError> {
         let reliable = self.choice(
             reliability,
@@ -503,10 +538,8 @@ impl Reader<'_> {
             "`reliable` or `best_effort`",
         )? == 0;
         let expected = "`transient_local` or `volatile`";
-        let transient_local = match self.0.get(durability) {
-            None => is_latched,
-            Some(_) => self.choice(durability, ["transient_local", "volatile"], expected)? == 0,
-        };
+        let transient_local =
+            self.choice(durability, ["volatile", "transient_local"], expected)? == 1;
         Ok(Delivery {
             reliable,
             // Only reliable subscriptions receive earlier messages.
