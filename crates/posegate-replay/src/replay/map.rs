@@ -5,7 +5,7 @@ use posegate::gate::Verdict;
 use posegate::set::Uncertainty;
 
 /// The most estimates that are kept.
-pub const MOST: usize = 512;
+const MOST: usize = 512;
 
 /// An estimate as a map shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct MapPose {
     pub verdict: Verdict,
 }
 
-/// Every n-th estimate: n is the smallest power of two with which at most [`MOST`] are kept.
+/// Every n-th estimate: n is the smallest power of two with which at most 512 are kept.
 #[derive(Clone, Debug, Default)]
 pub struct Map {
     /// The number of halvings so far.
