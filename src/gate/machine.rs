@@ -406,8 +406,8 @@ impl<'a> Gate<'a> {
     }
 
     /// Revokes the permit before anything is checked, then checks the settings before any of them is used. Returns
-    /// the state from before. Until a new state is stored, the last thing that a step does, the state is a corrupt word: a step that is not
-    /// completed, or that stores what it found elsewhere, leaves a fault.
+    /// the state from before. Until a new state is stored, the state is a corrupt word: a step that is not completed, or that stores elsewhere
+    /// what it found, leaves a fault. A permit is the last thing that a step stores.
     fn revoke(&mut self) -> Result<StateSnapshot, CorruptWord> {
         let before = StateSnapshot::of(self.state)?;
         if !matches!(before.standing, DecodedState::Latched(_)) {

@@ -532,6 +532,41 @@ fn second_checks_refuse_what_first_checks_let_through() {
     }
 }
 
+/// A report that the first checks let through, but that follows no other report, is a fault of the gate.
+#[test]
+fn a_step_checks_the_order_again() {
+    let table = Table::parse(SEE_T7).unwrap();
+    let settings = settings(&table, 1);
+    let others: [fn(&mut Report); 3] = [
+        |_| (),
+        |report| report.stamp_ms = 1005,
+        |report| report.frame = FrameId::of("odom"),
+    ];
+    for (number, other) in others.into_iter().enumerate() {
+        let mut gate = Gate::new(SEE_T7, &settings, 900).unwrap();
+        assert!(gate.step(1010, &report(1, 0.0)).permission.is_permit());
+        let mut next = report(2, 0.0);
+        other(&mut next);
+        gate.now_ms = RedundantWord::new(1020);
+        let before = gate.revoke().unwrap();
+        let taken = gate.take(
+            1020,
+            &Evidence::of(&next),
+            Ok(&MAP),
+            Ok(next.stamp_ms),
+            &before,
+        );
+        let follows = number == 0;
+        let expected = if follows {
+            Ok(Ok(()))
+        } else {
+            Err(CorruptWord)
+        };
+        assert_eq!(taken, expected, "{number}");
+        assert_eq!(gate.state() == State::Permitted, follows, "{number}");
+    }
+}
+
 /// A report that the first checks take for the last one, but that is another one, does not keep the gate open.
 #[test]
 fn another_report_is_no_repetition() {
