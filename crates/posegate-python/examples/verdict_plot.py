@@ -6,13 +6,7 @@ The recording is what `posegate replay` reads: a bag of ROS 2 (MCAP, with --topi
 """
 
 import argparse
-import json
-import subprocess
-import sys
-import tempfile
 from collections import Counter
-from pathlib import Path
-from typing import Any
 
 import matplotlib
 
@@ -20,21 +14,9 @@ matplotlib.use("Agg")  # A file, no window.
 
 import matplotlib.pyplot as plt
 import numpy as np
+import posegate
 
 PERMIT, DENY = "tab:green", "tab:red"
-
-
-def verdicts(site: str, recording: str, task: str, topics: list[str]) -> list[dict[str, Any]]:
-    """Returns the gate's decision on each estimate of a recording."""
-    with tempfile.TemporaryDirectory() as folder:
-        rows = Path(folder) / "rows.jsonl"
-        command = [sys.executable, "-m", "posegate", "replay", site, recording, "--task", task, "--json", "--rows", str(rows)]
-        for topic in topics:
-            command += ["--topic", topic]
-        ended = subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
-        if ended.returncode not in (0, 1):
-            sys.exit(ended.returncode)
-        return [json.loads(line) for line in rows.read_text().splitlines()]
 
 
 def main() -> None:
@@ -46,7 +28,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", required=True, help="the picture: PNG, SVG or PDF")
     given = parser.parse_args()
 
-    rows = verdicts(given.site, given.recording, given.task, given.topic)
+    rows = posegate.replay(given.site, given.recording, given.task, topic=given.topic, rows=True)["rows"]
     rows = [row for row in rows if row["pose"] is not None and np.all(np.isfinite(np.array(row["pose"], dtype=float)))]
     permit = np.array([row["verdict"] == "permit" for row in rows], dtype=np.bool_)
     poses = np.array([row["pose"] for row in rows], dtype=np.float64).reshape(-1, 3)

@@ -126,7 +126,7 @@ impl PyGateStep {
 /// >>> cov = [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]
 /// >>> gate.step_on(100, posegate.Evidence(100, 0.0, 0.0, 0.0, cov, others=[(0.01, 0.0, 0.0, cov)])).reason is None
 /// True
-/// >>> gate.step_on(150, posegate.Evidence(150, 0.0, 0.0, 0.0, cov, others=[(0.3, 0.0, 0.0, cov)])).reason
+/// >>> gate.step_on(150, posegate.Evidence(150, 0.0, 0.0, 0.0, cov, others=[(0.07, 0.0, 0.0, cov)])).reason
 /// 'not_contained'
 #[pyclass(frozen, name = "Evidence", module = "posegate")]
 pub struct PyEvidence {
@@ -153,18 +153,15 @@ impl PyEvidence {
         elsewhere: f64,
         sequence: Option<u32>,
     ) -> PyResult<Self> {
-        let elsewhere = match elsewhere {
-            0.0 => Some(Risk::NONE),
-            _ if elsewhere > 0.0 => Risk::from_confidence(1.0 - elsewhere),
-            _ => None,
-        };
-        let elsewhere = elsewhere.ok_or_else(|| {
-            refused_argument(
+        if !(0.0..1.0).contains(&elsewhere) {
+            return Err(refused_argument(
                 py,
-                "elsewhere is no probability".into(),
-                "give a number from 0 to below 1",
-            )
-        })?;
+                format!("elsewhere is {elsewhere}"),
+                "give a probability, a number from 0 to below 1",
+            ));
+        }
+        // The product is exact; rounded up, so that no probability above 0 counts as none.
+        let elsewhere = Risk::from_q32((elsewhere * 2.0_f64.powi(32)).ceil() as u32);
         let others = others
             .iter()
             .map(|(x, y, yaw, cov)| belief([*x, *y, *yaw], cov));

@@ -74,7 +74,7 @@ def main() -> None:
         bound = posegate.Bounded(0.02, 0.01)
         require(pickle.loads(pickle.dumps(bound)) == bound, "a pickled bound is equal")
         permit, reason, margin = table.decide_many(poses, bound, margins=True)
-        require(permit.any() and not permit.all(), "bounds permit some")
+        require(bool(permit.any()) and not bool(permit.all()), "bounds permit some")
         for row, (x, y, yaw) in enumerate(poses):
             one = table.decide(float(x), float(y), float(yaw), bound)
             require((one.permit, one.reason) == (permit[row], posegate.REASONS[reason[row]]), row)
