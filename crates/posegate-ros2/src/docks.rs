@@ -142,6 +142,8 @@ fn dock(folder: &Path, listed: &File, arguments: &Arguments) -> Result<Dock, Doc
         return Err(damaged(format!("is not the one that {MANIFEST} lists")));
     }
     settings.site_is_checked = true;
+    // Each table has its own.
+    settings.parameters.leave_out("task");
     Ok(Dock { table, settings })
 }
 

@@ -165,10 +165,10 @@ pub struct Graph {
     pub reset: Server<TriggerRequest, TriggerResponse>,
     /// The service that returns the reason why the gate is closed.
     pub explain: Server<TriggerRequest, TriggerResponse>,
-    /// The services of a managed node: its parameters, and its lifecycle. (With twelve more ends of topics, one of five starts of three nodes was
-    /// not discovered within 25 s beside busy cores, so a node that does not need them has none.)
+    /// The services of the parameters, of a managed node alone: with their twelve ends of topics, some nodes are not discovered in time beside
+    /// busy cores.
     pub parameters: Option<ParameterServers>,
-    /// See [`Self::parameters`].
+    /// The services of the lifecycle, of a managed node alone.
     pub lifecycle: Option<LifecycleServers>,
     threads: DdsThreads,
     // Fields are dropped in their order: the node is the last one.

@@ -8,11 +8,16 @@ use ros2_client::parameters::raw::{
 use ros2_client::rcl_interfaces::{ListParametersRequest, ListParametersResult};
 use std::collections::BTreeMap;
 
-/// The parameters with their values, as given or by default.
+/// The parameters that a node reports, by name, with their values as given or by default.
 #[derive(Clone, Debug, Default)]
-pub struct Known(pub BTreeMap<&'static str, Value>);
+pub struct ReportedParameters(pub BTreeMap<&'static str, Value>);
 
-impl Known {
+impl ReportedParameters {
+    /// Leaves out a parameter.
+    pub fn leave_out(&mut self, name: &str) {
+        self.0.remove(name);
+    }
+
     /// Returns the value of each name; "not set" for an unknown one.
     #[must_use]
     pub fn values(&self, names: &[String]) -> Vec<ParameterValue> {
@@ -111,13 +116,13 @@ mod tests {
 
     #[test]
     fn parameters_are_listed_and_described_with_their_types() {
-        let known = Known(BTreeMap::from([
+        let reported = ReportedParameters(BTreeMap::from([
             ("frame_id", Value::Text("map".into())),
             ("max_speed", Value::Double(0.3)),
             ("cycle_ms", Value::Integer(20)),
             ("markers", Value::Bool(true)),
         ]));
-        let listed = known.list(&ListParametersRequest {
+        let listed = reported.list(&ListParametersRequest {
             prefixes: Vec::new(),
             depth: 0,
         });
@@ -127,11 +132,16 @@ mod tests {
         );
         let mut names = listed.names;
         names.push("unknown".into());
-        assert_eq!(known.types(&names), [2, 4, 1, 3, 0]);
-        let values = known.values(&names);
+        assert_eq!(reported.types(&names), [2, 4, 1, 3, 0]);
+        let values = reported.values(&names);
         assert_eq!(values[1].string_value, "map");
         assert_eq!(values[3].double_value, 0.3);
-        assert!(known.descriptors(&names).iter().all(|each| each.read_only));
+        assert!(
+            reported
+                .descriptors(&names)
+                .iter()
+                .all(|each| each.read_only)
+        );
         let wanted = Parameter {
             name: "max_speed".into(),
             value: raw(Some(&Value::Double(0.1))),

@@ -4,7 +4,7 @@ use crate::lifecycle::{
     AvailableStates, AvailableTransitions, ChangeState, Changed, CurrentState, State,
 };
 use crate::message::TriggerRequest;
-use crate::parameter_services::{Known, refused};
+use crate::parameter_services::{ReportedParameters, refused};
 use ros2_client::parameters::raw::SetParametersResult;
 use ros2_client::rcl_interfaces::{
     DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest,
@@ -54,12 +54,12 @@ pub fn answer<Q: Message + Clone + 'static, R: Message + 'static>(
 
 impl ParameterServers {
     /// Answers requests. No parameter can be set.
-    pub fn serve(&self, known: &Known) {
+    pub fn serve(&self, reported: &ReportedParameters) {
         answer(&self.get, |request| GetParametersResponse {
-            values: known.values(&request.names),
+            values: reported.values(&request.names),
         });
         answer(&self.types, |request| GetParameterTypesResponse {
-            values: known.types(&request.names),
+            values: reported.types(&request.names),
         });
         answer(&self.set, |request| {
             let each = |given| -> SetParametersResult { refused(std::slice::from_ref(given)) };
@@ -73,10 +73,10 @@ impl ParameterServers {
             }
         });
         answer(&self.list, |request| ListParametersResponse {
-            result: known.list(&request),
+            result: reported.list(&request),
         });
         answer(&self.describe, |request| DescribeParametersResponse {
-            values: known.descriptors(&request.names),
+            values: reported.descriptors(&request.names),
         });
     }
 }

@@ -2,7 +2,7 @@
 
 use self::reader::Reader;
 use crate::arguments::Arguments;
-use crate::parameter_services::Known;
+use crate::parameter_services::ReportedParameters;
 use crate::poses::PoseSettings;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::motion::MotionBounds;
@@ -85,7 +85,7 @@ pub struct NodeSettings {
     /// `true` if the node denies until a manager of lifecycles has made it active.
     pub is_managed: bool,
     /// The parameters as services report them.
-    pub parameters: Known,
+    pub parameters: ReportedParameters,
     /// The line to the controller that decides; `None` if the node decides.
     pub serial: Option<Serial>,
 }
@@ -305,7 +305,7 @@ impl NodeSettings {
             tracker,
             markers: reader.bool("markers", true)?,
             is_managed: reader.bool("lifecycle", false)?,
-            parameters: reader.known(serial.is_some()),
+            parameters: reader.reported(serial.is_some()),
             serial,
         };
         settings.check()?;

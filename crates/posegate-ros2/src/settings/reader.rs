@@ -2,7 +2,7 @@
 
 use super::{Delivery, Serial, SettingsError, hex};
 use crate::arguments::Arguments;
-use crate::parameter_services::Known;
+use crate::parameter_services::ReportedParameters;
 use crate::parameters::{Parameters, Value};
 use crate::poses::{PoseSettings, PoseType};
 use posegate::gate::task_digest;
@@ -140,15 +140,16 @@ impl<'p> Reader<'p> {
     }
 
     /// Returns the parameters that the node has, with their values or defaults.
-    pub(super) fn known(self, is_serial: bool) -> Known {
+    pub(super) fn reported(self, is_serial: bool) -> ReportedParameters {
         let mut used = self.used.into_inner();
         used.retain(|name, _| !is_serial || WITH_CONTROLLER.contains(name));
-        Known(used)
+        ReportedParameters(used)
     }
 
-    fn used<T>(&self, name: &'static str, value: Value, is: T) -> T {
+    /// Notes the value of a parameter, and returns what the node makes of it.
+    fn used<T>(&self, name: &'static str, value: Value, setting: T) -> T {
         self.used.borrow_mut().insert(name, value);
-        is
+        setting
     }
 
     pub(super) fn check_names(&self) -> Result<(), SettingsError> {
