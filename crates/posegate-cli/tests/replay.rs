@@ -671,6 +671,14 @@ fn replay_is_drawn() {
     for name in lanes.split(' ') {
         assert!(picture.contains(&format!(">{name}")), "{name}");
     }
+    // The map is first.
+    let map = picture
+        .find(">pose-sets on the floor")
+        .map(|_| picture.find(">near the goal"));
+    let map = map
+        .flatten()
+        .or_else(|| picture.find(">the estimates and the goal"));
+    assert!(map < picture.find(">gate") && map.is_some());
     // Each reason has its seconds in the legend, and a colour that is also in its lane.
     let shut = summary["interlock"]["shut_s_by"].as_object().unwrap();
     assert!(shut.len() > 1, "{summary}");
@@ -682,6 +690,24 @@ fn replay_is_drawn() {
         assert!(picture.matches(colour.unwrap()).count() > 1, "{reason}");
     }
     assert_eq!(folder.files(), 4);
+}
+
+/// Estimates without a pose-set, or at no place on the floor, leave a picture whose numbers are all numbers.
+#[test]
+fn damaged_estimates_are_drawn() {
+    let folder = Folder::of(b"");
+    let (csv, picture) = (folder.path("damaged.csv"), folder.path("damaged.svg"));
+    let header = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
+    let rows = "1,0,0,0,1e-6,0,0,1e-6,0,1e-6\n2,0,0,0,1e-6,nan,0,1e-6,0,1e-6\n3,0,0,0,1e308,1e308,0,1e308,0,1e308\n\
+                4,1e300,0,0,1e-6,0,0,1e-6,0,1e-6\n5,nan,0,0,1e-6,0,0,1e-6,0,1e-6\n6,0,0,0,-1,0,0,-1,0,-1\n7,0,0,0,inf,0,0,1e-6,0,1e-6\n";
+    std::fs::write(&csv, header.to_owned() + rows).unwrap();
+    let output = posegate(&["replay", SITE, &csv, "--task", "dock", "-o", &picture]);
+    assert_eq!(output.status.code(), Some(0), "{}", words(&output));
+    let picture = std::fs::read_to_string(picture).unwrap();
+    assert!(picture.contains(">pose-sets on the floor"));
+    assert!(!picture.contains("NaN") && !picture.contains("inf,"));
+    // The place that is farthest away has no axis.
+    assert!(!picture.contains("0000000000"));
 }
 
 /// `now_s` is used at any distance from the stamp, as in `posegate gate`.

@@ -34,8 +34,11 @@ const WORST: Style = Style::outlined("#222222", 2.0);
 pub(super) struct ReplayMap<'r> {
     poses: Vec<&'r MapPose>,
     success: &'r SuccessSet,
-    sets: Vec<Option<PoseSetF64>>,
+    /// The border of each pose-set on the floor, metres; `None` if it is not finite.
+    sets: Vec<Option<Vec<[f64; 2]>>>,
+    /// The worst pose that is marked: x, y (m).
     worst: Option<[f64; 2]>,
+    /// Of how many estimates one is shown.
     every: u64,
 }
 
@@ -44,11 +47,14 @@ impl<'r> ReplayMap<'r> {
     pub fn of(replay: &'r Replay<'_>) -> Option<Self> {
         let poses: Vec<&MapPose> = replay.map().poses().collect();
         let set = |pose: &&MapPose| {
-            Some(PoseSetF64 {
+            let set = PoseSetF64 {
                 estimate: pose.pose,
                 spread: pose.spread?,
                 radius_squared: replay.radius_squared(),
-            })
+            };
+            let border = set.projection();
+            let is_finite = border.iter().flatten().all(|number| number.is_finite());
+            is_finite.then_some(border)
         };
         let sets = poses.iter().map(set).collect();
         let nearest = poses.iter().filter_map(|pose| match pose.verdict {
@@ -102,6 +108,7 @@ impl<'r> ReplayMap<'r> {
         }
     }
 
+    /// Draws what lies in a panel.
     fn content(&self, inside: &mut Inside<'_>, panel: &Panel) {
         let goal = self.success.goal;
         let heading = goal.yaw_deg.to_radians();
@@ -115,10 +122,8 @@ impl<'r> ReplayMap<'r> {
                 let all = self.poses.iter().zip(&self.sets);
                 all.filter(|(pose, _)| pose.verdict.is_permit() == permits)
             };
-            for (_, set) in these() {
-                if let Some(set) = set {
-                    inside.polygons(&[set.projection()], style);
-                }
+            for border in these().filter_map(|(_, border)| border.as_ref()) {
+                inside.polygons(std::slice::from_ref(border), style);
             }
             let dot = if permits { &PERMIT } else { &DENIAL };
             for (pose, _) in these() {
@@ -157,7 +162,8 @@ impl<'r> ReplayMap<'r> {
         for (permits, style, name) in [(true, PERMITTED, "permitted"), (false, DENIED, "denied")] {
             let count = count(permits);
             if count > 0 {
-                let words = format!("pose-sets on the floor, {name}: {count}{share}");
+                let words =
+                    format!("pose-sets on the floor, without movement, {name}: {count}{share}");
                 entries.push((Sample::Patch(style), words));
             }
         }
