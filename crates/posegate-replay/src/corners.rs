@@ -35,7 +35,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{IsometryMatrix3, Matrix3, Point3, Rotation3, Translation3, Vector3};
 use posegate::gate::Reason;
 use posegate::shape::{Camera, Mount, Pose3Deg, Tag, Tolerance};
 
@@ -246,11 +246,11 @@ fn wrapped(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }
 
-fn isometry(pose: &Pose3Deg) -> Isometry3<f64> {
+fn isometry(pose: &Pose3Deg) -> IsometryMatrix3<f64> {
     let [roll, pitch, yaw] = [pose.roll_deg, pose.pitch_deg, pose.yaw_deg].map(f64::to_radians);
-    Isometry3::from_parts(
+    IsometryMatrix3::from_parts(
         Translation3::new(pose.x, pose.y, pose.z),
-        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        Rotation3::from_euler_angles(roll, pitch, yaw),
     )
 }
 
@@ -258,7 +258,7 @@ fn isometry(pose: &Pose3Deg) -> Isometry3<f64> {
 #[derive(Clone)]
 struct View<'e> {
     camera: &'e Camera,
-    mount: Isometry3<f64>,
+    mount: IsometryMatrix3<f64>,
     corners: Vec<(Point3<f64>, [f64; 2])>,
 }
 

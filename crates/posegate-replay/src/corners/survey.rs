@@ -9,7 +9,7 @@
 //! tilted camera for a nearer or farther tag, so a small angle may have a large effect.
 
 use super::{MountedCamera, STEP, TagObservation, View, dot, slopes};
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 
 /// A tolerance: a ball of displacements of a tag or of the camera.
 pub(super) struct Ball<'v, 'e> {
@@ -36,7 +36,7 @@ pub(super) fn balls<'v, 'e>(
         }
     };
     for (number, seen) in seen.iter().enumerate() {
-        let moved = move |motion: Isometry3<f64>| {
+        let moved = move |motion: IsometryMatrix3<f64>| {
             let mut moved = view.clone();
             for (corner, _) in moved.corners.iter_mut().skip(4 * number).take(4) {
                 *corner = motion * *corner;
@@ -50,7 +50,7 @@ pub(super) fn balls<'v, 'e>(
         let centre = Translation3::new(at.x, at.y, at.z);
         let turn = |axis: Vector3<f64>| -> Moved<'v, 'e> {
             Box::new(move |by| {
-                moved(centre * UnitQuaternion::from_scaled_axis(axis * by) * centre.inverse())
+                moved(centre * Rotation3::from_scaled_axis(axis * by) * centre.inverse())
             })
         };
         add(seen.tolerance.translation, axes.map(shift).into());
@@ -69,7 +69,7 @@ pub(super) fn balls<'v, 'e>(
     let turn = |axis: Vector3<f64>| -> Moved<'v, 'e> {
         Box::new(move |by| {
             let mut moved = view.clone();
-            let turn = UnitQuaternion::from_scaled_axis(axis * by);
+            let turn = Rotation3::from_scaled_axis(axis * by);
             moved.mount.rotation = turn * moved.mount.rotation;
             moved
         })

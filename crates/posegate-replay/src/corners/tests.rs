@@ -311,7 +311,7 @@ fn set_contains_pose_for_tag_and_camera_within_tolerance() {
         // The true places of tag and camera.
         let turned = |pose: &Pose3Deg, turn: Vector3<f64>, way: Vector3<f64>| {
             let own = isometry(pose);
-            let turn = UnitQuaternion::from_scaled_axis(turn) * own.rotation;
+            let turn = Rotation3::from_scaled_axis(turn) * own.rotation;
             let (roll_deg, pitch_deg, yaw_deg) = turn.euler_angles();
             Pose3Deg {
                 x: pose.x + way.x,
