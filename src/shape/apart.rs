@@ -11,7 +11,7 @@ use super::scalar::dot;
 use super::side::SeparatingHalfPlane;
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
-use super::{Planar, PoseDeg, Scalar};
+use super::{Planar, PoseDeg, Scalar, Tolerance};
 use std::sync::Arc;
 
 /// A set that is the outside of something convex.
@@ -65,13 +65,26 @@ impl Exclusion {
         }
     }
 
+    /// Returns the poses that are outside for every position of the obstacle or the regions within a tolerance of the goal. Tags and walls
+    /// have tolerances of their own.
+    pub(super) fn within(self, tolerance: Tolerance) -> Self {
+        match self {
+            Self::Obstacle(clear) => Self::Obstacle(clear.within(tolerance)),
+            Self::Gap { clear, regions } => Self::Gap {
+                clear: clear.within(tolerance),
+                regions,
+            },
+            Self::Near { .. } | Self::Square { .. } | Self::Hidden { .. } => self,
+        }
+    }
+
     /// Returns `true` if its slack is exactly the largest of its sides' slacks: the excluded region has no
     /// curved border.
     pub const fn is_polyhedral(&self) -> bool {
-        matches!(
-            self,
-            Self::Obstacle(_) | Self::Gap { .. } | Self::Hidden { .. }
-        )
+        match self {
+            Self::Obstacle(_) | Self::Gap { .. } | Self::Hidden { .. } => true,
+            Self::Near { .. } | Self::Square { .. } => false,
+        }
     }
 
     /// Returns the distance from the robot's reference point of the farthest point that must not reach into the region, metres.
@@ -158,8 +171,7 @@ impl Exclusion {
                     .collect()
             }
             Self::Square { view, psi_min_deg } => {
-                let tag: Resolved<f64> = view.resolve(goal);
-                let normal = tag.normal;
+                let normal = view.resolve::<f64>(goal).normal;
                 let [c, s] = f64::cos_sin_deg(view.too_head_on(*psi_min_deg).0);
                 let (first, second) = across(normal);
                 (0..DIRECTIONS)
@@ -213,7 +225,6 @@ fn across(n: [f64; 3]) -> ([f64; 3], [f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::Tolerance;
     use crate::shape::visibility::test_view;
 
     /// A tolerance widens the cone at every width.

@@ -174,14 +174,8 @@ impl Shape {
         match self {
             Self::Box(set) => Self::Box(set.within(tolerance)),
             Self::Footprint(set) => Self::Footprint(set.within(tolerance)),
-            Self::Apart(Exclusion::Obstacle(set)) => {
-                Self::Apart(Exclusion::Obstacle(set.within(tolerance)))
-            }
-            Self::Apart(Exclusion::Gap { clear, regions }) => {
-                let clear = clear.within(tolerance);
-                Self::Apart(Exclusion::Gap { clear, regions })
-            }
-            Self::Visibility(_) | Self::Bounded { .. } | Self::Apart(_) => self,
+            Self::Apart(set) => Self::Apart(set.within(tolerance)),
+            Self::Visibility(_) | Self::Bounded { .. } => self,
             Self::Any(sets) => Self::Any(each_within(sets, tolerance)),
             Self::All(sets) => Self::All(each_within(sets, tolerance)),
         }
@@ -210,7 +204,7 @@ impl Shape {
 
     /// Returns the kind of set, as the site file names it.
     #[must_use]
-    pub const fn name(&self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
             Self::Box(_) => "box",
             Self::Footprint(_) => "footprint",
@@ -220,7 +214,7 @@ impl Shape {
             Self::Apart(_) => "visibility",
             Self::Any(_) => "any",
             Self::All(sets) => match sets.as_slice() {
-                [Self::Footprint(set), Self::Box(_)] if set.round().is_some() => "disc",
+                [Self::Footprint(set), Self::Box(_)] => set.round().map_or("all", Round::name),
                 _ => "all",
             },
         }
@@ -252,12 +246,7 @@ impl SuccessSet {
     #[must_use]
     pub fn covered_by(&self) -> Option<f64> {
         fn obstacles(shape: &Shape, goal: PoseDeg) -> f64 {
-            let origin = Planar {
-                x: 0.0,
-                y: 0.0,
-                cos: 1.0,
-                sin: 0.0,
-            };
+            let origin = Planar::from([0.0; 3]);
             match shape {
                 Shape::Apart(set @ Exclusion::Obstacle(_)) => set.slack(goal, &origin),
                 Shape::All(sets) => sets

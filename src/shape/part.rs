@@ -160,7 +160,9 @@ impl Leaf {
                 set.slacks(pose, ALL, 0, &mut note);
             }
             (_, Plain::Side(set)) => note(0, "side", set.room(pose)),
-            (_, Plain::Own) => note(0, "nothing", f64::NEG_INFINITY),
+            (Convex::Visibility(_) | Convex::Side(_) | Convex::Nothing, Plain::Own) => {
+                note(0, "nothing", f64::NEG_INFINITY);
+            }
         }
         least
     }
