@@ -10,9 +10,9 @@
  *
  * What a gate + tracker of a robot that drives takes, without its table, and a 100 Hz cycle of it (./ci.sh costs; `posegate table cost` reports
  * it for your table, with the bound of a cycle):
- *   Cortex-M4F: flash 38 + 18 kB (boxes, -Os) to 81 + 23 kB (all shapes, -O3), stack 2,768 B, 12,675 instructions
- *   Cortex-M0+: flash 41 + 19 kB (boxes, -Os) to 83 + 24 kB (all shapes, -O3), stack 3,056 B, 34,530 instructions
- *   RV32IMC: flash 49 + 24 kB (boxes, -Os) to 104 + 33 kB (all shapes, -O3), stack 2,688 B, 15,813 instructions
+ *   Cortex-M4F: flash 38 + 18 kB (boxes, -Os) to 81 + 23 kB (all shapes, -O3); stack 3,020; 2,768 B, 16,510; 12,675 instructions (-Os; -O3)
+ *   Cortex-M0+: flash 41 + 19 kB (boxes, -Os) to 83 + 24 kB (all shapes, -O3); stack 3,080; 3,056 B, 38,556; 34,530 instructions (-Os; -O3)
+ *   RV32IMC: flash 49 + 24 kB (boxes, -Os) to 104 + 33 kB (all shapes, -O3); stack 2,912; 2,688 B, 21,389; 15,813 instructions (-Os; -O3)
  *
  * C99 and C++11. Link libposegate_c.a after your own objects, with -Wl,--gc-sections; examples/c has
  * recipes for Make and CMake.

@@ -209,24 +209,26 @@ mod tests {
                     [figures.flash_of_gate, figures.flash_of_tracker].map(kilobytes);
                 format!("{gate} + {tracker} kB")
             };
-            let fast = Figures::of(core, Level::Fast, "turning");
-            let cycle = fast.odometry + fast.step;
+            let both = |of: fn(&Figures) -> String| {
+                [Level::Small, Level::Fast]
+                    .map(|level| of(&Figures::of(core, level, "turning")))
+                    .join("; ")
+            };
+            let stack = both(|own| grouped(own.stack_of_step.max(own.stack_of_tracked)));
+            let cycle = both(|own| grouped(own.odometry + own.step));
+            let time =
+                both(|own| format!("{:.2}", (own.odometry + own.step) as f64 * 2.0 / 64_000.0));
             let row = format!(
-                "| {name} | {} | {} | {} | {} B | {} | {:.2} ms |",
+                "| {name} | {} | {} | {} | {stack} B | {cycle} | {time} ms |",
                 flash(Level::Small, "boxes"),
                 flash(Level::Small, "turning"),
                 flash(Level::Fast, "turning"),
-                grouped(fast.stack_of_step.max(fast.stack_of_tracked)),
-                grouped(cycle),
-                cycle as f64 * 2.0 / 64_000.0,
             );
             assert!(readme.contains(&row), "{row}");
             let row = format!(
-                " *   {name}: flash {} (boxes, -Os) to {} (all shapes, -O3), stack {} B, {} instructions\n",
+                " *   {name}: flash {} (boxes, -Os) to {} (all shapes, -O3); stack {stack} B, {cycle} instructions (-Os; -O3)\n",
                 flash(Level::Small, "boxes"),
                 flash(Level::Fast, "turning"),
-                grouped(fast.stack_of_step.max(fast.stack_of_tracked)),
-                grouped(cycle),
             );
             assert!(header.contains(&row), "{row}");
             for (level, named) in [(Level::Small, "\"s\""), (Level::Fast, "3")] {
