@@ -162,7 +162,7 @@ struct Off {
     leans_about: f64,
 }
 
-/// Largest lean of the detector's pose of the robot, degrees, as stated in `site/language.md`.
+/// Largest lean of the detector's pose of the robot, degrees, as stated in `crates/posegate-site/src/language.md`.
 const LEAN_DEG: f64 = 20.0;
 
 /// Returns distance, angle to the optical axis and angle to the tag's normal: m, rad.
