@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import itertools
 import json
 import os
 import random
@@ -35,6 +36,7 @@ from std_srvs.srv import Trigger  # noqa: E402
 
 beyond = []
 started = []
+POSES = itertools.count()
 
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DEEP = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -83,7 +85,8 @@ def start(*parameters, options=(), ros=(), table=None):
 
 
 def pose(x=0.0, frame="map", stamp_ns=None, variance=1e-4):
-    """Returns a pose at the dock, stamped now."""
+    """Returns a pose at the dock, stamped now. Its covariance is never that of the pose before, as of a filter."""
+    variance *= 1 + 1e-4 * (next(POSES) % 100)
     message = PoseWithCovarianceStamped()
     stamp_ns = time.time_ns() if stamp_ns is None else stamp_ns
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
