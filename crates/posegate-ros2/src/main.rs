@@ -54,12 +54,16 @@ fn start() -> Outcome {
     std::process::exit(0);
 }
 
-/// Returns the topic from which poses come.
+/// Returns the topic from which poses come. Prints a warning if it may be that of another robot.
 fn source<'n>(names: &'n Names, settings: &NodeSettings) -> &'n str {
-    match settings.detector {
+    let topic = match settings.detector {
         None => names.of_poses(settings.poses.kind),
         Some(_) => &names.detections,
+    };
+    if let Some(warning) = names.warning(topic) {
+        eprintln!("posegate-node: warning: {warning}");
     }
+    topic
 }
 
 /// Runs a node with one table.

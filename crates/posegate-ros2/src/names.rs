@@ -184,6 +184,19 @@ impl Names {
     pub fn full_node(&self) -> String {
         format!("{}/{}", self.namespace.trim_end_matches('/'), self.node)
     }
+
+    /// Returns a warning if a topic of poses is not in the namespace of the node: the poses of another robot would give this one a permit.
+    /// Transforms have one topic for all robots.
+    #[must_use]
+    pub fn warning(&self, topic: &str) -> Option<String> {
+        let space = format!("{}/", self.namespace.trim_end_matches('/'));
+        (!topic.starts_with(&space) && topic != "/tf").then(|| {
+            format!(
+                "{topic} is not in the namespace {}: poses of another robot would give this one a permit",
+                self.namespace
+            )
+        })
+    }
 }
 
 fn is_path(name: &str) -> bool {
@@ -222,6 +235,22 @@ mod tests {
                 name.starts_with("/robot1/") || ["/diagnostics", "/tf"].contains(&name.as_str()),
                 "{name}"
             );
+        }
+    }
+
+    #[test]
+    fn poses_of_another_namespace_are_warned_of() {
+        for (rules, is_warned) in [
+            (&["__ns:=/robot2"][..], false),
+            (&["__ns:=/robot2", "pose:=/robot1/amcl_pose"], true),
+            (&["__ns:=/robot2", "pose:=/amcl_pose"], true),
+            (&["__ns:=/robot2", "pose:=/robot22/amcl_pose"], true),
+            (&["__ns:=/robot2", "pose:=filter/pose"], false),
+            (&["pose:=/robot1/amcl_pose"], false),
+        ] {
+            let names = names(rules).unwrap();
+            assert_eq!(names.warning(&names.pose).is_some(), is_warned, "{rules:?}");
+            assert_eq!(names.warning(&names.tf), None);
         }
     }
 
