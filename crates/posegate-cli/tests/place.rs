@@ -398,14 +398,10 @@ fn result_is_equal_for_any_number_of_threads() {
         let [one, two] =
             ["1", "3"].map(|threads| run_in(folder.path(), SITE, &line, Some(threads)).out);
         assert_eq!(one, two, "{method}");
-        let other = run_in(
-            folder.path(),
-            SITE,
-            &line.replace("--seed 5", "--seed 6"),
-            None,
-        )
-        .out;
-        assert_ne!(one, other, "{method}");
+        // The descents of BOBYQA draw nothing.
+        let other = line.replace("--seed 5", "--seed 6");
+        let other = run_in(folder.path(), SITE, &other, None).out;
+        assert_eq!(one == other, method == "bobyqa", "{method}");
     }
 }
 
