@@ -1,6 +1,6 @@
 //! Epsilon-pose-sets (Definition 1): the poses where the robot may be, and the checks of its inputs.
 //!
-//! Sets come from numbers from outside by two functions. [`PoseSet::gaussian`] and [`PoseSet::bounded`] take
+//! Two functions make a set of a caller's numbers: [`PoseSet::gaussian`] and [`PoseSet::bounded`] take
 //! floats as filters send them, check every one, and return integers that the rest of the core trusts. The
 //! integer set *contains* the set that the floats describe: every rounding is outwards. The estimate itself
 //! cannot be rounded outwards; its rounding is in the error budget of `contain`. There is no floating-point
@@ -192,7 +192,7 @@ pub enum Extent {
 
 /// An epsilon-pose-set: every pose where the robot may be, at the stated confidence.
 ///
-/// [`PoseSet::gaussian`] and [`PoseSet::bounded`] make it, the rest of the core trusts and grows it, so its numbers are in range.
+/// [`PoseSet::gaussian`] and [`PoseSet::bounded`] make it; the core grows it and widens it by a trust. All keep its numbers in range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PoseSet {

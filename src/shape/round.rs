@@ -123,6 +123,7 @@ mod tests {
             turn_deg: 30.0,
         };
         let set = set(round);
+        assert_eq!(set.shape.name(), "ellipse");
         let evaluator = set.evaluator();
         let (sin, cos) = 30f64.to_radians().sin_cos();
         let value = |[x, y]: [f64; 2]| {

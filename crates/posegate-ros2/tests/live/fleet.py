@@ -19,6 +19,7 @@ from support import (
     rclpy,
     require,
     start,
+    started,
 )
 
 STILL = ("stands_still:=true",)
@@ -98,6 +99,13 @@ def main():
     words = [NODE, str(TABLE), "--ros-args", "-p", STILL[0], "-r", "__ns:=/robot1", "-r", "/amcl_pose:=/x"]
     refused = subprocess.run(words, capture_output=True, text=True, timeout=10, check=False)
     require(refused.returncode == 2 and "/robot1/amcl_pose" in refused.stderr, refused.stderr)
+
+    # Poses of another robot's namespace: a warning before anything else.
+    words = [NODE, str(TABLE), "--ros-args", "-p", STILL[0], "-r", "__ns:=/robot2", "-r", "pose:=/robot1/amcl_pose"]
+    node = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    started.append(node)
+    line = node.stderr.readline()
+    require("warning: /robot1/amcl_pose is not in the namespace /robot2" in line, line)
 
 
 main()
