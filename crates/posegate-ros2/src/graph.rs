@@ -26,6 +26,10 @@ use std::time::Duration;
 /// Messages that wait for the node: those of one cycle at 1,000 per second, and a reserve.
 const DEPTH: usize = 64;
 
+/// The time from joining the graph to the first topic. Fast DDS loses for good what two nodes announce out of order at the same time: the library
+/// gives no source timestamps to announcements. Who is there is known after this time, and then the announcements arrive in order.
+const SETTLE: Duration = Duration::from_millis(500);
+
 /// The environment of a ROS program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Environment {
@@ -193,6 +197,7 @@ impl Graph {
         }
         let participant = participant.build().map_err(CreateError::from)?;
         let events = participant.status_listener();
+        std::thread::sleep(SETTLE);
         let context = Context::from_domain_participant(participant)?;
         let node_name = NodeName::new(&names.namespace, &names.node);
         let node_name = node_name.map_err(|error| GraphError::Dds(format!("{error:?}")))?;

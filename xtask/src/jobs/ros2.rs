@@ -81,6 +81,7 @@ pub fn ros2(given: &Arguments) -> Result {
     live(&jazzy, "rows").arg(&bag).json()?;
     live(&jazzy, "cyclone").json()?;
     live(&jazzy, "fleet").json()?;
+    live(&jazzy, "discovery").json()?;
     live(&jazzy, "docks").json()?;
     live(&jazzy, "managed").json()?;
     live(&jazzy, "detections").json()?;

@@ -108,5 +108,6 @@ def main():
     require("warning: /robot1/amcl_pose is not in the namespace /robot2" in line, line)
 
 
-main()
-end()
+if __name__ == "__main__":
+    main()
+    end()
