@@ -154,6 +154,7 @@ class PermitListener:
 
 def main():
     import rclpy
+    from rclpy.executors import ExternalShutdownException
 
     parser = argparse.ArgumentParser(description="Follow the permit of posegate-node")
     parser.add_argument("--task", required=True, help="the task that may run")
@@ -172,7 +173,7 @@ def main():
             if says != said:
                 print(f"{time.time():.3f} {says}", flush=True)
                 said = says
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ExternalShutdownException):
         pass
 
 

@@ -374,6 +374,14 @@ fn work_task_without_a_plan_is_reported() {
 }
 
 #[test]
+fn site_without_tasks_is_refused() {
+    let folder = Folder::with("");
+    let (_, error) = folder.expect(2, "site build site.toml -o built");
+    assert!(error.contains("the site has no task"), "{error}");
+    assert!(!folder.path().join("built").exists());
+}
+
+#[test]
 fn invalid_usage_is_refused() {
     let folder = Folder::with(&boxes());
     for (line, expected) in [

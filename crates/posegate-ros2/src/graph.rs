@@ -169,9 +169,8 @@ pub struct Graph {
     pub reset: Server<TriggerRequest, TriggerResponse>,
     /// The service that returns the reason why the gate is closed.
     pub explain: Server<TriggerRequest, TriggerResponse>,
-    /// The services of the parameters, of a managed node alone: with their twelve ends of topics, some nodes are not discovered in time beside
-    /// busy cores.
-    pub parameters: Option<ParameterServers>,
+    /// The services of the parameters.
+    pub parameters: ParameterServers,
     /// The services of the lifecycle, of a managed node alone.
     pub lifecycle: Option<LifecycleServers>,
     threads: DdsThreads,
@@ -270,25 +269,22 @@ impl Graph {
         let mut explain = builder.server(&names.explain, trigger)?;
         let own = |name: &str| format!("{}/{name}", names.full_node());
         let of_parameters = |kind| ["rcl_interfaces", kind];
-        let parameters = match settings.is_managed {
-            true => Some(ParameterServers {
-                get: builder.server(&own("get_parameters"), of_parameters("GetParameters"))?,
-                types: builder.server(
-                    &own("get_parameter_types"),
-                    of_parameters("GetParameterTypes"),
-                )?,
-                set: builder.server(&own("set_parameters"), of_parameters("SetParameters"))?,
-                set_at_once: builder.server(
-                    &own("set_parameters_atomically"),
-                    of_parameters("SetParametersAtomically"),
-                )?,
-                list: builder.server(&own("list_parameters"), of_parameters("ListParameters"))?,
-                describe: builder.server(
-                    &own("describe_parameters"),
-                    of_parameters("DescribeParameters"),
-                )?,
-            }),
-            false => None,
+        let parameters = ParameterServers {
+            get: builder.server(&own("get_parameters"), of_parameters("GetParameters"))?,
+            types: builder.server(
+                &own("get_parameter_types"),
+                of_parameters("GetParameterTypes"),
+            )?,
+            set: builder.server(&own("set_parameters"), of_parameters("SetParameters"))?,
+            set_at_once: builder.server(
+                &own("set_parameters_atomically"),
+                of_parameters("SetParametersAtomically"),
+            )?,
+            list: builder.server(&own("list_parameters"), of_parameters("ListParameters"))?,
+            describe: builder.server(
+                &own("describe_parameters"),
+                of_parameters("DescribeParameters"),
+            )?,
         };
         let of_lifecycle = |kind| ["lifecycle_msgs", kind];
         let lifecycle = match settings.is_managed {

@@ -81,11 +81,15 @@ impl Received {
         if let Some(problem) = self.peers.problem(&self.topic, self.parameters) {
             return Some(problem);
         }
-        (self.unreadable > 0).then(|| {
-            format!(
-                "{} messages of {} could not be read: another message type, or damaged on the way",
-                self.unreadable, self.topic
-            )
+        let topic = &self.topic;
+        if self.unreadable > 0 {
+            return Some(format!(
+                "{} messages of {topic} could not be read: another message type, or damaged on the way",
+                self.unreadable
+            ));
+        }
+        (self.messages == 0).then(|| {
+            format!("{topic} has a publisher that has sent nothing yet: AMCL, for one, begins after its initial pose and when the robot moves")
         })
     }
 

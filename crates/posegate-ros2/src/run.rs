@@ -361,6 +361,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                     .frame()
                     .and_then(|frame| wrong_frame(frame, settings))
             }),
+            Reason::PoseSetTooLarge => settings.movement(),
             _ => None,
         }
     }
@@ -437,9 +438,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                 self.publish(&answer, Instant::now(), false);
             }
         }
-        if let Some(servers) = &self.graph.parameters {
-            servers.serve(&self.settings.parameters);
-        }
+        self.graph.parameters.serve(&self.settings.parameters);
         while let Ok(Some((id, _))) = self.graph.explain.receive_request() {
             let answer = self.now();
             let response = TriggerResponse {

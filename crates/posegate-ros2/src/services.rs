@@ -1,4 +1,4 @@
-//! The services of a managed node: its parameters and its lifecycle.
+//! The services of the node's parameters, and of the lifecycle of a managed node.
 
 use crate::lifecycle::{
     AvailableStates, AvailableTransitions, ChangeState, Changed, CurrentState, State,

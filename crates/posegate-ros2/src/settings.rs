@@ -367,6 +367,16 @@ impl NodeSettings {
         }
     }
 
+    /// Returns how much of each set is movement, as text; `None` if odometry carries the poses, or the robot stands still.
+    #[must_use]
+    pub fn movement(&self) -> Option<String> {
+        let um = self.gate().movement(self.bounds, 0).translation_um();
+        (self.tracker.is_none() && um > 0).then(|| {
+            let m = f64::from(um) * 1e-6;
+            format!("each set includes {m:.3} m of movement or more, which the robot can make at max_speed until its permission ends: at a dock use stands_still:=true or use_odometry, or shorten valid_ms and permit_hold_ms")
+        })
+    }
+
     /// Returns the name of the task.
     #[must_use]
     pub fn task(&self) -> &str {

@@ -58,6 +58,9 @@ pub fn build(
     options: &BuildOptions,
     progress: &(dyn Fn() + Sync),
 ) -> Result<BuildSummary, SiteBuildError> {
+    if site.tasks.is_empty() {
+        return Err(SiteBuildError::NoTasks);
+    }
     let parts = parts_to_build(output)?;
     records::write(&parts, inventory, options.shard)?;
     let pieces: Vec<&Piece> = inventory.share(options.shard).collect();

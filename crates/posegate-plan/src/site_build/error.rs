@@ -51,6 +51,9 @@ pub enum SiteBuildError {
         /// The name of the results.
         name: &'static str,
     },
+    /// The site has no task.
+    #[error("the site has no task, so there is no table to build: add one ([task.NAME])")]
+    NoTasks,
     /// Pieces cannot be made. All others were made.
     #[error("{}", refused(.0))]
     Refused(Vec<(Piece, PieceError)>),
@@ -112,6 +115,7 @@ impl SiteBuildError {
             Self::NoFolder(_) | Self::Foreign { .. } => {
                 "name another folder, or one that is not there yet"
             }
+            Self::NoTasks => "`posegate check SITE` says what the site has",
             Self::Refused(_) => {
                 "fix the site file; `posegate table build` and `posegate plan` say more about a single task"
             }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::arguments::Command;
-use rustdds::GUID;
+use rustdds::{DomainParticipantStatusEvent, GUID};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
 const START: i128 = 1_800_000_000_000_000_000;
@@ -28,6 +28,23 @@ fn received() -> Received {
 
 fn at(ms: i128) -> Now {
     Now::from_ns(START + ms * 1_000_000)
+}
+
+#[test]
+fn publisher_that_sends_nothing_is_named() {
+    let mut silent = received();
+    let words = silent.problem().unwrap();
+    assert!(words.contains("nobody publishes"), "{words}");
+    silent
+        .peers
+        .note(&DomainParticipantStatusEvent::RemoteWriterMatched {
+            local_reader: GUID::from_bytes([0; 16]),
+            remote_writer: GUID::from_bytes([1; 16]),
+        });
+    let words = silent.problem().unwrap();
+    assert!(words.contains("has sent nothing yet"), "{words}");
+    silent.note(at(0), at(0).time());
+    assert!(silent.problem().is_none());
 }
 
 #[test]

@@ -81,6 +81,15 @@ fn parameters_become_settings() {
 
 /// Exactly one of the tracker and the gate's source must apply the trust.
 #[test]
+fn movement_in_a_set_is_told() {
+    // 0.3 m/s for the hold, 800 ms, the response, 290 ms, and 1 ms.
+    let moving = settings("--ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0").unwrap();
+    let words = moving.movement().unwrap();
+    assert!(words.contains("0.327 m"), "{words}");
+    assert!(settings(STILL).unwrap().movement().is_none());
+}
+
+#[test]
 fn trust_is_applied_once() {
     let line = format!(
         "{STILL} -p use_odometry:=true -p odometry_m_per_sqrt_m:=0.01 -p odometry_rad_per_sqrt_rad:=0.02 \
