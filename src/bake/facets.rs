@@ -36,13 +36,18 @@ pub enum Keep {
 
 impl Effort {
     /// The efforts to try, in this order.
-    pub const EACH: [Self; 6] = [
+    pub const EACH: [Self; 10] = [
         Self::new(Keep::Needed, 0),
         Self::new(Keep::Needed, 2),
         Self::new(Keep::NeededAtMany, 0),
         Self::new(Keep::NeededAtMany, 2),
         Self::new(Keep::All, 2),
         Self::new(Keep::All, 12),
+        // About 3 of 1,200 looks at a tag need one of these.
+        Self::new(Keep::All, 25),
+        Self::new(Keep::All, 50),
+        Self::new(Keep::All, 100),
+        Self::new(Keep::All, 200),
     ];
 
     const fn new(keep: Keep, inset: u8) -> Self {

@@ -16,6 +16,7 @@ pub struct Slope {
 impl Add for Slope {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             value: self.value + other.value,
@@ -27,6 +28,7 @@ impl Add for Slope {
 impl Sub for Slope {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self {
             value: self.value - other.value,
@@ -38,6 +40,7 @@ impl Sub for Slope {
 impl Neg for Slope {
     type Output = Self;
 
+    #[inline]
     fn neg(self) -> Self {
         Self {
             value: -self.value,
@@ -49,6 +52,7 @@ impl Neg for Slope {
 impl Mul for Slope {
     type Output = Self;
 
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self {
             value: self.value * other.value,

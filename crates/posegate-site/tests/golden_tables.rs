@@ -102,6 +102,30 @@ fn self_test_tables_equal_those_that_are_made() {
     }
 }
 
+/// A look of a synthetic plant. Its chords meet 3 to 6 mm outside of the set: it has no table with insets of 12 units alone.
+#[test]
+fn look_with_slanted_chords_has_a_table() {
+    let camera = include_str!("../../../examples/sites/dock.toml");
+    let camera = &camera[..camera.find("[tag.").unwrap()];
+    let text = format!(
+        "{camera}[tag.t]\nid = 73\nfamily = \"tag36h11\"\nsize = 0.16\n\
+         pose = {{ x = 20.05651869218019, y = 0.0, z = 0.594535777917998, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }}\n\
+         [task.see]\nkind = \"localization\"\ngoal = {{ x = 20.16408323186995, y = 1.1710996984885498, yaw_deg = -90.0 }}\n\
+         success = {{ shape = \"visibility\", camera = \"front\", tag = \"t\", d_max = 3.5, phi_max_deg = 25.0, psi_max_deg = 50.0, walls = [] }}\n\
+         error_bound = {{ translation = 0.03, yaw_deg = 1.0 }}\n"
+    );
+    let site = Site::parse(&text, "site.toml").unwrap();
+    let found = site.task("see").unwrap();
+    let order = BakeInput {
+        task: "see",
+        success: &found.success,
+        spec: site.chosen_table(found).unwrap(),
+        epsilon: site.epsilon,
+    };
+    let (_, proof) = build(&order, &|| ()).unwrap();
+    assert!(proof.corners > 10);
+}
+
 /// Returns a proven table without its sight record.
 fn self_test_table(layout: Layout) -> Vec<u8> {
     let examples = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples");
