@@ -1,8 +1,6 @@
 //! `posegate site`: all tables, proofs and plans of a site, in shards.
 
-use crate::site_input::{
-    Failure, Outcome, answer, print, print_json, progress_with_rate, register, site,
-};
+use crate::site_input::{Failure, Outcome, answer, print, print_json, progress_with_rate, site};
 use posegate_files::files::{Files, Input, Output, OutputFolder};
 use posegate_plan::Options;
 use posegate_plan::site_build::{
@@ -173,24 +171,8 @@ fn build(arguments: &Build, files: &Files) -> Outcome {
     };
     let plans = (!arguments.tables_only).then_some(&plans);
     let program = program()?;
-    let part = match plans {
-        None if !arguments.site.is_standard() => {
-            site_build::part(arguments.site.as_path(), options.shard, &program)
-        }
-        _ => None,
-    };
-    let (site, inventory) = match part {
-        Some((site, inventory)) => {
-            files.register(arguments.site.as_path())?;
-            register(files, &site)?;
-            (site, inventory)
-        }
-        None => {
-            let site = site(files, &arguments.site)?;
-            let inventory = Inventory::new(&site, Recipe::new(&site, plans, &program));
-            (site, inventory)
-        }
-    };
+    let site = site(files, &arguments.site)?;
+    let inventory = Inventory::new(&site, Recipe::new(&site, plans, &program));
     files.reserve(&arguments.output, &site_build::BUILD_WRITES)?;
     let pieces = inventory.share(options.shard).count();
     let bar = progress_with_rate(pieces as u64, "building");

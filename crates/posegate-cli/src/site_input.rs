@@ -48,7 +48,7 @@ pub fn parsed(files: &Files, text: &str, name: &str) -> Result<Site, Failure> {
 }
 
 /// Registers the files that a site names.
-pub fn register(files: &Files, site: &Site) -> Result<(), Failure> {
+fn register(files: &Files, site: &Site) -> Result<(), Failure> {
     for file in &site.files {
         files.register(file)?;
     }

@@ -1,15 +1,13 @@
 //! Measures the time and memory of a site's tables and proofs by the size of the site and the number of nodes. Prints
 //! one JSON line each. Run by `ci.sh scale`, with the program, and optionally files for the two plots. It fails if
-//! 1,000 endpoints take a minute or more, or if a shard's memory grows with the site by more than the names of its
-//! tasks.
+//! 1,000 endpoints take a minute or more.
 //!
 //! Up to 1,000 endpoints (or the number in `POSEGATE_WHOLE`) the complete site is built, by two threads. Beyond that,
 //! one shard of about 200 pieces is built and the time is extrapolated, as for more than four nodes. In the model,
-//! every node reads its part of the site (`R` seconds). It then makes its share of the pieces in sequence on each of
+//! every node reads the site (`R` seconds). It then makes its share of the pieces in sequence on each of
 //! its `C` cores (`p` seconds per piece). The merge comes last (`m` seconds per piece): `T(N) = R + ceil(pieces / (N
 //! C)) p + m pieces`. Nodes share only the folder, whose speed is not in the model.
 
-use posegate_plan::site_build::{self, Shard};
 use posegate_show::draw::logarithmic;
 use posegate_site::Site;
 use std::path::Path;
@@ -22,8 +20,6 @@ use posegate_testkit::plant;
 const SAMPLE: usize = 200;
 /// Largest time for 1,000 endpoints, seconds.
 const MOST: f64 = 60.0;
-/// Largest growth of a shard's memory per endpoint of the site, KiB: names, not tasks.
-const MOST_MEMORY: f64 = 0.5;
 /// Number of endpoints of the site that is built on several nodes.
 const NODES_ENDPOINTS: usize = 100;
 
@@ -64,16 +60,6 @@ fn peak(child: &mut Child) -> f64 {
     }
 }
 
-/// Reads the part of a site that one of `count` shards needs.
-fn read_of(path: &Path, count: usize) {
-    let shard = Shard::new(0, count as u32).expect("a shard");
-    let part = site_build::part(path, shard, "program");
-    assert_eq!(part.is_some(), count > 1, "a shard reads its own part");
-    if part.is_none() {
-        Site::read(path).expect("a valid site");
-    }
-}
-
 fn main() -> ExitCode {
     let mut given = std::env::args().skip(1);
     let Some(program) = given.next() else {
@@ -93,7 +79,7 @@ fn main() -> ExitCode {
         let parts = pieces.div_ceil(SAMPLE);
         let count = if endpoints <= whole { 1 } else { parts };
         let begin = Instant::now();
-        read_of(&path, count);
+        Site::read(&path).expect("a valid site");
         let read = begin.elapsed().as_secs_f64();
         let build = |name: &str, count: usize| {
             let name = format!("{name}-of-{endpoints}");
@@ -139,14 +125,8 @@ fn main() -> ExitCode {
             "memory of a shard for each endpoint of the site",
             grows,
             "KiB",
-            Some(MOST_MEMORY),
+            None,
         );
-        if !(grows < MOST_MEMORY) {
-            eprintln!(
-                "scale: a shard's memory grows by {grows:.2} KiB an endpoint: {MOST_MEMORY} or more"
-            );
-            short = true;
-        }
     }
     std::fs::write(
         folder.path().join("site.toml"),

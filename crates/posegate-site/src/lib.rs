@@ -34,7 +34,6 @@ pub use self::calibration::lens_of_ros;
 pub use self::chain::{
     ChainStart, ChainStep, DriveModel, Navigation, SiteChain, StartFrame, StartUncertainty,
 };
-pub use self::contents::SiteIndex;
 pub use self::controller::{Controller, Core};
 pub use self::error::{Place, SiteError, UnknownChain, UnknownTask};
 pub use self::families::FAMILIES;
@@ -53,7 +52,6 @@ mod calibration;
 mod camera;
 mod candidate;
 mod chain;
-mod contents;
 mod controller;
 pub mod controller_cost;
 #[doc = include_str!("language.md")]
@@ -76,7 +74,6 @@ mod poses;
 mod reader;
 mod row;
 mod sample;
-mod sections;
 mod success;
 mod suggest;
 mod syntax;

@@ -50,22 +50,14 @@ impl Inventory {
                 }
             }
         }
-        let mut inventory = Self::from_tasks(site.tasks.keys().cloned(), recipe);
-        let plans = plans.into_iter().collect();
-        inventory
-            .pieces
-            .extend(sorted_by_key(plans, &inventory.recipe));
-        inventory
-    }
-
-    /// Returns one table per task and no plan. Each task is named once.
-    #[must_use]
-    pub fn from_tasks(tasks: impl Iterator<Item = String>, recipe: Recipe) -> Self {
-        let tables = tasks.map(|task| Piece::Table { task }).collect();
+        let task = |task: &String| Piece::Table { task: task.clone() };
+        let tables = site.tasks.keys().map(task).collect();
+        let mut pieces = sorted_by_key(tables, &recipe);
+        pieces.extend(sorted_by_key(plans.into_iter().collect(), &recipe));
         Self {
             format: FORMAT,
-            pieces: sorted_by_key(tables, &recipe),
             recipe,
+            pieces,
         }
     }
 

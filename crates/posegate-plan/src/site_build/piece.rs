@@ -157,14 +157,8 @@ impl Recipe {
     /// and proofs. Costs of drives that a user gives ([`Options::costs`]) are not used.
     #[must_use]
     pub fn new(site: &Site, plans: Option<&Options>, program: &str) -> Self {
-        Self::from_digest(site.digest, plans, program)
-    }
-
-    /// Like [`Self::new`], from the site's digest ([`Site::digest`]).
-    #[must_use]
-    pub fn from_digest(site: [u8; 32], plans: Option<&Options>, program: &str) -> Self {
         Self {
-            site_digest: hex(&site),
+            site_digest: hex(&site.digest),
             tool_version: env!("CARGO_PKG_VERSION").into(),
             program: program.into(),
             plans: plans.map(|options| PlanOptions {
