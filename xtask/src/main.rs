@@ -49,6 +49,12 @@ const JOBS: &[Job] = &[
         "all that a change must pass without recordings (also without a job)",
         all,
     ),
+    job(
+        "full",
+        "",
+        "`all`, and the jobs that rarely find what those do not: before a release, and after a change of the core",
+        full,
+    ),
     job("fmt", "", "formatting", jobs::lint::fmt),
     job(
         "clippy",
@@ -367,25 +373,17 @@ const JOBS: &[Job] = &[
 
 /// What a change must pass without recordings: jobs with their arguments, those of this machine in this order, and beside them those of
 /// firmware. (The fast suite has a small share of `faults`.)
-const ON_THIS_MACHINE: &[&str] = &[
-    "quick",
+const ON_THIS_MACHINE: &[&str] = &["quick", "docs"];
+const OF_FIRMWARE: &[&str] = &["lines", "gate_mutants --texts", "no_panic", "vectors", "c"];
+/// The jobs that `full` adds.
+const MORE_ON_THIS_MACHINE: &[&str] = &[
     "clippy",
     "alone",
     "peers",
-    "docs",
     "adversarial 250000 today grid",
     "adversarial 250000 today facets",
 ];
-const OF_FIRMWARE: &[&str] = &[
-    "lines",
-    "gate_mutants --texts",
-    "wasm",
-    "no_panic",
-    "vectors",
-    "parts",
-    "c",
-    "counts",
-];
+const MORE_OF_FIRMWARE: &[&str] = &["wasm", "parts", "counts"];
 
 fn main() -> ExitCode {
     let mut given = std::env::args().skip(1);
@@ -435,6 +433,11 @@ fn all(_: &Arguments) -> Result {
     lanes::run(ON_THIS_MACHINE, OF_FIRMWARE, run_line)
 }
 
+fn full(given: &Arguments) -> Result {
+    all(given)?;
+    lanes::run(MORE_ON_THIS_MACHINE, MORE_OF_FIRMWARE, run_line)
+}
+
 /// Runs a job with its arguments, all in one line.
 fn run_line(line: &str) -> Result {
     let mut words = line.split(' ').map(str::to_owned);
@@ -458,7 +461,8 @@ mod tests {
 
     #[test]
     fn all_names_jobs_with_valid_arguments() {
-        for line in ON_THIS_MACHINE.iter().chain(OF_FIRMWARE) {
+        let more = MORE_ON_THIS_MACHINE.iter().chain(MORE_OF_FIRMWARE);
+        for line in ON_THIS_MACHINE.iter().chain(OF_FIRMWARE).chain(more) {
             let mut words = line.split(' ').map(str::to_owned);
             let job = find(&words.next().unwrap()).expect(line);
             assert!(job.name != "all");

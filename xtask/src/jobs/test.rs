@@ -69,7 +69,7 @@ pub fn deep(_: &Arguments) -> Result {
         .words("-p posegate-files -p posegate-learn -p posegate-site -p posegate-replay -p posegate-place -p posegate-plan -p posegate-show")
         .words("--test second_opinion --test success_sets --test planning --test moving_robot --test tracked_robot --test driven_robot")
         .words("--test cheapest_chains --test other_tags --test pose_set_proofs --test stricter_sets --test worst_pose")
-        .words("--test large_sites --test table_faults")
+        .words("--test table_faults")
         .env("POSEGATE_DEEP", "1")
         .run()?;
     // Those of recordings are run by `recorded`.
