@@ -18,7 +18,7 @@ pub struct Effort {
     /// The facets that are kept.
     pub keep: Keep,
     /// Every facet is moved inwards by this number of length units: where the lines of two chords meet, rounding can
-    /// push them over the curve.
+    /// push them over the curve. More than [`Effort::ROUNDING`] are for chords that meet beyond it at some headings.
     pub inset: u8,
 }
 
@@ -35,6 +35,11 @@ pub enum Keep {
 }
 
 impl Effort {
+    /// The largest inset that makes good only what rounding can do. A larger one may leave no pose.
+    pub const ROUNDING: u8 = 12;
+    /// The largest inset beyond that, micrometres.
+    const WIDEST_UM: u32 = 60_000;
+
     /// The efforts to try, in this order.
     pub const EACH: [Self; 10] = [
         Self::new(Keep::Needed, 0),
@@ -42,7 +47,7 @@ impl Effort {
         Self::new(Keep::NeededAtMany, 0),
         Self::new(Keep::NeededAtMany, 2),
         Self::new(Keep::All, 2),
-        Self::new(Keep::All, 12),
+        Self::new(Keep::All, Self::ROUNDING),
         // About 3 of 1,200 looks at a tag need one of these.
         Self::new(Keep::All, 25),
         Self::new(Keep::All, 50),
@@ -52,6 +57,12 @@ impl Effort {
 
     const fn new(keep: Keep, inset: u8) -> Self {
         Self { keep, inset }
+    }
+
+    /// Returns the inset in length units of 2^unit um.
+    fn inset_at(self, unit: u8) -> f64 {
+        let widest = Self::WIDEST_UM >> unit.min(31);
+        f64::from(u32::from(self.inset).min(widest.max(u32::from(Self::ROUNDING))))
     }
 }
 
@@ -440,7 +451,7 @@ fn frame(
         });
         let lost = lost.fold(f64::INFINITY, f64::min);
         let b = libm::floor((least + lost - clearance as f64 - BETWEEN_HEADINGS) / 16_384.0)
-            - f64::from(effort.inset);
+            - effort.inset_at(scale.unit);
         // A facet beyond the longest lever is beyond every pose of the table.
         let limit = f64::from(LONGEST_LEVER);
         (b <= limit).then(|| Facet {

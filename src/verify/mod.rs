@@ -230,6 +230,9 @@ pub fn build(
     Ok((bytes, proof))
 }
 
+/// Why there are no facets.
+const NONE_IS_PROVEN: &str = "none of their pieces is proven to lie inside the success set";
+
 /// Returns facets with every piece proven, each with the least effort that suffices, without the pieces that
 /// no effort proves. If all were proven at once, also returns the bytes of their table.
 fn proven_facets(
@@ -280,6 +283,14 @@ fn proven_facets(
         let known;
         (open, known_lever, known) = left(&plan, &among)?;
         if open.is_empty() {
+            if effort.inset > Effort::ROUNDING {
+                // Facets that leave no pose are proven, too.
+                let bytes = bake::write_facets(order, &plan)?;
+                let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
+                if coverage(&table, order.success).share == 0.0 {
+                    return Err(BakeError::NoPieces(NONE_IS_PROVEN).into());
+                }
+            }
             return Ok((plan, known));
         }
     }
@@ -291,8 +302,7 @@ fn proven_facets(
             !open.contains(&(number - 1))
         });
         if plan.pieces.is_empty() {
-            let why = "none of their pieces is proven to lie inside the success set";
-            return Err(BakeError::NoPieces(why).into());
+            return Err(BakeError::NoPieces(NONE_IS_PROVEN).into());
         }
         let all = |_| (0..plan.pieces.len()).collect();
         (open, _, known) = left(&plan, &all)?;

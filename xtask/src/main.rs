@@ -126,7 +126,7 @@ const JOBS: &[Job] = &[
     job(
         "vectors",
         "",
-        "the decisions of the vector file on this machine and five emulated cores",
+        "the decisions of the vector file on five emulated cores",
         jobs::vectors::vectors,
     ),
     job(
@@ -465,7 +465,7 @@ mod tests {
         for line in ON_THIS_MACHINE.iter().chain(OF_FIRMWARE).chain(more) {
             let mut words = line.split(' ').map(str::to_owned);
             let job = find(&words.next().unwrap()).expect(line);
-            assert!(job.name != "all");
+            assert!(!["all", "full"].contains(&job.name));
             assert!(
                 Arguments::new(words.collect(), ".".into(), job.name, job.usage).is_ok(),
                 "{line}"

@@ -26,8 +26,9 @@ use std::time::Duration;
 /// Messages that wait for the node: those of one cycle at 1,000 per second, and a reserve.
 const DEPTH: usize = 64;
 
-/// The time from joining the graph to the first topic. Fast DDS loses for good what two nodes announce out of order at the same time: the library
-/// gives no source timestamps to announcements. Who is there is known after this time, and then the announcements arrive in order.
+/// The time from joining the graph to the first topic. Two nodes that start together may announce their topics out of order. RustDDS puts no source
+/// timestamp on an announcement, and Fast DDS then loses some of them for good. After this time the others are known, and announcements arrive in
+/// order.
 const SETTLE: Duration = Duration::from_millis(500);
 
 /// The environment of a ROS program.

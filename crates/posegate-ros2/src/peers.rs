@@ -13,7 +13,7 @@ pub struct Peers {
     type_name: String,
     reader: Option<GUID>,
     /// `true` for a topic that several publishers share.
-    is_shared: bool,
+    pub is_shared: bool,
     matched: BTreeSet<GUID>,
     /// Publishers of the topic with another type.
     other_types: BTreeMap<GUID, String>,

@@ -88,9 +88,9 @@ impl Received {
                 self.unreadable
             ));
         }
-        (self.messages == 0).then(|| {
-            format!("{topic} has a publisher that has sent nothing yet: AMCL, for one, begins after its initial pose and when the robot moves")
-        })
+        // Of transforms only those that give the robot's pose are counted.
+        (self.messages == 0 && !self.peers.is_shared)
+            .then(|| format!("{topic} has a publisher, and no message of it has arrived"))
     }
 
     /// Returns the fault of the last stamp.

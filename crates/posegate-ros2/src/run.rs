@@ -4,7 +4,7 @@
 
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
-use crate::diagnostics::{diagnostics, wrong_frame};
+use crate::diagnostics::{diagnostics, words, wrong_frame};
 use crate::graph::{Environment, Graph, GraphError, Input};
 use crate::lifecycle::State;
 use crate::message::{Bool, TriggerResponse};
@@ -324,18 +324,21 @@ impl<'a, D: Decider> Runner<'a, D> {
     }
 
     fn drop_reports(&mut self) {
+        fn count<M>(received: &mut Received, taken: Option<M>) {
+            received.messages += u64::from(taken.is_some());
+        }
         let received = &mut self.pose;
         match &self.graph.input {
-            Input::Poses(topic) => drain(topic, BATCH, received, |_, _| ()),
-            Input::Odometry(topic) => drain(topic, BATCH, received, |_, _| ()),
-            Input::Plain(topic) => drain(topic, BATCH, received, |_, _| ()),
-            Input::Transforms(topic) => drain(topic, BATCH, received, |_, _| ()),
-            Input::Detections(topic, _) => drain(topic, BATCH, received, |_, _| ()),
+            Input::Poses(topic) => drain(topic, BATCH, received, count),
+            Input::Odometry(topic) => drain(topic, BATCH, received, count),
+            Input::Plain(topic) => drain(topic, BATCH, received, count),
+            Input::Transforms(topic) => drain(topic, BATCH, received, count),
+            Input::Detections(topic, _) => drain(topic, BATCH, received, count),
         }
     }
 
     /// Returns the action that the node knows and the gate does not: the fault of the topic, of the last pose, of stamps,
-    /// or the hold that would open.
+    /// the hold that would open, or the movement that a set includes.
     fn hint(&self, answer: &Answer) -> Option<String> {
         let (pose, settings) = (&self.pose, self.settings);
         let reason = answer.reason()?;
@@ -361,7 +364,9 @@ impl<'a, D: Decider> Runner<'a, D> {
                     .frame()
                     .and_then(|frame| wrong_frame(frame, settings))
             }),
-            Reason::PoseSetTooLarge => settings.movement(),
+            Reason::PoseSetTooLarge => settings
+                .movement()
+                .map(|movement| format!("{} {movement}", words(reason, None))),
             _ => None,
         }
     }

@@ -370,10 +370,11 @@ impl NodeSettings {
     /// Returns how much of each set is movement, as text; `None` if odometry carries the poses, or the robot stands still.
     #[must_use]
     pub fn movement(&self) -> Option<String> {
-        let um = self.gate().movement(self.bounds, 0).translation_um();
-        (self.tracker.is_none() && um > 0).then(|| {
-            let m = f64::from(um) * 1e-6;
-            format!("each set includes {m:.3} m of movement or more, which the robot can make at max_speed until its permission ends: at a dock use stands_still:=true or use_odometry, or shorten valid_ms and permit_hold_ms")
+        (self.tracker.is_none() && self.bounds != MotionBounds::STANDS_STILL).then(|| {
+            let growth = self.gate().movement(self.bounds, 0);
+            let m = f64::from(growth.translation_um()) * 1e-6;
+            let degrees = f64::from(growth.yaw_q24()) * 360.0 / 16_777_216.0;
+            format!("{m:.3} m and {degrees:.1} degrees of each set, or more, are movement at the stated speeds until the permission ends: less with shorter times, with use_odometry, or with stands_still:=true if brakes keep the robot in place")
         })
     }
 

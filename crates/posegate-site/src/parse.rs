@@ -42,10 +42,6 @@ pub(super) fn read(path: &Path) -> Result<Site, SiteError> {
     }
 }
 
-pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
-    part(text, file, Sha256::digest(text.as_bytes()).into())
-}
-
 /// The sections of a site file.
 const SECTIONS: [&Key; 17] = [
     &keys::CAMERAS,
@@ -67,8 +63,7 @@ const SECTIONS: [&Key; 17] = [
     &keys::IMPORTS,
 ];
 
-/// Reads a site from a part of a file's text. `sha256` is that of the complete file.
-pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, SiteError> {
+pub(super) fn site(text: &str, file: &str) -> Result<Site, SiteError> {
     let source = Source { file, text };
     let document = DeTable::parse(text).map_err(|fault| syntax(source, &fault))?;
     let root = &Table::root(source, &document);
@@ -109,7 +104,10 @@ pub(super) fn part(text: &str, file: &str, sha256: [u8; 32]) -> Result<Site, Sit
     })?;
     let (error_formulas, error_models) = split_models(parts.error_models);
     Ok(Site {
-        digest: digest(sha256, parts.files.iter().map(|file| &file.digest)),
+        digest: digest(
+            Sha256::digest(text.as_bytes()).into(),
+            parts.files.iter().map(|file| &file.digest),
+        ),
         files: parts.files.into_iter().map(|file| file.path).collect(),
         cameras: parts.cameras,
         remarks: parts.remarks,

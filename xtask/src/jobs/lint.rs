@@ -4,8 +4,8 @@ use crate::arguments::Arguments;
 use crate::need::{self, THUMBS};
 use crate::shell::{Result, cmd};
 
-/// Sets of features for the library alone; the workspace is checked with the other set, `std,defmt`.
-const FEATURES: [&str; 3] = ["", "std", "defmt"];
+/// Sets of features for the library alone, besides none and `std,defmt`.
+const FEATURES: [&str; 2] = ["std", "defmt"];
 
 pub fn fmt(_: &Arguments) -> Result {
     cmd("cargo fmt --all --check").run()
@@ -18,13 +18,16 @@ fn lint(words: &str) -> Result {
         .run()
 }
 
-/// Checks the code that most changes touch: every crate that the fast suite builds, with all its targets.
+/// Checks the code that most changes touch: every crate that the fast suite builds, with all its targets; the core without `std`, for
+/// which it has lints of its own; and the lock files of the workspaces that only their own jobs build.
 pub fn quick(_: &Arguments) -> Result {
-    lint("--workspace --exclude posegate-peers --all-targets")
+    lint("--workspace --exclude posegate-peers --all-targets")?;
+    lint("-p posegate --lib")?;
+    lock_files()
 }
 
-/// Checks the library alone with each set of features, all other crates with their features, the code for controllers, the fuzz
-/// targets, which no other build includes, and the lock files of the other workspaces.
+/// Checks the library alone with each set of features, all other crates with their features, the code for controllers, and the fuzz
+/// targets, which no other build includes.
 pub fn clippy(given: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     quick(given)?;
@@ -46,8 +49,7 @@ pub fn clippy(given: &Arguments) -> Result {
         ))?;
     }
     need::command("c++", "g++")?;
-    super::fuzz::check()?;
-    lock_files()
+    super::fuzz::check()
 }
 
 /// Checks that the lock files of the workspaces that only their own jobs build are current.

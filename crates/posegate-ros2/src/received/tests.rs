@@ -42,7 +42,7 @@ fn publisher_that_sends_nothing_is_named() {
             remote_writer: GUID::from_bytes([1; 16]),
         });
     let words = silent.problem().unwrap();
-    assert!(words.contains("has sent nothing yet"), "{words}");
+    assert!(words.contains("no message of it has arrived"), "{words}");
     silent.note(at(0), at(0).time());
     assert!(silent.problem().is_none());
 }

@@ -79,16 +79,18 @@ fn parameters_become_settings() {
     assert_eq!(still.bounds, MotionBounds::STANDS_STILL);
 }
 
-/// Exactly one of the tracker and the gate's source must apply the trust.
 #[test]
 fn movement_in_a_set_is_told() {
     // 0.3 m/s for the hold, 800 ms, the response, 290 ms, and 1 ms.
     let moving = settings("--ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0").unwrap();
     let words = moving.movement().unwrap();
-    assert!(words.contains("0.327 m"), "{words}");
+    assert!(words.contains("0.327 m and 32.7 degrees"), "{words}");
+    let turning = settings("--ros-args -p max_speed:=0.0 -p max_yaw_rate_deg:=30.0").unwrap();
+    assert!(turning.movement().is_some());
     assert!(settings(STILL).unwrap().movement().is_none());
 }
 
+/// Exactly one of the tracker and the gate's source must apply the trust.
 #[test]
 fn trust_is_applied_once() {
     let line = format!(

@@ -166,7 +166,7 @@ def counts():
 
 require(peer.wait(5.0, counts) is not None, f"telemetry: {state()}")
 _, values = state()
-figure("serial: telemetry messages that were published", int(values["telemetry"]), "messages", 1)
+figure("serial: telemetry messages that were published", int(values["telemetry"]), "messages")
 
 # What the controller denies.
 require(peer.drive(20.0, make=lambda: pose(x=0.07), until=lambda: not peer.listener.permitted()), "a permit outside of the set")
