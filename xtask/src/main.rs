@@ -90,7 +90,7 @@ const JOBS: &[Job] = &[
     job(
         "peers",
         "",
-        "the C header, MCAP files and defmt's log, compared with other programs",
+        "MCAP files and defmt's log, compared with other programs",
         jobs::test::peers,
     ),
     job(

@@ -3,7 +3,7 @@
 //! C firmware links `libposegate_c.a` and uses plain structs, integers of fixed size and functions that return a
 //! [`posegate_status`]. The doc comments of types and functions are written for C programs, because the header contains
 //! them. The header is generated from this crate and from [`posegate::gate::Reason`]
-//! (`crates/posegate-peers/tests/c_header.rs`), so there is one list of reasons.
+//! (`crates/posegate-c/tests/c_header.rs`), so there is one list of reasons.
 //!
 //! - **Memory** belongs to the caller: there is no allocation and no global state. Objects that are more than plain
 //!   numbers (a gate, a judge, a tracker, a sequencer, a receiver) live in storage that C declares and an `init` function initialises. Storage

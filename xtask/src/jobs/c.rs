@@ -35,10 +35,9 @@ pub fn c(_: &Arguments) -> Result {
         need::command(command, package)?;
     }
     ran(
-        suite("--test c_boundary --test c_overlap --test c_sequencer"),
+        suite("--test c_boundary --test c_header --test c_overlap --test c_sequencer"),
         1,
     )?;
-    ran(cmd("cargo test -p posegate-peers --test c_header"), 1)?;
     for (compiler, language) in COMPILERS {
         cmd(compiler)
             .words(&format!("-x {language} -Wall -Wextra -pedantic -Wconversion -Wshadow -Wundef -Werror -fsyntax-only {HEADER}"))

@@ -55,7 +55,7 @@ pub fn alone(_: &Arguments) -> Result {
     suite("--doc").run()
 }
 
-/// Compares the C header, MCAP files and defmt's log with independent programs.
+/// Compares MCAP files and defmt's log with independent programs.
 pub fn peers(_: &Arguments) -> Result {
     need::targets(&THUMBS)?;
     need::qemu()?;

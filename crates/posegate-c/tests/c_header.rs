@@ -1,6 +1,6 @@
 //! `include/posegate.h` equals what cbindgen generates from `posegate-c`, and its reasons equal `posegate::gate::Reason`.
 //!
-//! `POSEGATE_BLESS=1 cargo test -p posegate-peers --test c_header` rewrites it.
+//! `POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header` rewrites it.
 
 use posegate::gate::Reason;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ fn committed() -> String {
 fn header_equals_cbindgen_output() {
     assert!(
         committed() == generated(),
-        "{HEADER} differs: POSEGATE_BLESS=1 cargo test -p posegate-peers --test c_header"
+        "{HEADER} differs: POSEGATE_BLESS=1 cargo test -p posegate-c --test c_header"
     );
 }
 
