@@ -48,7 +48,7 @@ impl Effort {
         Self::new(Keep::NeededAtMany, 2),
         Self::new(Keep::All, 2),
         Self::new(Keep::All, Self::ROUNDING),
-        // About 3 of 1,200 looks at a tag need one of these.
+        // Some looks at a tag need one of these: `crates/posegate-site/tests/golden_tables.rs` has one.
         Self::new(Keep::All, 25),
         Self::new(Keep::All, 50),
         Self::new(Keep::All, 100),
@@ -629,4 +629,16 @@ fn touches(line: &Line, index: usize, lines: &[Line]) -> bool {
         }
     }
     low < high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_insets_are_limited_in_metres() {
+        let inset = |inset, unit| Effort::new(Keep::All, inset).inset_at(unit);
+        let found = [inset(200, 8), inset(200, 12), inset(200, 31), inset(2, 12)];
+        assert_eq!(found, [200.0, 14.0, 12.0, 2.0]);
+    }
 }

@@ -283,13 +283,8 @@ fn proven_facets(
         let known;
         (open, known_lever, known) = left(&plan, &among)?;
         if open.is_empty() {
-            if effort.inset > Effort::ROUNDING {
-                // Facets that leave no pose are proven, too.
-                let bytes = bake::write_facets(order, &plan)?;
-                let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
-                if coverage(&table, order.success).share == 0.0 {
-                    return Err(BakeError::NoPieces(NONE_IS_PROVEN).into());
-                }
+            if effort.inset > Effort::ROUNDING && holds_nothing(order, &plan)? {
+                return Err(BakeError::NoPieces(NONE_IS_PROVEN).into());
             }
             return Ok((plan, known));
         }
@@ -308,6 +303,13 @@ fn proven_facets(
         (open, _, known) = left(&plan, &all)?;
     }
     Ok((plan, known))
+}
+
+/// Returns `true` if a table of these facets holds no pose of the set. Facets that leave no pose are proven, too.
+fn holds_nothing(order: &BakeInput<'_>, plan: &FacetPlan) -> Result<bool, BuildError> {
+    let bytes = bake::write_facets(order, plan)?;
+    let table = Table::parse(&bytes).map_err(VerifyError::Table)?;
+    Ok(coverage(&table, order.success).share == 0.0)
 }
 
 /// Proves every run of a table inside a set.

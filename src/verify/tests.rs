@@ -1,8 +1,8 @@
 //! Tables are built for sets that have one; other sets give the right error.
 
-use super::{BuildError, ExpectedTable, VerifyError, build, coverage, verify};
-use crate::bake::{BakeError, BakeInput, Extent, Layout, Step, TableSpec};
-use crate::shape::{Clear, Exclusion, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
+use super::{BuildError, ExpectedTable, VerifyError, build, coverage, holds_nothing, verify};
+use crate::bake::{self, BakeError, BakeInput, Effort, Extent, Layout, Step, TableSpec};
+use crate::shape::{BoxSet, Clear, Exclusion, Footprint, PoseDeg, Shape, SuccessSet, Tolerance};
 use crate::table::Table;
 
 fn set(yaw_deg: f64, shape: Shape) -> SuccessSet {
@@ -31,6 +31,24 @@ fn order(success: &SuccessSet, yaw_deg: [f64; 2], layout: Layout) -> BakeInput<'
             layout,
         },
         epsilon: 0.99,
+    }
+}
+
+/// A box of 4 mm to either side, in length units of 64 um or more: 200 of them leave nothing.
+#[test]
+fn facets_that_leave_no_pose_are_found() {
+    let side = [-0.004, 0.004];
+    let small = BoxSet {
+        x: side,
+        y: side,
+        yaw_deg: [-4.0, 4.0],
+    };
+    let small = set(0.0, Shape::Box(small));
+    let order = order(&small, [-5.0, 5.0], Layout::Facets);
+    let largest = *Effort::EACH.last().unwrap();
+    for (effort, is_void) in [(Effort::default(), false), (largest, true)] {
+        let plan = bake::facets(&order, effort).unwrap();
+        assert_eq!(holds_nothing(&order, &plan).unwrap(), is_void, "{effort:?}");
     }
 }
 

@@ -55,13 +55,7 @@ fn committed_tables_are_made_from_the_committed_site() {
     }
     // Facets in several pieces, for the budgets of a decision. Two tags took 29 kB with cells.
     let bay = Site::read(root.join("sites/loading-bay.toml")).unwrap();
-    let task = bay.task("see-bay").unwrap();
-    let order = BakeInput {
-        task: "see-bay",
-        success: &task.success,
-        spec: bay.chosen_table(task).unwrap(),
-        epsilon: bay.epsilon,
-    };
+    let order = chosen(&bay, "see-bay");
     let (made, proof) = posegate::verify::build(&order, &|| ()).unwrap();
     let path = root.join("../tests/data/see-bay.posegate");
     if std::env::var_os("POSEGATE_BLESS").is_some() {
@@ -102,6 +96,17 @@ fn self_test_tables_equal_those_that_are_made() {
     }
 }
 
+/// Returns the table of a task as the site asks for it.
+fn chosen<'a>(site: &'a Site, task: &'a str) -> BakeInput<'a> {
+    let found = site.task(task).unwrap();
+    BakeInput {
+        task,
+        success: &found.success,
+        spec: site.chosen_table(found).unwrap(),
+        epsilon: site.epsilon,
+    }
+}
+
 /// A look of a synthetic plant. Its chords meet 3 to 6 mm outside of the set: it has no table with insets of 12 units alone.
 #[test]
 fn look_with_slanted_chords_has_a_table() {
@@ -115,15 +120,9 @@ fn look_with_slanted_chords_has_a_table() {
          error_bound = {{ translation = 0.03, yaw_deg = 1.0 }}\n"
     );
     let site = Site::parse(&text, "site.toml").unwrap();
-    let found = site.task("see").unwrap();
-    let order = BakeInput {
-        task: "see",
-        success: &found.success,
-        spec: site.chosen_table(found).unwrap(),
-        epsilon: site.epsilon,
-    };
+    let order = chosen(&site, "see");
     let (bytes, _) = build(&order, &|| ()).unwrap();
-    let share = coverage(&Table::parse(&bytes).unwrap(), &found.success).share;
+    let share = coverage(&Table::parse(&bytes).unwrap(), order.success).share;
     assert!(share > 0.95, "{share}");
 }
 

@@ -160,7 +160,7 @@ opened()
 
 
 def counts():
-    """Tells whether the last diagnostics count messages in both directions: they come once a second."""
+    """Returns True if the last diagnostics count messages in both directions. Diagnostics come once a second."""
     return state() and all(int(state()[1][name]) > 0 for name in ("telemetry", "controller_bytes"))
 
 
