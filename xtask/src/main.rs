@@ -374,7 +374,7 @@ const JOBS: &[Job] = &[
 /// What a change must pass without recordings: jobs with their arguments, those of this machine in this order, and beside them those of
 /// firmware. (The fast suite has a small share of `faults`.)
 const ON_THIS_MACHINE: &[&str] = &["quick", "docs"];
-const OF_FIRMWARE: &[&str] = &["lines", "gate_mutants --texts", "no_panic", "vectors", "c"];
+const OF_FIRMWARE: &[&str] = &["lines", "gate_mutants --texts", "no_panic", "c"];
 /// The jobs that `full` adds.
 const MORE_ON_THIS_MACHINE: &[&str] = &[
     "clippy",
@@ -383,7 +383,7 @@ const MORE_ON_THIS_MACHINE: &[&str] = &[
     "adversarial 250000 today grid",
     "adversarial 250000 today facets",
 ];
-const MORE_OF_FIRMWARE: &[&str] = &["wasm", "parts", "counts"];
+const MORE_OF_FIRMWARE: &[&str] = &["vectors", "wasm", "parts", "counts"];
 
 fn main() -> ExitCode {
     let mut given = std::env::args().skip(1);

@@ -2,7 +2,7 @@
 //! The tests cover all subcommands with all of their arguments that name files.
 #![cfg(unix)]
 
-use posegate_testkit::commands;
+use posegate_testkit::{commands, counts};
 
 use commands::{
     DEMO, Folder, LINES, NAMED_BY_SITE, Role, arguments, code_of, file_of, filled, listed,
@@ -88,6 +88,7 @@ fn every_command_writes_its_outputs() {
 
 #[test]
 fn no_output_file_replaces_an_input() {
+    let (skipped, step) = counts::part(4);
     let mut pairs = 0;
     for (leaf, line) in LINES {
         for (output, role) in arguments(leaf, line) {
@@ -95,6 +96,10 @@ fn no_output_file_replaces_an_input() {
                 continue;
             }
             for (_, input) in inputs(leaf, line) {
+                pairs += 1;
+                if pairs % step != skipped {
+                    continue;
+                }
                 let folder = Folder::new();
                 let at = |name: &str| folder.path().join(name);
                 fs::create_dir(at("sub")).unwrap();
@@ -116,7 +121,6 @@ fn no_output_file_replaces_an_input() {
                     let line = filled(leaf, line, &[(&output, name)]);
                     refused(&folder, &line, &format!("{leaf} {output} on {input}"));
                 }
-                pairs += 1;
             }
         }
     }

@@ -173,12 +173,14 @@ fn slivers_are_built_or_refused_with_a_message() {
         // Hardly any slack for the robot.
         sets.push(format!("{{ shape = \"footprint\", footprint = {robot}, region = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1{}], [-0.2, 0.1{}]] }}", &thin[3..], &thin[3..]));
     }
-    let mut proven = 0;
-    for set in &sets {
+    let (skipped, step) = counts::part(4);
+    let (mut proven, mut tried) = (0, 0);
+    for set in sets.iter().skip(skipped).step_by(step) {
         let codes = built(&site(set, 0.0, &table));
         proven += usize::from(codes[0] == 0);
+        tried += 1;
     }
-    assert!(proven > sets.len() / 2, "{proven} of {}", sets.len());
+    assert!(tried >= 7 && proven > tried / 2, "{proven} of {tried}");
 }
 
 /// The proof chooses the right part of the set for each piece, also if the robot fits at few headings.

@@ -16,7 +16,7 @@
 //! | answer of [`Evaluator::permits`]: 0 permit, else the code of the reason; 0x80 added if a reply follows | u8 |
 //! | length of the request | u8 |
 //! | [`Request::body`], which names the table | |
-//! | with 0x80: [`Reply::body`] of [`Request::judge`]: the same answer with margin and worst pose | 23 bytes |
+//! | with 0x80: [`Reply::body`] of [`Request::evaluate`]: the same answer with margin and worst pose | 23 bytes |
 #![allow(dead_code)] // Firmware includes this file by path, and uses a part.
 
 use posegate::gate::Reason;

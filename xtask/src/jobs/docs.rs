@@ -40,7 +40,7 @@ const BUILT: [(&str, &str); 2] = [
 /// The page that `cargo xtask python` runs, since it needs the wheel.
 const OF_PYTHON: &str = "for-python.md";
 
-/// Builds the API documents of the core alone and of all libraries without a warning. Runs every command in the shell blocks of the
+/// Builds the API documents of all libraries without a warning. Runs every command in the shell blocks of the
 /// README and of docs/, each page in a separate folder with the sample files. The program is that
 /// of the fast suite, so that nothing is built twice; `budgets` and `dist` build it for release, and run the demo.
 pub fn docs(_: &Arguments) -> Result {
@@ -49,22 +49,15 @@ pub fn docs(_: &Arguments) -> Result {
     need::command("arm-none-eabi-gcc", "gcc-arm-none-eabi")?;
     need::command("make", "make")?;
     stamps::are_stated()?;
-    for packages in [
-        "-p posegate",
-        // Without the program, whose document would replace that of the library.
-        "-p posegate -p posegate-files -p posegate-learn -p posegate-site -p posegate-replay -p posegate-place -p posegate-plan -p posegate-show -p posegate-c --features posegate/std,posegate/defmt",
-    ] {
-        cmd(&format!("cargo doc --no-deps {packages}"))
-            .env("RUSTDOCFLAGS", "-D warnings")
-            .run()?;
-    }
+    // The packages of the lints, so that what these depend on is not checked twice.
+    cmd("cargo doc --no-deps --workspace --exclude posegate-peers")
+        .env("RUSTDOCFLAGS", "-D warnings")
+        .run()?;
     let mut report = Report::default();
     check_front_pages(&mut report)?;
-    build_suite("--bin posegate --example may_dock --example drive_bag").run()?;
+    build_suite("--bin posegate --example drive_bag").run()?;
     // Its lines are the README's.
     program_at(&tested("examples/may_dock")).run()?;
-    // Its command on the pages is replaced below, but its features must be enough.
-    cmd("cargo check -p posegate-replay --example drive_bag").run()?;
     let mut pages = files::files_ending("docs", ".md")?;
     pages.retain(|page| !page.ends_with(OF_PYTHON));
     pages.insert(0, "README.md".into());

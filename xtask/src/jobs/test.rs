@@ -14,9 +14,11 @@ pub fn suite(arguments: &str) -> Cmd {
     cmd("cargo test --workspace --exclude posegate-peers").words(arguments)
 }
 
-/// Returns the command that builds programs with the features of the fast suite, so that nothing is built twice.
+/// Returns the command that builds programs with the features of the fast suite, so that nothing is built twice. Cargo counts the
+/// features of dependencies for tests only if an example or a test is built, so there is always one.
 pub fn build_suite(arguments: &str) -> Cmd {
-    cmd("cargo build --workspace --exclude posegate-peers --profile test").words(arguments)
+    cmd("cargo build --workspace --exclude posegate-peers --profile test --example may_dock")
+        .words(arguments)
 }
 
 /// Firmware that tests of the fast suite run in the emulator.
@@ -50,8 +52,18 @@ fn build_firmware() -> Result {
 }
 
 /// Runs the tests that are not in the fast suite: the core's tests without the feature `std`, and the examples in the API documents.
+/// Checks what only a build of one crate shows: links in the core's API documents, and the features of an example.
 pub fn alone(_: &Arguments) -> Result {
     cmd("cargo test -p posegate --lib").run()?;
+    // In a folder of their own: those of the workspace have the same names.
+    for features in ["", "std,defmt"] {
+        cmd("cargo doc --no-deps -p posegate --target-dir target/alone --features")
+            .arg(features)
+            .env("RUSTDOCFLAGS", "-D warnings")
+            .run()?;
+    }
+    // The pages name it with the features of its crate.
+    cmd("cargo check -p posegate-replay --example drive_bag").run()?;
     suite("--doc").run()
 }
 
@@ -80,6 +92,7 @@ pub fn deep(_: &Arguments) -> Result {
         "chains",
         "cover",
         "demo",
+        "outputs_and_inputs",
         "place",
         "standard_output",
         "tag_tolerance",

@@ -34,7 +34,7 @@ const GOAL: f64 = 0.1;
 /// Number of faults of each kind from which on the two firmwares can be distinguished.
 const MANY: u64 = 400;
 /// Number of faults of each kind in the fast suite.
-const FEW: u64 = 20;
+const FEW: u64 = 8;
 
 fn main() -> ExitCode {
     let numbers: Vec<u64> = std::env::args()

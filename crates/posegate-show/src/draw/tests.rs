@@ -230,10 +230,10 @@ fn drawn_pieces_equal_those_of_the_gate() {
         };
         let table = Table::parse(&bytes).unwrap();
         let (mut permits, mut denials) = (0, 0);
-        for _ in 0..counts::rounds(60, 2) {
+        for _ in 0..counts::rounds(20, 2) {
             let yaw_deg = random.within([-20.0, 20.0]);
             let pieces = pieces(&table, yaw_deg, &window);
-            for _ in 0..counts::rounds(60, 4) {
+            for _ in 0..counts::rounds(180, 4) {
                 let point = [random.within(window.x), random.within(window.y)];
                 let looks = pieces
                     .iter()
