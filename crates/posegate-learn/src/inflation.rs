@@ -7,7 +7,7 @@ use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
 use super::groups::{self, GroupReport, for_a_new_group, own_factor};
 use super::memory::{FEWEST_BLOCKS, memory};
-use super::student::normal_quantile;
+use super::quantiles::normal_quantile;
 use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
 use serde::{Deserialize, Serialize};

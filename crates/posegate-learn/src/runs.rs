@@ -2,7 +2,7 @@
 //! with the same information.
 
 use super::binomial::order_statistic;
-use super::student::{normal_quantile, t_quantile};
+use super::quantiles::{normal_quantile, t_quantile};
 use std::collections::BTreeMap;
 
 /// The origin of the runs of a file's rows.

@@ -1,7 +1,7 @@
 //! Compares the places of docks and tags in the site file with logs of dockings.
 
 use super::LearnError;
-use super::fisher::fisher_quantile;
+use super::quantiles::fisher_quantile;
 use nalgebra::{Cholesky, Const, Matrix3, Vector3};
 use posegate_files::sheet::{Sheet, each};
 use std::collections::BTreeMap;

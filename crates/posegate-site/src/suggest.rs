@@ -48,28 +48,7 @@ pub(super) fn list<'a>(mut names: impl Iterator<Item = &'a str>) -> String {
 /// Returns the number of insertions, deletions, replacements and swaps of neighbours that turn `a`
 /// into `b`. Letter case is ignored.
 fn distance(a: &str, b: &str) -> usize {
-    let a: Vec<char> = a.to_lowercase().chars().collect();
-    let b: Vec<char> = b.to_lowercase().chars().collect();
-    let width = b.len() + 1;
-    let mut cost = vec![0_usize; (a.len() + 1) * width];
-    for i in 0..=a.len() {
-        for j in 0..=b.len() {
-            cost[i * width + j] = if i == 0 || j == 0 {
-                i + j
-            } else {
-                let replaced = cost[(i - 1) * width + j - 1] + usize::from(a[i - 1] != b[j - 1]);
-                let removed = cost[(i - 1) * width + j] + 1;
-                let added = cost[i * width + j - 1] + 1;
-                let swapped = if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                    cost[(i - 2) * width + j - 2] + 1
-                } else {
-                    usize::MAX
-                };
-                replaced.min(removed).min(added).min(swapped)
-            };
-        }
-    }
-    cost[a.len() * width + b.len()]
+    strsim::osa_distance(&a.to_lowercase(), &b.to_lowercase())
 }
 
 #[cfg(test)]

@@ -49,6 +49,10 @@ pub fn docs(_: &Arguments) -> Result {
     need::command("arm-none-eabi-gcc", "gcc-arm-none-eabi")?;
     need::command("make", "make")?;
     stamps::are_stated()?;
+    // Pages link each other if their folders exist, in whatever order they are made.
+    for package in ["posegate", "posegate_site"] {
+        std::fs::create_dir_all(target_folder().join("doc").join(package))?;
+    }
     // The packages of the lints, so that what these depend on is not checked twice.
     cmd("cargo doc --no-deps --workspace --exclude posegate-peers")
         .env("RUSTDOCFLAGS", "-D warnings")

@@ -17,105 +17,106 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// For what a parameter is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Of {
+    /// A gate or odometry, which a node with a controller does not have.
+    Gate,
+    AnyNode,
+    /// Poses, on any node. Not allowed if detections are used.
+    Poses,
+    /// Poses for a gate. (The covariance from corners has all its terms.)
+    PosesOfGate,
+    /// Allowed only if detections are used.
+    Detections,
+}
+
 /// Every parameter.
-const NAMES: [&str; 52] = [
-    "camera",
-    "camera_info_reliability",
-    "child_frame_id",
-    "corner_sigma_px",
-    "cross_terms",
-    "cycle_ms",
-    "detections_durability",
-    "detections_reliability",
-    "frame_id",
-    "heartbeat_ms",
-    "inflation",
-    "inhibit_hold_ms",
-    "lifecycle",
-    "link_timeout_ms",
-    "look_at",
-    "markers",
-    "max_hamming",
-    "max_speed",
-    "max_speed_across",
-    "max_yaw_rate_deg",
-    "maximum_age_ms",
-    "maximum_fix_age_ms",
-    "odom_durability",
-    "odom_frame_id",
-    "odom_reliability",
-    "odometry_m_per_sqrt_m",
-    "odometry_m_per_sqrt_s",
-    "odometry_maximum_gap_ms",
-    "odometry_rad_per_sqrt_m",
-    "odometry_rad_per_sqrt_rad",
-    "odometry_rad_per_sqrt_s",
-    "odometry_slip",
-    "odometry_turn_slip",
-    "odometry_turn_slip_per_m",
-    "permit_hold_ms",
-    "permits_in_a_row",
-    "pose_durability",
-    "pose_reliability",
-    "pose_type",
-    "report_period_ms",
-    "restart",
-    "robot",
-    "set_translation_m",
-    "set_yaw_deg",
-    "site_digest",
-    "stands_still",
-    "task",
-    "task_digest",
-    "use_detections",
-    "use_odometry",
-    "use_sim_time",
-    "valid_ms",
+const PARAMETERS: [(Of, &[&str]); 5] = [
+    (
+        Of::Gate,
+        &[
+            "inflation",
+            "inhibit_hold_ms",
+            "look_at",
+            "markers",
+            "max_speed",
+            "max_speed_across",
+            "max_yaw_rate_deg",
+            "maximum_age_ms",
+            "maximum_fix_age_ms",
+            "odom_durability",
+            "odom_reliability",
+            "odometry_m_per_sqrt_m",
+            "odometry_m_per_sqrt_s",
+            "odometry_maximum_gap_ms",
+            "odometry_rad_per_sqrt_m",
+            "odometry_rad_per_sqrt_rad",
+            "odometry_rad_per_sqrt_s",
+            "odometry_slip",
+            "odometry_turn_slip",
+            "odometry_turn_slip_per_m",
+            "permit_hold_ms",
+            "permits_in_a_row",
+            "report_period_ms",
+            "restart",
+            "stands_still",
+            "use_detections",
+            "use_odometry",
+            "use_sim_time",
+        ],
+    ),
+    (
+        Of::AnyNode,
+        &[
+            "cycle_ms",
+            "frame_id",
+            "heartbeat_ms",
+            "lifecycle",
+            "link_timeout_ms",
+            "robot",
+            "site_digest",
+            "task",
+            "task_digest",
+            "valid_ms",
+        ],
+    ),
+    (
+        Of::Poses,
+        &[
+            "child_frame_id",
+            "odom_frame_id",
+            "pose_durability",
+            "pose_reliability",
+            "pose_type",
+            "set_translation_m",
+            "set_yaw_deg",
+        ],
+    ),
+    (Of::PosesOfGate, &["cross_terms"]),
+    (
+        Of::Detections,
+        &[
+            "camera",
+            "camera_info_reliability",
+            "corner_sigma_px",
+            "detections_durability",
+            "detections_reliability",
+            "max_hamming",
+        ],
+    ),
 ];
 
-/// The parameters of a node with a controller. All others are settings of the gate or of odometry, which such a node
-/// does not have.
-const WITH_CONTROLLER: [&str; 17] = [
-    "child_frame_id",
-    "cycle_ms",
-    "frame_id",
-    "heartbeat_ms",
-    "lifecycle",
-    "link_timeout_ms",
-    "odom_frame_id",
-    "pose_durability",
-    "pose_reliability",
-    "pose_type",
-    "robot",
-    "set_translation_m",
-    "set_yaw_deg",
-    "site_digest",
-    "task",
-    "task_digest",
-    "valid_ms",
-];
+/// Returns the names of the parameters that are for something of `of`.
+fn named(of: impl Fn(Of) -> bool) -> impl Iterator<Item = &'static str> {
+    let groups = PARAMETERS.into_iter().filter(move |(own, _)| of(*own));
+    groups.flat_map(|(_, names)| names.iter().copied())
+}
 
-/// Parameters that are allowed only if detections are used.
-const OF_DETECTIONS: [&str; 6] = [
-    "camera",
-    "camera_info_reliability",
-    "corner_sigma_px",
-    "detections_durability",
-    "detections_reliability",
-    "max_hamming",
-];
-
-/// Parameters that are allowed only for poses. The covariance from corners has all its terms.
-const OF_POSES: [&str; 8] = [
-    "child_frame_id",
-    "cross_terms",
-    "odom_frame_id",
-    "pose_durability",
-    "pose_reliability",
-    "pose_type",
-    "set_translation_m",
-    "set_yaw_deg",
-];
+/// Returns `true` if a node with a controller has a parameter.
+fn is_with_controller(name: &str) -> bool {
+    named(|of| matches!(of, Of::AnyNode | Of::Poses)).any(|own| own == name)
+}
 
 /// The standard deviation of a corner's coordinates, pixels. Detectors are often better; use a value measured with
 /// the robot's own camera.
@@ -142,7 +143,7 @@ impl<'p> Reader<'p> {
     /// Returns the parameters that the node has, with their values or defaults.
     pub(super) fn reported(self, is_serial: bool) -> ReportedParameters {
         let mut used = self.used.into_inner();
-        used.retain(|name, _| !is_serial || WITH_CONTROLLER.contains(name));
+        used.retain(|name, _| !is_serial || is_with_controller(name));
         ReportedParameters(used)
     }
 
@@ -153,22 +154,18 @@ impl<'p> Reader<'p> {
     }
 
     pub(super) fn check_names(&self) -> Result<(), SettingsError> {
-        let unknown = self.given.names().find(|name| !NAMES.contains(name));
+        let mut all: Vec<_> = named(|_| true).collect();
+        all.sort_unstable();
+        let unknown = self.given.names().find(|name| !all.contains(name));
         let Some(name) = unknown else {
             return Ok(());
         };
-        let similar = NAMES
-            .iter()
-            .map(|known| (distance(name, known), known))
-            .min();
-        let hint = similar.filter(|(distance, _)| *distance <= 3);
+        let hint = posegate_site::question(name, all.iter().copied());
         Err(SettingsError::Unknown {
             name: name.to_owned(),
             place: self.given.place(name).to_owned(),
-            hint: hint.map_or(String::new(), |(_, known)| {
-                format!(" (did you mean `{known}`?)")
-            }),
-            all: NAMES.join(", "),
+            hint: hint.map_or(String::new(), |hint| format!(" ({hint})")),
+            all: all.join(", "),
         })
     }
 
@@ -180,9 +177,7 @@ impl<'p> Reader<'p> {
             };
         };
         let names = self.given.names().filter(|name| *name != "use_sim_time");
-        let foreign = names
-            .into_iter()
-            .find(|name| !WITH_CONTROLLER.contains(name));
+        let foreign = names.into_iter().find(|name| !is_with_controller(name));
         match foreign {
             Some(name) => Err(SettingsError::OfTheController {
                 name: name.to_owned(),
@@ -355,10 +350,14 @@ impl<'p> Reader<'p> {
         table: &Table<'_>,
     ) -> Result<Option<Detector>, SettingsError> {
         let is_used = self.bool("use_detections", false)?;
-        let foreign: &[&str] = if is_used { &OF_POSES } else { &OF_DETECTIONS };
-        if let Some(name) = foreign.iter().find(|name| self.given.get(name).is_some()) {
+        let is_foreign = move |of| match of {
+            Of::Poses | Of::PosesOfGate => is_used,
+            Of::Detections => !is_used,
+            Of::Gate | Of::AnyNode => false,
+        };
+        if let Some(name) = named(is_foreign).find(|name| self.given.get(name).is_some()) {
             return Err(SettingsError::OtherInput {
-                name: (*name).to_owned(),
+                name: name.to_owned(),
                 place: self.given.place(name).to_owned(),
                 of: if is_used {
                     "poses"
@@ -582,20 +581,4 @@ impl<'p> Reader<'p> {
             maximum_fix_age_ms: self.ms("maximum_fix_age_ms", 1_500)?,
         }))
     }
-}
-
-/// Returns the number of single-letter changes between two names.
-fn distance(from: &str, to: &str) -> usize {
-    let to: Vec<char> = to.chars().collect();
-    let mut row: Vec<usize> = (0..=to.len()).collect();
-    for (i, a) in from.chars().take(64).enumerate() {
-        let mut before = row[0];
-        row[0] = i + 1;
-        for (j, b) in to.iter().enumerate() {
-            let changed = before + usize::from(a != *b);
-            before = row[j + 1];
-            row[j + 1] = changed.min(before + 1).min(row[j] + 1);
-        }
-    }
-    row[to.len()]
 }

@@ -1,4 +1,4 @@
-//! Quantiles of the normal distribution and of Student's t distribution.
+//! Quantiles of the normal distribution, of Student's t distribution and of the F distribution.
 
 /// Returns the quantile of the standard normal distribution.
 pub(super) fn normal_quantile(probability: f64) -> f64 {
@@ -32,6 +32,23 @@ pub(super) fn t_quantile(probability: f64, degrees: f64) -> f64 {
 /// Returns the probability that a t variable exceeds `t`, at least 0.
 fn beyond(t: f64, degrees: f64) -> f64 {
     0.5 * incomplete_beta(0.5 * degrees, 0.5, degrees / (degrees + t * t))
+}
+
+/// Returns the p-quantile of the F distribution with `a` and `b` degrees of freedom, to a relative error of 1e-9; p is above 0 and below 1.
+pub(super) fn fisher_quantile(p: f64, a: f64, b: f64) -> f64 {
+    // The share beyond f is I_y(b/2, a/2) with y = b / (b + a f), which rises with y.
+    let beyond = 1.0 - p;
+    let (mut low, mut high) = (0.0f64, 1.0f64);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if incomplete_beta(0.5 * b, 0.5 * a, middle) < beyond {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    // A smaller y is a larger f.
+    b / a * (1.0 - low) / low.max(1e-300)
 }
 
 /// Returns the regularised incomplete beta function, by its continued fraction (Lentz).
@@ -93,5 +110,27 @@ mod tests {
         }
         assert!((normal_quantile(0.975) - 1.959_964).abs() < 1e-6);
         assert!(t_quantile(0.5, 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fisher_quantiles_equal_published_ones() {
+        for (p, a, b, expected) in [
+            (0.95, 3.0, 10.0, 3.708_26),
+            (0.99, 3.0, 10.0, 6.552_31),
+            (0.95, 1.0, 1.0, 161.447_6),
+            (0.95, 3.0, 2.0, 19.164_3),
+            (0.999, 3.0, 60.0, 6.171_2),
+            (0.5, 4.0, 4.0, 1.0),
+        ] {
+            let found = fisher_quantile(p, a, b);
+            assert!(
+                (found / expected - 1.0).abs() < 2e-5,
+                "{p} {a} {b}: {found}"
+            );
+        }
+        // With two and b degrees of freedom the share beyond f is (1 + 2 f / b)^(-b/2).
+        let f = fisher_quantile(0.9999, 2.0, 7.0);
+        let beyond = (1.0 + 2.0 * f / 7.0f64).powf(-3.5);
+        assert!((beyond / 1e-4 - 1.0).abs() < 1e-8, "{beyond}");
     }
 }
