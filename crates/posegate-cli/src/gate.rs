@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         )
     })?;
     let radius = radius(&table, arguments.epsilon)?;
-    let task_digest = super::table::hex(&table.task_digest());
+    let task_digest = posegate_files::printable::hex(&table.task_digest());
     let columns = match arguments.set {
         Kind::Gaussian => Columns::Estimates,
         Kind::Bounded => Columns::TimedPoses,

@@ -10,7 +10,7 @@ use posegate::verify::{
     verify, volume,
 };
 use posegate_files::files::{Files, Input, Output};
-use posegate_files::printable::printable_json;
+use posegate_files::printable::{hex, printable_json};
 use posegate_show::doctor::{Warning, examine};
 use posegate_site::controller_cost::{self, Level};
 use posegate_site::{Core, Site, TableSpec, Task};
@@ -325,11 +325,6 @@ fn proof_text(proof: Proof) -> String {
 
 fn of_proof(proof: Proof) -> Value {
     json!({"runs": proof.runs, "cells": proof.cells, "corners": proof.corners})
-}
-
-/// Returns bytes as hexadecimal digits.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Returns the content of a table as JSON.

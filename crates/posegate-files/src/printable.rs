@@ -26,6 +26,12 @@ pub const fn is_printable(letter: char) -> bool {
         | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
+/// Returns bytes as hexadecimal digits.
+#[must_use]
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Appends a character, escaped as Rust writes it (`\n`, `\u{1b}`) if it is not printable.
 pub fn push(out: &mut String, letter: char) {
     match letter {

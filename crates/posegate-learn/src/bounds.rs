@@ -5,7 +5,7 @@ use super::LearnError;
 use super::axis::PARTS;
 use super::calibration::Calibration;
 use super::cells::{Cells, each, nested};
-use super::detections::{Detections, hexadecimal};
+use super::detections::Detections;
 use super::document::{self, Document};
 use super::error_model::ErrorModel;
 use super::family::{Family, LEAST_RATIO};
@@ -14,6 +14,7 @@ use super::sample::{FEWEST, FEWEST_RUNS, LEAST_ERROR, Sample};
 use super::smooth::{Lattice, Target, capped, errors_around, fit, floored, share_of};
 use super::split::{Drawn, FITTED, split};
 use super::taken_with::TakenWith;
+use posegate_files::printable::hex;
 
 /// The settings for learning bounds.
 #[derive(Clone, Debug, PartialEq)]
@@ -213,7 +214,7 @@ impl<'d> Learner<'d> {
             })
             .count();
         document::Data {
-            sha256: hexadecimal(&detections.sha256),
+            sha256: hex(&detections.sha256),
             views: rows.len() as u64,
             drawn_of: detections.drawn_of,
             detections: self.seen.len() as u64,

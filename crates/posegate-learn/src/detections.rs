@@ -189,10 +189,5 @@ fn place(line: &Line<'_>, [d, phi, psi]: [Column; 3]) -> Result<[f64; 3], SheetE
     ])
 }
 
-/// Returns a digest in hexadecimal digits.
-pub(super) fn hexadecimal(digest: &[u8; 32]) -> String {
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 #[cfg(test)]
 mod tests;

@@ -4,10 +4,10 @@ use super::LearnError;
 use super::axis::PARTS;
 use super::binomial::clopper_pearson;
 use super::cells::{Cells, flat, numbered};
-use super::detections::hexadecimal;
 use super::document::{self, Document};
 use super::family::Family;
 use super::smooth::{Lattice, between};
+use posegate_files::printable::hex;
 
 mod scaled;
 
@@ -251,7 +251,7 @@ impl ErrorModel {
     /// Returns `true` if the model was learnt from the file with this SHA-256.
     #[must_use]
     pub fn is_of(&self, sha256: &[u8; 32]) -> bool {
-        self.document.data.sha256 == hexadecimal(sha256)
+        self.document.data.sha256 == hex(sha256)
     }
 
     /// Returns `true` if the bounds are for the better one of the two poses that fit a tag's image, instead of the

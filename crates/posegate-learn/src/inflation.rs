@@ -2,7 +2,6 @@
 
 use super::LearnError;
 use super::binomial::{conformal_rank, order_statistic, rank};
-use super::detections::hexadecimal;
 use super::document::VERSION;
 use super::estimates::{LOG_DET, Scored, ScoredEstimates};
 use super::groups::{self, GroupReport, for_a_new_group, own_factor};
@@ -10,6 +9,7 @@ use super::memory::{FEWEST_BLOCKS, memory};
 use super::quantiles::normal_quantile;
 use posegate::confidence::radius_squared;
 use posegate::set::Inflation;
+use posegate_files::printable::hex;
 use serde::{Deserialize, Serialize};
 
 /// The most conditions that are distinguished.
@@ -151,7 +151,7 @@ pub fn learn_inflation(
         confidence,
         condition: estimates.condition.clone(),
         data: Data {
-            sha256: hexadecimal(&estimates.sha256),
+            sha256: hex(&estimates.sha256),
             rows: rows.len() as u64,
             impossible: estimates.impossible.len() as u64,
         },

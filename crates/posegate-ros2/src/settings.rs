@@ -10,6 +10,7 @@ use posegate::report::FrameId;
 use posegate::set::{Aging, Trust};
 use posegate::table::{Table, TableError};
 use posegate::track::TrackerSettings;
+use posegate_files::printable::hex;
 use posegate_replay::detector::{Detector, DetectorError};
 use std::path::PathBuf;
 
@@ -395,11 +396,6 @@ impl NodeSettings {
     pub fn site(&self) -> String {
         hex(&self.task_digest)
     }
-}
-
-/// Returns bytes as hexadecimal digits.
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -135,10 +135,7 @@ impl Site {
     /// Returns the digest as hexadecimal digits.
     #[must_use]
     pub fn digest_text(&self) -> String {
-        self.digest
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect()
+        posegate_files::printable::hex(&self.digest)
     }
 
     /// Returns the digest of a task that a controller compares with the one in its table ([`posegate::shape::SuccessSet::digest`]). The rest

@@ -1,21 +1,11 @@
 //! SHA-256 as text.
 
-use std::fmt::Write as _;
+pub(super) use posegate_files::printable::hex;
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-
-/// Returns a digest as hexadecimal digits.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing to a string does not fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
-}
 
 /// Returns the SHA-256 of some bytes as hexadecimal digits.
 pub(super) fn sha256(bytes: &[u8]) -> String {

@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::figures::base64;
 use super::start::first_sigmas;
 use crate::draw::panel::Window;
 use crate::draw::site_plan;
 use crate::draw::{DrawError, Subject, chain_picture, success_of};
 use crate::draw::{SeenFrom, task_image_with_numbers, task_plan};
+use data_encoding::BASE64;
 use posegate::bake;
 use posegate::chain::StartAssumption;
 use posegate::table::Table;
@@ -283,7 +283,7 @@ impl Shown {
         Some(json!({
             "name": self.name,
             "goal": { "x": goal.x, "y": goal.y, "yaw_deg": goal.yaw_deg },
-            "table": self.table.as_ref().ok().map(|(bytes, _)| base64(bytes)),
+            "table": self.table.as_ref().ok().map(|(bytes, _)| BASE64.encode(bytes)),
             "why": self.table.as_ref().err(),
             "window": { "x": self.window.x, "y": self.window.y },
             "sections": { "headings": headings, "polygons": polygons },

@@ -4,11 +4,12 @@ use serde_json::{Value, json};
 
 use super::contents::{Contents, PageError, PageInput, Shown, ShownChain};
 use super::equal_tasks::{area, groups_of_equal};
-use super::figures::{base64, escaped, figure, folded, numbers, table};
+use super::figures::{escaped, figure, folded, numbers, table};
 use super::summary::summary;
 use crate::draw::{
     Mounted, MountingSheet, SeenFrom, Subject, borders_picture, mounting_sheet, task_plan,
 };
+use data_encoding::BASE64;
 use posegate::shape::{Pose3Deg, Tag};
 use posegate::table::Table;
 use posegate_files::printable::fixed;
@@ -62,7 +63,8 @@ pub fn page(order: &PageInput<'_>, contents: &Contents) -> Result<String, PageEr
         .map(|(number, (name, _))| format!("<option value=\"{number}\">{}</option>", escaped(name)))
         .collect();
     let tasks: Vec<Value> = tasks.into_iter().map(|(_, task)| task).collect();
-    let data = json!({ "core": base64(super::CORE), "epsilon": site.epsilon, "tasks": tasks });
+    let data =
+        json!({ "core": BASE64.encode(super::CORE), "epsilon": site.epsilon, "tasks": tasks });
     // The data must not contain the end of the script element.
     let data = data.to_string().replace('<', "\\u003c");
     let parts = [
