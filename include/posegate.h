@@ -8,11 +8,14 @@
  * a union. Storage (a gate, a judge, a receiver) shares memory with nothing: POSEGATE_STATUS_OVERLAP, every
  * output is a denial, and the storage holds nothing until it is initialised again.
  *
- * What a gate + tracker of a robot that drives takes, without its table, and a 100 Hz cycle of it (./ci.sh costs; `posegate table cost` reports
- * it for your table, with the bound of a cycle):
- *   Cortex-M4F: flash 38 + 18 kB (boxes, -Os) to 81 + 23 kB (all shapes, -O3); stack 3,020; 2,768 B, 16,510; 12,675 instructions (-Os; -O3)
- *   Cortex-M0+: flash 41 + 19 kB (boxes, -Os) to 83 + 24 kB (all shapes, -O3); stack 3,080; 3,056 B, 38,556; 34,530 instructions (-Os; -O3)
- *   RV32IMC: flash 49 + 24 kB (boxes, -Os) to 104 + 33 kB (all shapes, -O3); stack 2,912; 2,688 B, 21,389; 15,813 instructions (-Os; -O3)
+ * What a gate + tracker of a robot that drives takes, without its table, and the most instructions that a cycle of examples/c/robot took, without
+ * a fix and with one, at -Os; -O3 (./ci.sh costs; `posegate table cost` reports it for your table, with the bound of a cycle):
+ *   Cortex-M4F: flash 38 + 18 kB (boxes, -Os) to 81 + 23 kB (all shapes, -O3), stack 3,520; 3,240 B,
+ *     16,510; 12,675 instructions without a fix, 37,943; 27,662 with one
+ *   Cortex-M0+: flash 41 + 19 kB (boxes, -Os) to 83 + 24 kB (all shapes, -O3), stack 3,736; 3,552 B,
+ *     38,556; 34,530 instructions without a fix, 94,298; 85,074 with one
+ *   RV32IMC: flash 49 + 24 kB (boxes, -Os) to 104 + 33 kB (all shapes, -O3), stack 3,472; 3,216 B,
+ *     21,389; 15,813 instructions without a fix, 42,951; 32,237 with one
  *
  * C99 and C++11. Link libposegate_c.a after your own objects, with -Wl,--gc-sections; examples/c has
  * recipes for Make and CMake.
@@ -387,6 +390,31 @@ typedef uint32_t posegate_cross_terms;
 #endif // __cplusplus
 
 /**
+ * How the errors of a fix and of its prediction depend on each other. 0 is not a value.
+ */
+enum posegate_dependence
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Independent: a fix from a tag, and a pose that odometry carried from an earlier tag.
+     */
+    POSEGATE_DEPENDENCE_INDEPENDENT = 1,
+    /**
+     * Unknown: a filter shares its past with the prediction, for example. A wrong model is detected later.
+     */
+    POSEGATE_DEPENDENCE_UNKNOWN = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_dependence posegate_dependence;
+#else
+typedef uint32_t posegate_dependence;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * What to do next. 0 is not a value.
  */
 enum posegate_instruction_kind
@@ -416,6 +444,36 @@ enum posegate_instruction_kind
 typedef enum posegate_instruction_kind posegate_instruction_kind;
 #else
 typedef uint32_t posegate_instruction_kind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How well a model agrees with the fixes so far.
+ */
+enum posegate_model
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * No sign of a contradiction.
+     */
+    POSEGATE_MODEL_HOLDS = 0,
+    /**
+     * The logarithm of the evidence has reached half of the limit for a contradiction: check camera and tags soon.
+     */
+    POSEGATE_MODEL_IN_DOUBT = 1,
+    /**
+     * The fixes contradict the model: keep the gate closed (`posegate_gate_inhibit` with
+     * `POSEGATE_REASON_MODEL_CONTRADICTED` instead of a step) until the cause was removed and `posegate_monitor_reset` was called.
+     */
+    POSEGATE_MODEL_CONTRADICTED = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum posegate_model posegate_model;
+#else
+typedef uint32_t posegate_model;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 

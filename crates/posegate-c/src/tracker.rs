@@ -353,9 +353,10 @@ pub unsafe extern "C" fn posegate_gate_step_tracked(
     // SAFETY: the caller's promise; sealed storage has been written. The two storages are apart, so both objects may be used at once.
     posegate_status::of(|| unsafe {
         let apart = separate(gate, step)
-            .and(separate(tracker, step))
             .and(separate(gate, tracker))
             .and(separate(tracker, gate));
+        // A tracker that the step shares is no longer initialised, so the gate closes.
+        let of_tracker = separate(tracker, step);
         let written = write(step, posegate_step::DENIED);
         apart?;
         let tracker = open(tracker);
@@ -379,6 +380,7 @@ pub unsafe extern "C" fn posegate_gate_step_tracked(
         if let Err(reason) = found {
             result.verdict = Err(reason);
         }
+        of_tracker?;
         written?;
         write(step, posegate_step::of(result))?;
         tracker.map(|_| ())

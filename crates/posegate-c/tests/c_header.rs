@@ -134,6 +134,23 @@ fn every_macro_and_constant_compiles() {
     assert!(output.status.success(), "{said}");
 }
 
+/// Every name of a type, a function or a constant in a comment is declared.
+#[test]
+fn comments_name_what_is_declared() {
+    let header = committed();
+    let code = without_comments(&header);
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let declared: std::collections::BTreeSet<&str> = code.split(|c| !is_word(c)).collect();
+    // Names in backquotes; one that ends with `_` is the beginning of several.
+    let named = header.split('`').skip(1).step_by(2).filter(|name| {
+        let is_own = name.starts_with("posegate_") || name.starts_with("POSEGATE_");
+        is_own && name.chars().all(is_word) && !name.ends_with('_')
+    });
+    let (unknown, known): (Vec<&str>, Vec<&str>) = named.partition(|name| !declared.contains(name));
+    assert!(unknown.is_empty(), "{unknown:?}");
+    assert!(known.len() > 100, "{}", known.len());
+}
+
 fn without_comments(text: &str) -> String {
     let mut code = String::new();
     let mut rest = text;

@@ -554,6 +554,29 @@ fn bad_pointers_are_errors_and_close() {
     }
 }
 
+/// A step that is written into the tracker is an error, after which an open gate does not stay open.
+#[test]
+fn a_step_in_the_tracker_closes_the_gate() {
+    let (gate, tracker) = (gate_of_c(SEE_T7), tracker_of_c());
+    let mut belief = belief_of_c(0.0, 0.0, 0.0);
+    belief.spread = [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-7];
+    let opened = (1..40).find(|sequence| {
+        let sequence = *sequence;
+        let report = report_of_c(sequence, 10 * sequence, belief);
+        let step = step_on(gate, 10 * sequence, &evidence_of_c(report, &[])).1;
+        step.state.kind == posegate_state_kind::Permitted as u32
+    });
+    let now = 10 * opened.expect("the gate opens");
+    let step = zeroed::<posegate_step>();
+    // SAFETY: valid pointers.
+    unsafe {
+        let status = posegate_gate_step_tracked(gate, now, tracker, tracker.cast());
+        assert_eq!(status, posegate_status::Overlap);
+        assert_eq!(posegate_gate_tick(gate, now, step), posegate_status::Ok);
+        assert_ne!((*step).state.kind, posegate_state_kind::Permitted as u32);
+    }
+}
+
 #[test]
 fn invalid_odometry_ends_the_path() {
     let tracker = tracker_of_c();

@@ -1156,6 +1156,18 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
         assert_eq!(with(enough), Vec::<String>::new(), "{core}");
         assert_eq!(with(enough - 2.0), ["task see-t7"], "{core}");
     }
+    // A tracker, and the archive for size, take more.
+    let tracker = "--core cortex-m4f --tracker --level s --json";
+    let (out, _) = folder.expect(0, &format!("table cost t.posegate {tracker}"));
+    let cost: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let enough = 2 * cost["cycle"]["with_fix"].as_u64().unwrap();
+    let with = |cycles: u64| {
+        costly(&format!(
+            "core = \"cortex-m4f\"\ntracker = true\nlevel = \"s\"\ncycles_per_decision = {cycles}"
+        ))
+    };
+    assert!(!with(enough).contains(&"task see-t7".to_owned()));
+    assert!(with(enough - 1).contains(&"task see-t7".to_owned()));
     // Without a stated number, an instruction counts as two cycles.
     let enough = 2 * step("cortex-m4f");
     let with = |cycles: u64| {

@@ -30,6 +30,15 @@ impl Core {
     }
 }
 
+/// The level of optimization of the archive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// 3: fast.
+    Fast,
+    /// "s": small.
+    Small,
+}
+
 /// The cycles that the motion controller can spend on a step of the gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller {
@@ -40,6 +49,10 @@ pub struct Controller {
     /// The cycles of an instruction on average, wait states of the flash included: at least 1.
     /// [`Self::DEFAULT_CYCLES_PER_INSTRUCTION`] if the file does not state them.
     pub cycles_per_instruction: Option<f64>,
+    /// The level of optimization of its archive.
+    pub level: Level,
+    /// Fixes are carried along odometry.
+    pub has_tracker: bool,
 }
 
 impl Controller {
@@ -59,6 +72,8 @@ pub(super) fn controller(node: &Node<'_>) -> Result<Controller, SiteError> {
         &keys::CORE,
         &keys::CYCLES_PER_DECISION,
         &keys::CYCLES_PER_INSTRUCTION,
+        &keys::LEVEL,
+        &keys::TRACKER,
     ])?;
     let core = table.required(&keys::CORE)?;
     let word = core.text()?;
@@ -66,6 +81,22 @@ pub(super) fn controller(node: &Node<'_>) -> Result<Controller, SiteError> {
         .into_iter()
         .find(|known| known.name() == word)
         .ok_or_else(|| core.unknown_word(Core::ALL.map(Core::name)))?;
+    let level = match table.optional(&keys::LEVEL) {
+        None => Level::Fast,
+        Some(node) => match node.text()? {
+            "3" => Level::Fast,
+            "s" => Level::Small,
+            _ => return Err(node.unknown_word(["3", "s"])),
+        },
+    };
+    let has_tracker = match table.optional(&keys::TRACKER) {
+        None => false,
+        Some(node) => match node.written() {
+            "true" => true,
+            "false" => false,
+            _ => return Err(node.out_of_range()),
+        },
+    };
     let cycles = table.required(&keys::CYCLES_PER_DECISION)?;
     Ok(Controller {
         core,
@@ -74,5 +105,7 @@ pub(super) fn controller(node: &Node<'_>) -> Result<Controller, SiteError> {
             .optional(&keys::CYCLES_PER_INSTRUCTION)
             .map(|node| node.number())
             .transpose()?,
+        level,
+        has_tracker,
     })
 }

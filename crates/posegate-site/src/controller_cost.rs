@@ -4,20 +4,13 @@
 //! code. The bounds are those of the table ([`posegate::table::Table::worst_case`]) with what a call takes besides its decisions, as measured
 //! in `examples/c/robot`. `./ci.sh costs` makes the figures.
 
+pub use crate::controller::Level;
+
 use crate::Core;
 use posegate::table::{Parts, Table};
 
 /// The figures: a line for each core, level of optimization and set of parts.
 const FIGURES: &str = include_str!("controller_cost/figures.txt");
-
-/// The level of optimization of the archive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Level {
-    /// 3: fast.
-    Fast,
-    /// "s": small.
-    Small,
-}
 
 /// The cost of a gate: bytes, and instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +45,9 @@ struct Figures {
     stack_of_step: u64,
     stack_of_tracked: u64,
     odometry: u64,
+    /// The pages state it.
+    #[cfg(test)]
+    fix: u64,
     late_fix: u64,
     step: u64,
     change: u64,
@@ -80,6 +76,8 @@ impl Figures {
             stack_of_step: number(6),
             stack_of_tracked: number(7),
             odometry: number(9),
+            #[cfg(test)]
+            fix: number(10),
             late_fix: number(11),
             step: number(12),
             change: number(13),
@@ -214,19 +212,32 @@ mod tests {
                     .map(|level| of(&Figures::of(core, level, "turning")))
                     .join("; ")
             };
-            let stack = both(|own| grouped(own.stack_of_step.max(own.stack_of_tracked)));
-            let cycle = both(|own| grouped(own.odometry + own.step));
-            let time =
-                both(|own| format!("{:.2}", (own.odometry + own.step) as f64 * 2.0 / 64_000.0));
+            let stack = both(|own| {
+                let cycle = own.stack_of_step.max(own.stack_of_tracked);
+                grouped(own.stack_of_init.max(cycle))
+            });
+            let [without, with]: [fn(&Figures) -> u64; 2] = [
+                |own| own.odometry + own.step,
+                |own| own.fix + own.odometry + own.step,
+            ];
+            let time = both(|own| {
+                let cycle = own.fix + own.odometry + own.step;
+                format!("{:.2}", cycle as f64 * 2.0 / 64_000.0)
+            });
+            let [without, with] = [without, with].map(|of| {
+                [Level::Small, Level::Fast]
+                    .map(|level| grouped(of(&Figures::of(core, level, "turning"))))
+                    .join("; ")
+            });
             let row = format!(
-                "| {name} | {} | {} | {} | {stack} B | {cycle} | {time} ms |",
+                "| {name} | {} | {} | {} | {stack} B | {without} | {with} | {time} ms |",
                 flash(Level::Small, "boxes"),
                 flash(Level::Small, "turning"),
                 flash(Level::Fast, "turning"),
             );
             assert!(readme.contains(&row), "{row}");
             let row = format!(
-                " *   {name}: flash {} (boxes, -Os) to {} (all shapes, -O3); stack {stack} B, {cycle} instructions (-Os; -O3)\n",
+                " *   {name}: flash {} (boxes, -Os) to {} (all shapes, -O3), stack {stack} B,\n *     {without} instructions without a fix, {with} with one\n",
                 flash(Level::Small, "boxes"),
                 flash(Level::Fast, "turning"),
             );

@@ -48,6 +48,17 @@ pub(super) const CYCLES_PER_INSTRUCTION: Key = Key::number(
     |number| (1.0..=100.0).contains(&number),
 );
 
+pub(super) const LEVEL: Key = Key::new(
+    "level",
+    "the archive's level of optimization: \"3\" or \"s\"",
+    "\"s\"",
+);
+pub(super) const TRACKER: Key = Key::new(
+    "tracker",
+    "true if fixes are carried along odometry, else false",
+    "true",
+);
+
 // Poses.
 const POSE3: &str =
     "{ x = 4.0, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 180.0 }";

@@ -7,8 +7,8 @@ use std::fs::{read_to_string, write};
 /// A job and the digest of its sources, one in each line.
 const FILE: &str = "docs/stamps.txt";
 const PAGE: &str = "docs/measured.md";
-/// What decides the figures of deep jobs: firmware, its tests and its dependencies.
-const SOURCES: [&str; 4] = ["src", "examples", "crates/posegate-boards", "Cargo.lock"];
+/// What decides the figures of deep jobs: firmware and its tests, besides what the firmware depends on.
+const SOURCES: [&str; 3] = ["src", "examples", "crates/posegate-boards"];
 
 /// Returns the digest of the committed sources.
 fn digest() -> Result<String> {
@@ -22,8 +22,15 @@ fn digest() -> Result<String> {
     // Pages beside the code state the figures, and do not change them.
     let is_code = |line: &&str| !line.ends_with(".md");
     let code: Vec<&str> = listed.lines().filter(is_code).collect();
+    let used = cmd("cargo tree --locked -p posegate --features firmware --target thumbv7em-none-eabihf --edges normal,build,dev --prefix none")
+        .read()?;
+    // Name and version, without the folders of the workspace.
+    let used = used
+        .lines()
+        .map(|line| line.split(' ').take(2).collect::<Vec<_>>().join(" "));
+    let used: Vec<String> = used.collect();
     let digest = cmd("git hash-object --stdin")
-        .input(code.join("\n"))
+        .input(format!("{}\n{}", code.join("\n"), used.join("\n")))
         .read()?;
     Ok(digest.chars().take(12).collect())
 }

@@ -4,7 +4,7 @@ use super::Warning;
 use super::warning::warn;
 use posegate::bake::{self, BakeError, BakeInput};
 use posegate::table::Table;
-use posegate_site::controller_cost::{self, Level};
+use posegate_site::controller_cost;
 use posegate_site::{Core, Site};
 
 /// Returns a warning for each task on whose table a step of a gate in C may take more cycles than the site's controller has, both evaluations and the
@@ -38,8 +38,9 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
         let Ok(table) = Table::parse(&bytes) else {
             continue;
         };
-        let step = controller_cost::cost(&table, controller.core, Level::Fast, false).with_fix;
-        let cycles = controller.cycles(step);
+        let (level, has_tracker) = (controller.level, controller.has_tracker);
+        let cost = controller_cost::cost(&table, controller.core, level, has_tracker);
+        let cycles = controller.cycles(cost.with_fix);
         let core = match controller.core {
             Core::CortexM4F => "Cortex-M4F",
             Core::CortexM0Plus => "Cortex-M0+",
@@ -62,7 +63,12 @@ pub fn decision_costs(site: &Site) -> Result<Vec<Warning>, (String, BakeError)> 
                 "decision_too_long",
                 ["task", name],
                 format!(
-                    "a step of the gate on its table may take {cycles:.0} cycles of a {core}; the controller has {} for it",
+                    "{} on its table may take {cycles:.0} cycles of a {core}; the controller has {} for it",
+                    if has_tracker {
+                        "a cycle of the gate and its tracker with a late fix"
+                    } else {
+                        "a step of the gate"
+                    },
                     controller.cycles_per_decision
                 ),
                 &advice.join("; or "),
