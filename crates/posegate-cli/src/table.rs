@@ -134,8 +134,8 @@ pub struct Cost {
     #[arg(long)]
     tracker: bool,
     /// The level of optimization of the archive
-    #[arg(long, default_value = "3", value_parser = ["3", "s"])]
-    level: String,
+    #[arg(long, default_value = "3", value_parser = PossibleValuesParser::new(Level::ALL.map(Level::name)).try_map(level))]
+    level: Level,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -437,14 +437,16 @@ fn core(name: String) -> Result<Core, String> {
     known.ok_or(name)
 }
 
+/// Returns the level of optimization of a name.
+fn level(name: String) -> Result<Level, String> {
+    let known = Level::ALL.into_iter().find(|level| level.name() == name);
+    known.ok_or(name)
+}
+
 fn cost(arguments: &Cost, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
-    let level = match arguments.level.as_str() {
-        "s" => Level::Small,
-        _ => Level::Fast,
-    };
-    let cost = controller_cost::cost(&table, arguments.core, level, arguments.tracker);
+    let cost = controller_cost::cost(&table, arguments.core, arguments.level, arguments.tracker);
     let total = cost.flash_of_gate + cost.flash_of_tracker + cost.flash_of_table;
     if arguments.json {
         print_json(&json!({
@@ -462,7 +464,7 @@ fn cost(arguments: &Cost, files: &Files) -> Outcome {
          a cycle takes at most {} instructions, {} with a fix; a change of table {}",
         arguments.core.name(),
         cost.parts,
-        arguments.level,
+        arguments.level.name(),
         cost.flash_of_gate,
         cost.flash_of_tracker,
         cost.flash_of_table,

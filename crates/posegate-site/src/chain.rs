@@ -267,11 +267,7 @@ fn start(node: &Node<'_>, site_epsilon: f64) -> Result<ChainStart, SiteError> {
         None => Tolerance::NONE,
     };
     let frame = match table.optional(&keys::CHAIN_FRAME) {
-        Some(node) => match node.text()? {
-            "world" => StartFrame::World,
-            "goal" => StartFrame::Goal,
-            _ => return Err(node.unknown_word(["world", "goal"])),
-        },
+        Some(node) => node.among([("world", StartFrame::World), ("goal", StartFrame::Goal)])?,
         None => StartFrame::World,
     };
     Ok(ChainStart {

@@ -39,6 +39,20 @@ pub enum Level {
     Small,
 }
 
+impl Level {
+    /// Both levels.
+    pub const ALL: [Self; 2] = [Self::Fast, Self::Small];
+
+    /// Returns the name of the level in a site file, as compilers have it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "3",
+            Self::Small => "s",
+        }
+    }
+}
+
 /// The cycles that the motion controller can spend on a step of the gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller {
@@ -75,19 +89,12 @@ pub(super) fn controller(node: &Node<'_>) -> Result<Controller, SiteError> {
         &keys::LEVEL,
         &keys::TRACKER,
     ])?;
-    let core = table.required(&keys::CORE)?;
-    let word = core.text()?;
-    let core = Core::ALL
-        .into_iter()
-        .find(|known| known.name() == word)
-        .ok_or_else(|| core.unknown_word(Core::ALL.map(Core::name)))?;
+    let core = table
+        .required(&keys::CORE)?
+        .among(Core::ALL.map(|core| (core.name(), core)))?;
     let level = match table.optional(&keys::LEVEL) {
         None => Level::Fast,
-        Some(node) => match node.text()? {
-            "3" => Level::Fast,
-            "s" => Level::Small,
-            _ => return Err(node.unknown_word(["3", "s"])),
-        },
+        Some(node) => node.among(Level::ALL.map(|level| (level.name(), level)))?,
     };
     let has_tracker = match table.optional(&keys::TRACKER) {
         None => false,

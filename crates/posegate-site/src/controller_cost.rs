@@ -45,7 +45,7 @@ struct Figures {
     stack_of_step: u64,
     stack_of_tracked: u64,
     odometry: u64,
-    /// The pages state it.
+    /// A fix that is not late: only the pages state it.
     #[cfg(test)]
     fix: u64,
     late_fix: u64,
@@ -55,14 +55,10 @@ struct Figures {
 
 impl Figures {
     fn of(core: Core, level: Level, parts: &str) -> Self {
-        let level = match level {
-            Level::Fast => "3",
-            Level::Small => "s",
-        };
         let row = FIGURES
             .lines()
             .map(|line| line.split(' ').collect::<Vec<_>>())
-            .find(|row| row.get(..3) == Some(&[core.name(), level, parts]))
+            .find(|row| row.get(..3) == Some(&[core.name(), level.name(), parts]))
             .unwrap_or_default();
         let number = |at: usize| {
             row.get(at)
@@ -216,18 +212,11 @@ mod tests {
                 let cycle = own.stack_of_step.max(own.stack_of_tracked);
                 grouped(own.stack_of_init.max(cycle))
             });
-            let [without, with]: [fn(&Figures) -> u64; 2] = [
-                |own| own.odometry + own.step,
-                |own| own.fix + own.odometry + own.step,
-            ];
+            let without = both(|own| grouped(own.odometry + own.step));
+            let with = both(|own| grouped(own.fix + own.odometry + own.step));
             let time = both(|own| {
                 let cycle = own.fix + own.odometry + own.step;
                 format!("{:.2}", cycle as f64 * 2.0 / 64_000.0)
-            });
-            let [without, with] = [without, with].map(|of| {
-                [Level::Small, Level::Fast]
-                    .map(|level| grouped(of(&Figures::of(core, level, "turning"))))
-                    .join("; ")
             });
             let row = format!(
                 "| {name} | {} | {} | {} | {stack} B | {without} | {with} | {time} ms |",

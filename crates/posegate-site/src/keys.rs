@@ -33,7 +33,7 @@ pub(super) const SITE_CONTROLLER: Key = Key::new(
 );
 pub(super) const CORE: Key = Key::new(
     "core",
-    "\"cortex-m4f\" (also for M7 and M33) or \"cortex-m0plus\"",
+    "\"cortex-m4f\" (also for M7 and M33), \"cortex-m0plus\" or \"rv32imc\"",
     "\"cortex-m4f\"",
 );
 pub(super) const CYCLES_PER_DECISION: Key = Key::new(

@@ -174,6 +174,19 @@ impl<'a> Node<'a> {
         }
     }
 
+    /// Returns what the string stands for among words with their meanings.
+    pub(super) fn among<T: Copy, const N: usize>(
+        &self,
+        all: [(&str, T); N],
+    ) -> Result<T, SiteError> {
+        let word = self.text()?;
+        let found = all.into_iter().find(|(known, _)| *known == word);
+        found.map_or_else(
+            || Err(self.unknown_word(all.map(|(known, _)| known))),
+            |(_, meaning)| Ok(meaning),
+        )
+    }
+
     /// Returns the elements of an array, under the same key.
     pub(super) fn array(&self) -> Result<Vec<Node<'a>>, SiteError> {
         let DeValue::Array(values) = self.value.get_ref() else {

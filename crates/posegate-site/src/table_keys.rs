@@ -62,10 +62,11 @@ fn step(node: &Node<'_>) -> Result<Step, SiteError> {
 }
 
 fn layout(node: &Node<'_>) -> Result<Layout, SiteError> {
-    match node.text()? {
+    node.among([
+        ("facets", Layout::Facets),
+        ("grid", Layout::Grid),
         // Older site files say "both" for facets with cells beside them; facets alone decide now.
-        "auto" | "facets" | "both" => Ok(Layout::Facets),
-        "grid" => Ok(Layout::Grid),
-        _ => Err(node.unknown_word(["facets", "grid", "both", "auto"])),
-    }
+        ("both", Layout::Facets),
+        ("auto", Layout::Facets),
+    ])
 }

@@ -3,6 +3,7 @@
 mod programs;
 
 use crate::arguments::Arguments;
+use crate::files::target_folder;
 use crate::need::{self, THUMBS};
 use crate::report::Report;
 use crate::shell::{Cmd, Result, cmd};
@@ -57,8 +58,9 @@ pub fn alone(_: &Arguments) -> Result {
     cmd("cargo test -p posegate --lib").run()?;
     // In a folder of their own: those of the workspace have the same names.
     for features in ["", "std,defmt"] {
-        cmd("cargo doc --no-deps -p posegate --target-dir target/alone --features")
+        cmd("cargo doc --no-deps -p posegate --features")
             .arg(features)
+            .env("CARGO_TARGET_DIR", target_folder().join("alone"))
             .env("RUSTDOCFLAGS", "-D warnings")
             .run()?;
     }

@@ -58,6 +58,8 @@ y = [-0.06, 0.06] => y = 0.06 => 0.06, => is a number => y = [
 y = [-0.06, 0.06] => y = [-0.06, true] => true => y[1]` is `true`
 x = [-2.0, 2.0] => x = [2, 2] => [2, 2] => `table.extent.x` is [2, 2] => x = [-2.0
 y = [-1.0, 1.0] => y = [1, -1] => [1, -1] => `task.park.table.extent.y`
+[confidence] => [controller]\ncore = "cortex-m4f"\ncycles_per_decision = 9\nlevel = "z"\n[confidence] => "z" => `controller.level` is "z"
+[confidence] => [controller]\ncore = "cortex-m4f"\ncycles_per_decision = 9\ntracker = "yes"\n[confidence] => "yes" => `controller.tracker` is "yes" => tracker = true
 layout = "auto" => layout = "gird" => "gird" => `table.layout` => did you mean "grid"?
 camera = "front" => camera = "fornt" => "fornt" => no camera `fornt` => did you mean `front`?
 tag = "t7" => tag = "wall" => "wall" => no tag `wall` => add a table [tag.wall]
@@ -194,7 +196,7 @@ fn key_errors_point_at_the_key() {
 
 #[test]
 fn semantic_errors_point_at_the_value() {
-    check(MEANINGS, 19);
+    check(MEANINGS, 21);
 }
 
 #[test]
