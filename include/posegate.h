@@ -768,8 +768,8 @@ enum posegate_reason
      */
     POSEGATE_REASON_STALE = 12,
     /**
-     * No longer reported, kept for the logs of older firmware: the gate has no valid table. Its parts are [`Self::TableDamaged`],
-     * [`Self::TableTooNew`] and [`Self::PartMissing`].
+     * No longer reported, kept for the logs of older firmware: the gate has no valid table. Reasons 29, 44
+     * and 45 say why.
      */
     POSEGATE_REASON_TABLE_INVALID = 13,
     /**

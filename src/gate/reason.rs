@@ -47,8 +47,8 @@ pub enum Reason {
     BoundInvalid = 11,
     /// The estimate is too old, or from the future.
     Stale = 12,
-    /// No longer reported, kept for the logs of older firmware: the gate has no valid table. Its parts are [`Self::TableDamaged`],
-    /// [`Self::TableTooNew`] and [`Self::PartMissing`].
+    /// No longer reported, kept for the logs of older firmware: the gate has no valid table. Reasons 29, 44
+    /// and 45 say why.
     TableInvalid = 13,
     /// The source says itself that it does not know its covariance.
     CovarianceUnknown = 14,

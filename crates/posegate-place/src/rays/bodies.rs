@@ -42,7 +42,11 @@ impl Bodies {
                         collect(set, shape, in_union, into);
                     }
                 }
-                _ => {}
+                // No parts of a union, or views.
+                Shape::Box(_)
+                | Shape::Footprint(_)
+                | Shape::Visibility(_)
+                | Shape::Bounded { .. } => {}
             }
         }
         let mut bodies = Vec::new();
