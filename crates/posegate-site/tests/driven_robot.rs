@@ -15,9 +15,9 @@ use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_site::Site;
 use posegate_testkit::counts::{first_seed, is_deep};
+use posegate_testkit::driven::{Found, driven};
 use posegate_testkit::hall::{self, Believed, CORNERS, TO_WALL_M, WALLS};
 use posegate_testkit::oracle::Rng;
-use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// A tool 3 m ahead and aside: where it is nearest to a wall, the circle of a wrong heading is farthest from its tangent.
@@ -433,36 +433,6 @@ impl Fix {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    openings: u64,
-    moments: u64,
-    outside: u64,
-    late: u64,
-    /// The least slack, micrometres.
-    least_um: i64,
-}
-
-impl Found {
-    const NONE: Self = Self {
-        openings: 0,
-        moments: 0,
-        outside: 0,
-        late: 0,
-        least_um: i64::MAX,
-    };
-
-    fn plus(self, other: Self) -> Self {
-        Self {
-            openings: self.openings + other.openings,
-            moments: self.moments + other.moments,
-            outside: self.outside + other.outside,
-            late: self.late + other.late,
-            least_um: self.least_um.min(other.least_um),
-        }
-    }
-}
-
 /// The largest distance of any corner of any robot beyond any wall, after a movement at the largest speeds for a time, or `least` if that is
 /// larger: in any direction, or along the robot's axis.
 fn beyond(poses: &[[f64; 3]], hall: &Hall, scene: &Scene, seconds: f64, least: f64) -> f64 {
@@ -700,47 +670,27 @@ fn simulate(rng: &mut Rng, cause: Cause, hall: &Hall, found: &mut Found) {
             continue;
         }
         found.openings += u64::from(!was_open);
-        found.moments += 1;
         let (poses, stamp) = permitted.as_ref().expect("an open gate has permitted");
         // Valid until the output has followed the next answer.
         let seconds = (now - stamp) as f64 * TICK_S + f64::from(scene.response_ms) * 1e-3;
         let least = (found.least_um as f64 * -1e-6).min(0.0);
         let beyond = beyond(poses, hall, &scene, seconds, least);
-        found.least_um = found.least_um.min((-beyond * 1e6).min(1e9) as i64);
-        if beyond > 1e-9 {
-            found.outside += 1;
-            if found.outside == 1 {
-                eprintln!(
-                    "{cause:?}: {beyond} m beyond after {} s: {scene:?}",
-                    (now - first) as f64 * TICK_S
-                );
-            }
+        if found.note(beyond) {
+            eprintln!(
+                "{cause:?}: {beyond} m beyond after {} s: {scene:?}",
+                (now - first) as f64 * TICK_S
+            );
         }
     }
-}
-
-fn driven(cause: Cause, openings: u64, seed: u64) -> Found {
-    let hall = Hall::of(cause);
-    let streams = Rng::streams(seed);
-    let each = openings.div_ceil(streams.len() as u64);
-    let found = streams
-        .into_par_iter()
-        .map(|mut rng| {
-            let mut found = Found::NONE;
-            while found.openings < each {
-                simulate(&mut rng, cause, &hall, &mut found);
-            }
-            found
-        })
-        .reduce(|| Found::NONE, Found::plus);
-    println!("{cause:?} {found:?}");
-    found
 }
 
 /// Searches a cause for a number of openings, in the deep job and in the fast suite: nothing is outside, and robots come near to the walls.
 fn holds(cause: Cause, [deep, fast]: [u64; 2], near_um: i64) {
     let openings = if is_deep() { deep } else { fast };
-    let found = driven(cause, openings, first_seed());
+    let hall = Hall::of(cause);
+    let found = driven(openings, first_seed(), |rng, found| {
+        simulate(rng, cause, &hall, found);
+    });
     assert_eq!(found.outside, 0, "{found:?}");
     assert!(found.moments > found.openings, "{found:?}");
     assert!(found.late > 0 || cause == Cause::Arcs, "{found:?}");

@@ -12,9 +12,9 @@ use posegate::report::{FrameId, PoseEstimate, Report};
 use posegate::set::{Aging, Estimate, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate_testkit::counts::{first_seed, is_deep};
+use posegate_testkit::driven::{Found, driven};
 use posegate_testkit::hall::{self, Believed};
 use posegate_testkit::oracle::Rng;
-use rayon::prelude::*;
 
 /// A source, a controller, and a robot.
 #[derive(Clone, Copy, Debug)]
@@ -58,29 +58,6 @@ impl Drive {
     fn longest(&self) -> f64 {
         let held = self.latency_ms + self.permit_hold_ms + self.response_ms;
         f64::from(held.min(self.maximum_age_ms)) * 1e-3
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    openings: u64,
-    moments: u64,
-    outside: u64,
-}
-
-impl Found {
-    const NONE: Self = Self {
-        openings: 0,
-        moments: 0,
-        outside: 0,
-    };
-
-    fn plus(self, other: Self) -> Self {
-        Self {
-            openings: self.openings + other.openings,
-            moments: self.moments + other.moments,
-            outside: self.outside + other.outside,
-        }
     }
 }
 
@@ -163,32 +140,17 @@ fn drive(rng: &mut Rng, bytes: &[u8], stated: impl Fn(&Drive) -> MotionBounds, f
         let (stamp, set) = newest.expect("an open gate has permitted a report");
         // Valid until the output has followed the next answer.
         let ends = f64::from(now_ms + drive.response_ms - stamp) * 1e-3;
-        found.moments += 1;
-        if set.room(drive.speed * ends, drive.rate * ends) < -1e-9 {
-            found.outside += 1;
-            if found.outside == 1 {
-                eprintln!("outside {ends} s after the stamp: {drive:?} {set:?}");
-            }
+        if found.note(-set.room(drive.speed * ends, drive.rate * ends)) {
+            eprintln!("outside {ends} s after the stamp: {drive:?} {set:?}");
         }
     }
 }
 
-fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> MotionBounds + Sync) -> Found {
+fn driven_with(openings: u64, seed: u64, stated: impl Fn(&Drive) -> MotionBounds + Sync) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
-    let streams = Rng::streams(seed);
-    let each = openings.div_ceil(streams.len() as u64);
-    let found = streams
-        .into_par_iter()
-        .map(|mut rng| {
-            let mut found = Found::NONE;
-            while found.openings < each {
-                drive(&mut rng, &bytes, &stated, &mut found);
-            }
-            found
-        })
-        .reduce(|| Found::NONE, Found::plus);
-    println!("{found:?}");
-    found
+    driven(openings, seed, |rng, found| {
+        drive(rng, &bytes, &stated, found)
+    })
 }
 
 fn bounds(drive: &Drive) -> MotionBounds {
@@ -198,7 +160,7 @@ fn bounds(drive: &Drive) -> MotionBounds {
 #[test]
 fn no_open_moment_has_a_pose_outside() {
     let openings = if is_deep() { 1_000_000 } else { 1_500 };
-    let found = driven(openings, first_seed(), bounds);
+    let found = driven_with(openings, first_seed(), bounds);
     assert_eq!(found.outside, 0, "{found:?}");
     assert!(found.moments > 5 * found.openings, "{found:?}");
 }
@@ -206,13 +168,13 @@ fn no_open_moment_has_a_pose_outside() {
 /// The judge detects a gate with bounds of no speed, of nine tenths of it, or of half the turn rate.
 #[test]
 fn judge_detects_a_gate_with_too_small_bounds() {
-    let still = driven(200, 3, |_| MotionBounds::STANDS_STILL);
+    let still = driven_with(200, 3, |_| MotionBounds::STANDS_STILL);
     assert!(still.outside > 100, "{still:?}");
-    let slower = driven(800, 3, |drive| {
+    let slower = driven_with(800, 3, |drive| {
         MotionBounds::new(0.9 * drive.speed, 0.0, drive.rate).expect("bounds")
     });
     assert!(slower.outside > 20, "{slower:?}");
-    let no_turn = driven(400, 3, |drive| {
+    let no_turn = driven_with(400, 3, |drive| {
         MotionBounds::new(drive.speed, 0.0, 0.5 * drive.rate).expect("bounds")
     });
     assert!(no_turn.outside > 5, "{no_turn:?}");

@@ -16,9 +16,9 @@ use posegate::set::{Aging, Estimate, RadiusSquared, Trust, Uncertainty};
 use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_testkit::counts::{first_seed, is_deep};
+use posegate_testkit::driven::{Found, driven};
 use posegate_testkit::hall::{self, Believed, CORNERS, TO_WALL_M, WALLS};
 use posegate_testkit::oracle::Rng;
-use rayon::prelude::*;
 
 /// The largest axes of a fix's ellipsoid, metres and radians.
 const SIZES: [f64; 2] = [0.05, 0.1];
@@ -285,42 +285,6 @@ fn moved([x, y, yaw]: [f64; 3], [ahead, left, turn]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    openings: u64,
-    moments: u64,
-    outside: u64,
-    late: u64,
-    early: u64,
-    /// Moments with less than a centimetre of slack, and the least slack, micrometres.
-    near: u64,
-    least_um: i64,
-}
-
-impl Found {
-    const NONE: Self = Self {
-        openings: 0,
-        moments: 0,
-        outside: 0,
-        late: 0,
-        early: 0,
-        near: 0,
-        least_um: i64::MAX,
-    };
-
-    fn plus(self, other: Self) -> Self {
-        Self {
-            openings: self.openings + other.openings,
-            moments: self.moments + other.moments,
-            outside: self.outside + other.outside,
-            late: self.late + other.late,
-            early: self.early + other.early,
-            near: self.near + other.near,
-            least_um: self.least_um.min(other.least_um),
-        }
-    }
-}
-
 /// Drives with a tracker whose odometry errors are `stated(drive)`.
 fn drive(
     rng: &mut Rng,
@@ -473,7 +437,6 @@ fn drive(
             continue;
         }
         found.openings += u64::from(!was_open);
-        found.moments += 1;
         let (fix, count, stamp) = permitted.expect("an open gate has permitted a report");
         let evidence = Evidence {
             fix,
@@ -484,39 +447,27 @@ fn drive(
         // Valid until the output has followed the next answer.
         let ends_s = f64::from(now_ms + drive.response_ms - stamp) * 1e-3;
         let beyond = evidence.worst(ends_s);
-        found.near += u64::from(beyond > -0.01);
-        found.least_um = found.least_um.min((-beyond * 1e6) as i64);
-        if beyond > 1e-9 {
-            found.outside += 1;
-            if found.outside == 1 {
-                eprintln!("{beyond} m beyond, {ends_s} s after the stamp: {drive:?} {fix:?}");
-            }
+        if found.note(beyond) {
+            eprintln!("{beyond} m beyond, {ends_s} s after the stamp: {drive:?} {fix:?}");
         }
     }
 }
 
-fn driven(openings: u64, seed: u64, stated: impl Fn(&Drive) -> OdometryErrors + Sync) -> Found {
+fn driven_with(
+    openings: u64,
+    seed: u64,
+    stated: impl Fn(&Drive) -> OdometryErrors + Sync,
+) -> Found {
     let bytes = hall::facets(&hall::site([0.0; 3]), "hall", 2.5);
-    let streams = Rng::streams(seed);
-    let each = openings.div_ceil(streams.len() as u64);
-    let found = streams
-        .into_par_iter()
-        .map(|mut rng| {
-            let mut found = Found::NONE;
-            while found.openings < each {
-                drive(&mut rng, &bytes, &stated, &mut found);
-            }
-            found
-        })
-        .reduce(|| Found::NONE, Found::plus);
-    println!("{found:?}");
-    found
+    driven(openings, seed, |rng, found| {
+        drive(rng, &bytes, &stated, found)
+    })
 }
 
 #[test]
 fn no_open_moment_of_a_tracked_robot_has_a_history_that_ends_outside() {
     let openings = if is_deep() { 1_000_000 } else { 12_000 };
-    let found = driven(openings, first_seed(), |drive| drive.errors);
+    let found = driven_with(openings, first_seed(), |drive| drive.errors);
     assert_eq!(found.outside, 0, "{found:?}");
     assert!(found.moments > 5 * found.openings, "{found:?}");
     // Fixes come late and before the odometry of their time, and sets end near the walls.
@@ -530,21 +481,21 @@ fn no_open_moment_of_a_tracked_robot_has_a_history_that_ends_outside() {
 /// The judge detects a tracker with errors of no slip, of half of the slip, or of half of the noise.
 #[test]
 fn judge_detects_a_tracker_with_too_small_errors() {
-    let no_slip = driven(6_000, 3, |drive| OdometryErrors {
+    let no_slip = driven_with(6_000, 3, |drive| OdometryErrors {
         slip: 0.0,
         turn_slip: 0.0,
         turn_slip_per_m: 0.0,
         ..drive.errors
     });
     assert!(no_slip.outside > 20, "{no_slip:?}");
-    let half = driven(6_000, 3, |drive| OdometryErrors {
+    let half = driven_with(6_000, 3, |drive| OdometryErrors {
         slip: 0.5 * drive.errors.slip,
         turn_slip: 0.5 * drive.errors.turn_slip,
         turn_slip_per_m: 0.5 * drive.errors.turn_slip_per_m,
         ..drive.errors
     });
     assert!(half.outside > 5, "{half:?}");
-    let quiet = driven(6_000, 3, |drive| OdometryErrors {
+    let quiet = driven_with(6_000, 3, |drive| OdometryErrors {
         m_per_sqrt_m: 0.0,
         rad_per_sqrt_m: 0.0,
         ..drive.errors

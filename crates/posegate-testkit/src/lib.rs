@@ -8,6 +8,7 @@ pub mod commands;
 pub mod controller;
 pub mod counts;
 pub mod dock;
+pub mod driven;
 pub mod estimates;
 pub mod firmware;
 pub mod gate;

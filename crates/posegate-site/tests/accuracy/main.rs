@@ -22,9 +22,22 @@ use posegate_site::Site;
 use rayon::prelude::*;
 use std::process::ExitCode;
 
-/// Returns reference set A for the oracle, with the site file's numbers.
-fn reference() -> World {
-    let set = SetDeg::Visibility {
+/// The camera of every scene.
+const CAMERA: &str = r#"
+[camera.front]
+width_px = 640
+height_px = 480
+fx = 615.0
+fy = 615.0
+cx = 320.0
+cy = 240.0
+mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }
+"#;
+
+/// Returns the poses from which that camera sees a tag at `(4, y)`, for the oracle. With y = 0 it is reference set A, with the site file's
+/// numbers.
+fn seen(y: f64) -> SetDeg {
+    SetDeg::Visibility {
         camera: oracle::Camera {
             width: 640.0,
             height: 480.0,
@@ -34,14 +47,37 @@ fn reference() -> World {
             cy: 240.0,
         },
         mount_deg: [0.25, 0.0, 0.5, 0.0, 0.0, 0.0],
-        tag_in_world_deg: [4.0, 0.0, 0.5, 0.0, 0.0, 180.0],
+        tag_in_world_deg: [4.0, y, 0.5, 0.0, 0.0, 180.0],
         tag_size: 0.30,
         d_max: 5.5,
         phi_max_deg: 25.0,
         psi_max_deg: 50.0,
         z_near: 0.05,
-    };
-    world(&set)
+    }
+}
+
+/// Returns a random pose-set for sets that are no larger than a hall.
+fn drawn(rng: &mut Rng) -> PoseSet {
+    if rng.chance(0.25) {
+        return PoseSet::Bounded {
+            translation: rng.log_within(0.02, 0.4),
+            yaw: rng.log_within(0.01, 0.4),
+        };
+    }
+    let sigma = [
+        rng.log_within(0.01, 0.15),
+        rng.log_within(0.01, 0.15),
+        rng.log_within(0.003, 0.12),
+    ];
+    let share = 1.0 - rng.log_within(1e-2, 1.0);
+    let direction = rng.within(0.0, std::f64::consts::TAU);
+    let (xt, yt) = (share * direction.cos(), share * direction.sin());
+    let xy = xt * yt;
+    let rho = [[1.0, xy, xt], [xy, 1.0, yt], [xt, yt, 1.0]];
+    PoseSet::Gaussian {
+        cov: [0, 1, 2].map(|i| [0, 1, 2].map(|j| rho[i][j] * sigma[i] * sigma[j])),
+        r2: 743_499.0 / 65_536.0,
+    }
 }
 
 fn world(set: &SetDeg) -> World {
@@ -156,7 +192,7 @@ fn main() -> ExitCode {
         y: [-2.0, 2.0],
         yaw_deg: [-20.0, 20.0],
     };
-    let worlds = [reference(), world(&extent)];
+    let worlds = [world(&seen(0.0)), world(&extent)];
     let cases: Vec<Case> = (0..count)
         .into_par_iter()
         .map(|i| {

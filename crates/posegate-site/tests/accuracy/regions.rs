@@ -3,7 +3,7 @@
 //! the robot. The truth is by the areas of what the regions leave of the robot's outline.
 
 use crate::oracle::{Pose, PoseSet, Rng, union_scale};
-use crate::{Case, core_set, q16};
+use crate::{Case, core_set, drawn, q16};
 use posegate::bake::{BakeInput, Layout, Step, TableSpec, extent};
 use posegate::contain::{Decision, decide, examine};
 use posegate::shape::{PoseDeg, Shape, SuccessSet};
@@ -184,28 +184,7 @@ fn case(rng: &mut Rng, hall: &Hall, inside: &(dyn Fn(Pose) -> f64 + Sync)) -> Ca
         if hall.regions.iter().any(alone) {
             continue;
         }
-        let set = if rng.chance(0.25) {
-            PoseSet::Bounded {
-                translation: rng.log_within(0.02, 0.4),
-                yaw: rng.log_within(0.01, 0.4),
-            }
-        } else {
-            let sigma = [
-                rng.log_within(0.01, 0.15),
-                rng.log_within(0.01, 0.15),
-                rng.log_within(0.003, 0.12),
-            ];
-            let share = 1.0 - rng.log_within(1e-2, 1.0);
-            let direction = rng.within(0.0, std::f64::consts::TAU);
-            let (xt, yt) = (share * direction.cos(), share * direction.sin());
-            let xy = xt * yt;
-            let rho = [[1.0, xy, xt], [xy, 1.0, yt], [xt, yt, 1.0]];
-            let cov = [0, 1, 2].map(|i| [0, 1, 2].map(|j| rho[i][j] * sigma[i] * sigma[j]));
-            PoseSet::Gaussian {
-                cov,
-                r2: 743_499.0 / 65_536.0,
-            }
-        };
+        let set = drawn(rng);
         // Quickly: the outermost poses on each axis of a set that is too large.
         let outermost = |axis: usize| match &set {
             PoseSet::Gaussian { cov, r2 } => cov[axis].map(|v| v * (r2 / cov[axis][axis]).sqrt()),

@@ -1,8 +1,8 @@
 //! The same ratio for sets with large yaw errors, up to half a turn, and with correlations up to 0.999: a footprint
 //! in a hall, and a visible tag. Only sets whose scale is bounded count.
 
-use crate::oracle::{Camera, PoseSet, Rng, SetDeg, scale};
-use crate::{Case, core_set, q16, world};
+use crate::oracle::{PoseSet, Rng, SetDeg, scale};
+use crate::{CAMERA, Case, core_set, q16, seen, world};
 use posegate::contain::examine;
 use posegate::table::Table;
 use posegate_site::Site;
@@ -10,16 +10,6 @@ use posegate_testkit::hall;
 use rayon::prelude::*;
 
 const SITE: &str = r#"
-
-[camera.front]
-width_px = 640
-height_px = 480
-fx = 615.0
-fy = 615.0
-cx = 320.0
-cy = 240.0
-mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }
-
 [tag.t7]
 id = 7
 family = "tag36h11"
@@ -46,26 +36,6 @@ fn footprint() -> SetDeg {
     SetDeg::Footprint {
         footprint: rectangle(0.4, 0.3),
         region: rectangle(2.0, 2.0),
-    }
-}
-
-fn see() -> SetDeg {
-    SetDeg::Visibility {
-        camera: Camera {
-            width: 640.0,
-            height: 480.0,
-            fx: 615.0,
-            fy: 615.0,
-            cx: 320.0,
-            cy: 240.0,
-        },
-        mount_deg: [0.25, 0.0, 0.5, 0.0, 0.0, 0.0],
-        tag_in_world_deg: [4.0, 0.0, 0.5, 0.0, 0.0, 180.0],
-        tag_size: 0.30,
-        d_max: 5.5,
-        phi_max_deg: 25.0,
-        psi_max_deg: 50.0,
-        z_near: 0.05,
     }
 }
 
@@ -106,10 +76,10 @@ fn case(rng: &mut Rng, set: &SetDeg, reach: [f64; 2], spread: f64) -> Case {
 
 /// Prints a line for each set and range. Returns `true` if one misses its goals.
 pub fn turning(count: u64, seed: u64) -> bool {
-    let text = SITE.to_string() + &hall::task([0.0; 3]);
+    let text = CAMERA.to_owned() + SITE + &hall::task([0.0; 3]);
     let site = Site::parse(&text, "site.toml").expect("the site is valid");
     let mut short = false;
-    for (name, set, spread) in [("hall", footprint(), 1.4), ("see", see(), 1.0)] {
+    for (name, set, spread) in [("hall", footprint(), 1.4), ("see", seen(0.0), 1.0)] {
         let bytes = hall::facets(&site, name, 8.0);
         let table = Table::parse(&bytes).expect("a table");
         for (reach, [mean_goal, least_goal]) in REACHES {

@@ -1,8 +1,8 @@
 //! The same ratio for unions: a lane and a bay that share a face or overlap, also with different yaw ranges, two tags
 //! of which one must be seen, and a footprint that may be across two regions.
 
-use crate::oracle::{Camera, Constraints, Pose, PoseSet, Rng, SetDeg, union_scale, union_slack};
-use crate::{Case, core_set, q16, world};
+use crate::oracle::{Constraints, Pose, PoseSet, Rng, SetDeg, union_scale, union_slack};
+use crate::{CAMERA, Case, core_set, drawn, q16, seen, world};
 use posegate::bake::{BakeInput, Extent, Layout, Step, TableSpec};
 use posegate::contain::{Decision, decide, examine, second};
 use posegate::report::PoseEstimate;
@@ -16,16 +16,6 @@ use std::f64::consts::PI;
 /// Sets for which the least scale has a goal.
 const SETS: u64 = 60;
 const SITE: &str = r#"
-
-[camera.front]
-width_px = 640
-height_px = 480
-fx = 615.0
-fy = 615.0
-cx = 320.0
-cy = 240.0
-mount = { x = 0.25, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 0.0 }
-
 [tag.left]
 id = 7
 family = "tag36h11"
@@ -67,26 +57,6 @@ fn boxes(x: [f64; 2], y: [f64; 2], yaw: f64) -> SetDeg {
     }
 }
 
-fn see(y: f64) -> SetDeg {
-    SetDeg::Visibility {
-        camera: Camera {
-            width: 640.0,
-            height: 480.0,
-            fx: 615.0,
-            fy: 615.0,
-            cx: 320.0,
-            cy: 240.0,
-        },
-        mount_deg: [0.25, 0.0, 0.5, 0.0, 0.0, 0.0],
-        tag_in_world_deg: [4.0, y, 0.5, 0.0, 0.0, 180.0],
-        tag_size: 0.30,
-        d_max: 5.5,
-        phi_max_deg: 25.0,
-        psi_max_deg: 50.0,
-        z_near: 0.05,
-    }
-}
-
 /// Returns the slack of a rectangle at a pose in a hall of 4 by 4 m without its quarter at x < 0, y < 0. Two convex
 /// polygons do not intersect if the normal of an edge of one separates them.
 fn across_regions([x, y, yaw]: Pose) -> f64 {
@@ -121,7 +91,7 @@ fn scenes() -> [Scene; 4] {
     [
         ("face", of([lane.clone(), bay(0.0, 25.0)])),
         ("narrower", of([lane, bay(-0.2, 10.0)])),
-        ("tags", of([see(1.0), see(-1.0)])),
+        ("tags", of([seen(1.0), seen(-1.0)])),
         ("regions", Box::new(across_regions)),
     ]
 }
@@ -139,26 +109,7 @@ fn case(rng: &mut Rng, slack: &(dyn Fn(Pose) -> f64 + Sync), near: bool) -> Case
         if slack(estimate) < 0.0 {
             continue;
         }
-        let r2 = 743_499.0 / 65_536.0;
-        let set = if rng.chance(0.25) {
-            PoseSet::Bounded {
-                translation: rng.log_within(0.02, 0.4),
-                yaw: rng.log_within(0.01, 0.4),
-            }
-        } else {
-            let sigma = [
-                rng.log_within(0.01, 0.15),
-                rng.log_within(0.01, 0.15),
-                rng.log_within(0.003, 0.12),
-            ];
-            let share = 1.0 - rng.log_within(1e-2, 1.0);
-            let direction = rng.within(0.0, std::f64::consts::TAU);
-            let (xt, yt) = (share * direction.cos(), share * direction.sin());
-            let xy = xt * yt;
-            let rho = [[1.0, xy, xt], [xy, 1.0, yt], [xt, yt, 1.0]];
-            let cov = [0, 1, 2].map(|i| [0, 1, 2].map(|j| rho[i][j] * sigma[i] * sigma[j]));
-            PoseSet::Gaussian { cov, r2 }
-        };
+        let set = drawn(rng);
         let truth = union_scale(slack, estimate, &set, MOST, rng);
         if truth > 0.3 && truth < 0.99 * MOST {
             return Case {
@@ -172,7 +123,7 @@ fn case(rng: &mut Rng, slack: &(dyn Fn(Pose) -> f64 + Sync), near: bool) -> Case
 
 /// Prints a line for each set. Returns `true` if one misses its goals; that of the least holds for 60 sets and more.
 pub fn unions(count: u64, seed: u64) -> bool {
-    let site = Site::parse(SITE, "site.toml").expect("the site is valid");
+    let site = Site::parse(&(CAMERA.to_owned() + SITE), "site.toml").expect("the site is valid");
     let mut short = false;
     assert!(count > 0, "no sets");
     for (name, slack) in scenes() {
