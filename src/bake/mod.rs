@@ -52,7 +52,6 @@ mod export;
 mod extent;
 mod facets;
 mod frames;
-mod lines;
 mod parts;
 mod runs;
 mod sight;
@@ -178,7 +177,7 @@ fn empty(order: &BakeInput<'_>, cells: &Cells) -> BakeError {
 pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
-    if rows.iter().flatten().all(runs::Row::is_empty) {
+    if rows.iter().flatten().all(Vec::is_empty) {
         return Err(empty(order, &cells));
     }
     write_grid(order, &cells, &rows)

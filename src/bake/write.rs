@@ -1,6 +1,6 @@
 //! Writes cells and runs as the bytes of format version 1.
 
-use super::{BakeError, BakeInput, FacetPlan, check, goal_frame, sight_record};
+use super::{BakeError, BakeInput, FacetPlan, Rows, check, goal_frame, sight_record};
 use crate::confidence::core_radius;
 use crate::table::{
     Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, SightRecord, VERSION, checksum,
@@ -14,14 +14,11 @@ pub const LARGEST_TABLE: usize = 64 << 20;
 ///
 /// # Errors
 /// [`BakeError`] if the table exceeds the format.
-pub fn write_grid<Row>(
+pub fn write_grid(
     order: &BakeInput<'_>,
     cells: &Cells,
-    slabs: &[Vec<Row>],
-) -> Result<Vec<u8>, BakeError>
-where
-    for<'a> &'a Row: IntoIterator<Item = &'a Run>,
-{
+    slabs: &[Rows],
+) -> Result<Vec<u8>, BakeError> {
     write(order, cells, &grid(cells, slabs)?, &[])
 }
 
@@ -108,11 +105,7 @@ fn padded<const N: usize>(name: &str) -> Result<[u8; N], BakeError> {
 }
 
 /// Encodes the grid layout; slabs with equal rows share them.
-fn grid<Row>(cells: &Cells, slabs: &[Vec<Row>]) -> Result<Vec<u8>, BakeError>
-where
-    for<'a> &'a Row: IntoIterator<Item = &'a Run>,
-{
-    let count = |row: &Row| row.into_iter().count();
+fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
     let wide = cells.columns > 255;
     let directory = 4 + 8 * slabs.len();
     let mut head = Vec::with_capacity(directory);
@@ -120,11 +113,11 @@ where
     let mut body: Vec<u8> = Vec::new();
     let mut known: BTreeMap<Vec<u8>, u32> = BTreeMap::new();
     for rows in slabs {
-        let filled = |row: &Row| count(row) > 0;
+        let filled = |row: &Vec<Run>| !row.is_empty();
         let first = rows.iter().position(filled).unwrap_or(0);
         let end = rows.iter().rposition(filled).map_or(first, |last| last + 1);
         let rows = &rows[first..end];
-        let several = rows.iter().any(|row| count(row) > 1);
+        let several = rows.iter().any(|row| row.len() > 1);
         let mut bytes = Vec::new();
         if several {
             let mut start = 0usize;
@@ -139,7 +132,7 @@ where
             };
             put(0)?;
             for row in rows {
-                start += count(row);
+                start += row.len();
                 put(start)?;
             }
         }

@@ -38,10 +38,8 @@ pub use self::footprint::{Footprint, PolygonError};
 pub(crate) use self::groups::halves;
 pub use self::groups::{GroupName, PoseGroup, Ranges};
 pub use self::lens::{Lens, Optic};
-pub use self::membership::{Membership, is_seen, seen};
-pub(crate) use self::part::Parts;
-pub(crate) use self::part::Ready;
-pub use self::part::{Convex, ConvexPart};
+pub use self::membership::{Membership, MinSlack};
+pub(crate) use self::part::{ConvexPart, Parts, Ready};
 pub use self::planar::Planar;
 pub use self::round::{Round, RoundError};
 pub use self::scalar::Scalar;
@@ -71,6 +69,7 @@ mod lens;
 mod membership;
 mod part;
 mod planar;
+mod prepared;
 mod round;
 mod scalar;
 mod side;
@@ -248,7 +247,10 @@ impl SuccessSet {
         fn obstacles(shape: &Shape, goal: PoseDeg) -> f64 {
             let origin = Planar::from([0.0; 3]);
             match shape {
-                Shape::Apart(set @ Exclusion::Obstacle(_)) => set.slack(goal, &origin),
+                Shape::Apart(set @ Exclusion::Obstacle(_)) => {
+                    let rooms = set.lines(goal).map(|line| line.room(&origin));
+                    rooms.fold(f64::NEG_INFINITY, f64::max)
+                }
                 Shape::All(sets) => sets
                     .iter()
                     .map(|set| obstacles(set, goal))
