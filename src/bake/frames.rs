@@ -2,7 +2,7 @@
 //! and the convex region in which each of them may be ([`crate::table::Facets`]).
 
 use super::border::{Curve, HalfPlane};
-use crate::shape::{Binds, ConvexPart, Footprint, Line, Ready, Resolved, Visibility};
+use crate::shape::{Binds, ConvexPart, Footprint, Line, Ready, Resolved, Visibility, edges};
 use crate::table::{Axes, Cells};
 
 /// A frame with its constraints, metres, in the goal's axes (or the robot's).
@@ -119,10 +119,8 @@ fn grown(extent: [[f64; 2]; 2], by: f64) -> Vec<HalfPlane> {
 
 /// Returns one frame per vertex, in which every edge of the region is a facet.
 fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
-    let region = shape.region();
-    let edges = region.iter().zip(region.iter().cycle().skip(1));
-    let planes: Vec<HalfPlane> = edges
-        .map(|([ax, ay], [bx, by])| {
+    let planes: Vec<HalfPlane> = edges(shape.region())
+        .map(|[[ax, ay], [bx, by]]| {
             let length = libm::hypot(bx - ax, by - ay);
             // Outward normal of a counter-clockwise edge.
             let normal = [(by - ay) / length, (ax - bx) / length];

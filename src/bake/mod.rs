@@ -138,6 +138,12 @@ pub struct Nearest {
     pub slack: f64,
 }
 
+impl BakeError {
+    fn too_large(what: &'static str, count: f64, limit: f64) -> Self {
+        Self::TooLarge { what, count, limit }
+    }
+}
+
 fn missing(cells: u64, nearest: Nearest) -> String {
     let Nearest {
         pose: [x, y, yaw],

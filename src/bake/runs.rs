@@ -1,6 +1,7 @@
 //! The runs of every row: the cells that lie in the set.
 
 use super::slab_edge;
+use crate::certify::radians;
 use crate::shape::{Binds, ConvexPart, Planar, Ready, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
 use rayon::prelude::*;
@@ -62,7 +63,6 @@ fn intersect(a: Edges, b: Edges) -> Edges {
 
 /// Returns the run of each row of a slab of a convex set.
 fn of_slab(part: &ConvexPart, cells: &Cells, k: u16) -> impl Iterator<Item = Option<Run>> {
-    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
     let yaw = [slab_edge(cells, k), slab_edge(cells, k + 1)].map(radians);
     let slab = Slab::of(cells);
     let mut lines = if part.boxes().count() == part.constraints().count() {
@@ -172,9 +172,9 @@ impl<'a> Slab<'a> {
             for line in lines {
                 if both(line, place) < 0.0 {
                     place = top(line);
-                }
-                if both(line, place) < 0.0 {
-                    return;
+                    if both(line, place) < 0.0 {
+                        return;
+                    }
                 }
                 let before = (place / PLACES) as u16;
                 let clear =

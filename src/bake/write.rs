@@ -43,11 +43,8 @@ fn write(
     let sight = sight.as_ref().map_or(&[][..], |bytes| bytes);
     let total = HEADER_LENGTH + grid.len() + facets.len() + sight.len() + CRC_LENGTH;
     if total > LARGEST_TABLE {
-        return Err(BakeError::TooLarge {
-            what: "bytes",
-            count: total as f64,
-            limit: LARGEST_TABLE as f64,
-        });
+        let limit = LARGEST_TABLE as f64;
+        return Err(BakeError::too_large("bytes", total as f64, limit));
     }
     let mut bytes = Vec::with_capacity(total);
     bytes.extend(MAGIC);
@@ -122,12 +119,9 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
         if several {
             let mut start = 0usize;
             let mut put = |start: usize| -> Result<(), BakeError> {
-                let start = u16::try_from(start).map_err(|_| BakeError::TooLarge {
-                    what: "runs in a slab",
-                    count: start as f64,
-                    limit: f64::from(u16::MAX),
-                })?;
-                bytes.extend(start.to_le_bytes());
+                let most = f64::from(u16::MAX);
+                let beyond = |_| BakeError::too_large("runs in a slab", start as f64, most);
+                bytes.extend(u16::try_from(start).map_err(beyond)?.to_le_bytes());
                 Ok(())
             };
             put(0)?;
@@ -154,11 +148,7 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
             }
         }
         if rows.len() > 0x7fff {
-            return Err(BakeError::TooLarge {
-                what: "rows",
-                count: rows.len() as f64,
-                limit: 32767.0,
-            });
+            return Err(BakeError::too_large("rows", rows.len() as f64, 32767.0));
         }
         let offset = *known.entry(bytes).or_insert_with_key(|bytes| {
             let offset = directory + body.len();
@@ -166,11 +156,8 @@ fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
             offset as u32
         });
         if directory + body.len() > LARGEST_TABLE {
-            return Err(BakeError::TooLarge {
-                what: "bytes",
-                count: (directory + body.len()) as f64,
-                limit: LARGEST_TABLE as f64,
-            });
+            let count = (directory + body.len()) as f64;
+            return Err(BakeError::too_large("bytes", count, LARGEST_TABLE as f64));
         }
         head.extend(offset.to_le_bytes());
         head.extend((first as u16).to_le_bytes());
@@ -186,11 +173,7 @@ fn facets(plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
         u16::try_from(count)
             .ok()
             .filter(|count| *count <= most)
-            .ok_or(BakeError::TooLarge {
-                what,
-                count: count as f64,
-                limit: f64::from(most),
-            })
+            .ok_or(BakeError::too_large(what, count as f64, f64::from(most)))
     };
     let frames = || plan.pieces.iter().flat_map(|piece| &piece.frames);
     let all = counted(frames().map(|f| f.facets.len()).sum(), "facets", u16::MAX)?;

@@ -7,6 +7,7 @@
 
 use super::clear::Clear;
 use super::footprint::farthest;
+use super::polygon::edges;
 use super::side::{Line, SeparatingHalfPlane};
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
@@ -169,12 +170,6 @@ impl Exclusion {
                 .collect(),
         }
     }
-}
-
-/// Returns the edges of a polygon.
-fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
-    let ends = corners.iter().cycle().skip(1);
-    corners.iter().zip(ends).map(|(a, b)| [*a, *b])
 }
 
 /// Returns two unit vectors perpendicular to a unit vector and to each other.
