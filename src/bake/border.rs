@@ -1,5 +1,7 @@
 //! The border of a convex region of the plane, traced around a point inside and cut into chords.
 
+use crate::shape::farthest_holding;
+
 /// A constraint of a region: at least zero inside, concave.
 pub(super) type Curve = std::boxed::Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>;
 
@@ -69,16 +71,10 @@ impl Region<'_> {
         for i in 1..=DIRECTIONS {
             let next = self.border(inner, angle(i));
             if next.1 != last.1 {
-                let (mut low, mut high) = (angle(i - 1), angle(i));
-                for _ in 0..44 {
-                    let middle = 0.5 * (low + high);
-                    if self.border(inner, middle).1 == last.1 {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
-                let corner = self.border(inner, low).0;
+                let end = farthest_holding(angle(i - 1), angle(i), 44, |angle| {
+                    self.border(inner, angle).1 == last.1
+                });
+                let corner = self.border(inner, end).0;
                 points.push((corner, last.1));
                 points.push((corner, next.1));
             }
@@ -129,20 +125,12 @@ impl Region<'_> {
             }
         }
         for (number, curve) in self.curves.iter().enumerate() {
-            // Concave along the ray and positive at its start: one end, by false position.
+            // Concave along the ray and positive at its start: one end.
             if curve(at(least.0)) >= 0.0 {
                 continue;
             }
-            let (mut low, mut high) = (0.0, least.0);
-            for _ in 0..52 {
-                let middle = 0.5 * (low + high);
-                if curve(at(middle)) >= 0.0 {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            least = (low, number);
+            let end = farthest_holding(0.0, least.0, 52, |t| curve(at(t)) >= 0.0);
+            least = (end, number);
         }
         (at(least.0), least.1)
     }

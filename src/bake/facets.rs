@@ -7,7 +7,7 @@ use super::border::{Chord, HalfPlane, Region};
 use super::frames::{self, Draft};
 use super::{BakeError, BakeInput, parts, slab_start};
 use crate::contain::facet_clearance_q14;
-use crate::shape::{ConvexPart, SuccessSet, is_whole_circle};
+use crate::shape::{ConvexPart, SuccessSet, clipped, is_whole_circle};
 use crate::table::{Axes, Cells, Facet, LARGEST_UNIT, LONGEST_LEVER};
 use core::f64::consts::TAU;
 use rayon::prelude::*;
@@ -583,25 +583,12 @@ fn lines(frames: &[FramePlan], yaw: f64) -> Vec<Line> {
 /// is empty.
 fn middle_within<'a>(lines: impl Iterator<Item = &'a Line>, far: f64) -> Option<[f64; 2]> {
     let mut polygon = vec![[far, far], [-far, far], [-far, -far], [far, -far]];
-    let mut rest = Vec::new();
     for line in lines {
-        let room = |p: [f64; 2]| line.offset + 2.0 - line.normal[0] * p[0] - line.normal[1] * p[1];
-        rest.clear();
-        for (i, a) in polygon.iter().enumerate() {
-            let b = polygon[(i + 1) % polygon.len()];
-            let (ra, rb) = (room(*a), room(b));
-            if ra >= 0.0 {
-                rest.push(*a);
-            }
-            if (ra > 0.0 && rb < 0.0) || (ra < 0.0 && rb > 0.0) {
-                let t = ra / (ra - rb);
-                rest.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
-            }
-        }
-        if rest.is_empty() {
+        let [x, y] = line.normal;
+        polygon = clipped(&polygon, |p| line.offset + 2.0 - x * p[0] - y * p[1]);
+        if polygon.is_empty() {
             return None;
         }
-        core::mem::swap(&mut polygon, &mut rest);
     }
     let count = polygon.len() as f64;
     Some([0, 1].map(|axis| polygon.iter().map(|p| p[axis]).sum::<f64>() / count))

@@ -2,7 +2,7 @@
 //! and the convex region in which each of them may be ([`crate::table::Facets`]).
 
 use super::border::{Curve, HalfPlane};
-use crate::shape::{Binds, Convex, ConvexPart, Footprint, Line, PoseDeg, Resolved, Visibility};
+use crate::shape::{Binds, ConvexPart, Footprint, Line, Ready, Resolved, Visibility, edges};
 use crate::table::{Axes, Cells};
 
 /// A frame with its constraints, metres, in the goal's axes (or the robot's).
@@ -29,16 +29,22 @@ pub(super) fn of_part(part: &ConvexPart, cells: &Cells) -> Option<Vec<Draft>> {
         inner = [0, 1].map(|i| [inner[i][0].max(sides[i][0]), inner[i][1].min(sides[i][1])]);
     }
     let mut frames = Vec::new();
-    for set in part.constraints() {
+    for set in part.ready() {
         match set {
-            Convex::Box(_) | Convex::Side(_) => {}
-            Convex::Nothing => return None,
-            Convex::Footprint(shape) => frames.extend(of_footprint(shape, extent)),
-            Convex::Visibility(shape) => frames.extend(of_visibility(shape, part.goal, extent)?),
+            Ready::Box(_) | Ready::Side(_) => {}
+            Ready::Nothing => return None,
+            Ready::Footprint(shape) => frames.extend(of_footprint(shape, extent)),
+            Ready::Visibility(tag) => {
+                frames.extend(of_image_edges(tag, extent)?);
+                frames.push(of_optical_axis(tag, extent));
+                frames.push(of_tag_cone(tag, extent));
+            }
         }
     }
-    for line in part.lines() {
-        add_line(&mut frames, line, extent)?;
+    for set in part.ready() {
+        if let Ready::Side(line) = set {
+            add_line(&mut frames, line, extent)?;
+        }
     }
     frames.push(Draft {
         axes: Axes::World,
@@ -113,10 +119,8 @@ fn grown(extent: [[f64; 2]; 2], by: f64) -> Vec<HalfPlane> {
 
 /// Returns one frame per vertex, in which every edge of the region is a facet.
 fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
-    let region = shape.region();
-    let edges = region.iter().zip(region.iter().cycle().skip(1));
-    let planes: Vec<HalfPlane> = edges
-        .map(|([ax, ay], [bx, by])| {
+    let planes: Vec<HalfPlane> = edges(shape.region())
+        .map(|[[ax, ay], [bx, by]]| {
             let length = libm::hypot(bx - ax, by - ay);
             // Outward normal of a counter-clockwise edge.
             let normal = [(by - ay) / length, (ax - bx) / length];
@@ -138,16 +142,6 @@ fn of_footprint(shape: &Footprint, extent: [[f64; 2]; 2]) -> Vec<Draft> {
         .collect()
 }
 
-/// Returns the frames of the image's edges as seen at each corner of the tag, of the angle to the
-/// optical axis at its centre, and of distance and obliqueness at the camera.
-fn of_visibility(shape: &Visibility, goal: PoseDeg, extent: [[f64; 2]; 2]) -> Option<Vec<Draft>> {
-    let tag: Resolved<f64> = shape.resolve(goal);
-    let mut frames = of_image_edges(shape, &tag, extent)?;
-    frames.push(of_optical_axis(shape, &tag, extent));
-    frames.push(of_tag_cone(shape, &tag, extent));
-    Some(frames)
-}
-
 /// Returns the camera's axes in those of the robot: forward, left, up.
 fn camera_axes(tag: &Resolved<f64>) -> [[f64; 3]; 3] {
     let [rx, ry, rz] = tag.axes;
@@ -155,11 +149,7 @@ fn camera_axes(tag: &Resolved<f64>) -> [[f64; 3]; 3] {
 }
 
 /// Returns a frame for each place of corners: the edges of the image, and the least depth. `None` if no position sees a corner.
-fn of_image_edges(
-    shape: &Visibility,
-    tag: &Resolved<f64>,
-    extent: [[f64; 2]; 2],
-) -> Option<Vec<Draft>> {
+fn of_image_edges(tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Option<Vec<Draft>> {
     let [forward, left, up] = camera_axes(tag);
     let [mx, my, mz] = tag.mount;
     // Corners above each other have the same position on the floor.
@@ -202,8 +192,8 @@ fn of_image_edges(
                     offset > 1e-9 * size
                 }
             };
-            let window = shape.camera.view();
-            let holds = side([1.0, 0.0, 0.0], shape.z_near)
+            let window = tag.set.camera.view();
+            let holds = side([1.0, 0.0, 0.0], tag.set.z_near)
                 && window
                     .planes()
                     .iter()
@@ -224,7 +214,7 @@ fn of_image_edges(
 }
 
 /// Returns the frame of the angle between the optical axis and the ray to the tag's centre.
-fn of_optical_axis(shape: &Visibility, tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Draft {
+fn of_optical_axis(tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Draft {
     let [forward, ..] = camera_axes(tag);
     let [mx, my, mz] = tag.mount;
     let [cx, cy, cz] = tag.centre;
@@ -234,7 +224,7 @@ fn of_optical_axis(shape: &Visibility, tag: &Resolved<f64>, extent: [[f64; 2]; 2
     // The camera is in front of the tag, so the cone's other half and its tip are excluded.
     let flat = libm::hypot(forward[0], forward[1]);
     if flat > 1e-3 {
-        let near = (-(forward[2] * height) + 0.2 * shape.z_near.min(tag_depth(shape))) / flat;
+        let near = (-(forward[2] * height) + 0.2 * tag.set.z_near.min(tag_depth(&tag.set))) / flat;
         let normal = [forward[0] / flat, forward[1] / flat];
         window.push(HalfPlane {
             normal,
@@ -255,13 +245,13 @@ fn of_optical_axis(shape: &Visibility, tag: &Resolved<f64>, extent: [[f64; 2]; 2
 }
 
 /// Returns the frame of distance and obliqueness at the camera, and of the ball that the camera must be in.
-fn of_tag_cone(shape: &Visibility, tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Draft {
+fn of_tag_cone(tag: &Resolved<f64>, extent: [[f64; 2]; 2]) -> Draft {
     let [mx, my, mz] = tag.mount;
     let [cx, cy, cz] = tag.centre;
     let height = cz - mz;
     let (cos_psi, less) = (tag.cos_psi, tag.less);
     let normal = tag.normal;
-    let d_max = shape.d_max - less.ray;
+    let d_max = tag.set.d_max - less.ray;
     // The vector to the camera from a point in front of the tag's centre.
     let back = move |[x, y]: [f64; 2], before: f64| {
         let plain = [x - cx, y - cy, -height];

@@ -52,7 +52,6 @@ mod export;
 mod extent;
 mod facets;
 mod frames;
-mod lines;
 mod parts;
 mod runs;
 mod sight;
@@ -139,6 +138,12 @@ pub struct Nearest {
     pub slack: f64,
 }
 
+impl BakeError {
+    fn too_large(what: &'static str, count: f64, limit: f64) -> Self {
+        Self::TooLarge { what, count, limit }
+    }
+}
+
 fn missing(cells: u64, nearest: Nearest) -> String {
     let Nearest {
         pose: [x, y, yaw],
@@ -178,7 +183,7 @@ fn empty(order: &BakeInput<'_>, cells: &Cells) -> BakeError {
 pub fn grid(order: &BakeInput<'_>, progress: &(dyn Fn() + Sync)) -> Result<Vec<u8>, BakeError> {
     let cells = check(order)?;
     let rows = runs::of_set(order.success, &cells, progress);
-    if rows.iter().flatten().all(runs::Row::is_empty) {
+    if rows.iter().flatten().all(Vec::is_empty) {
         return Err(empty(order, &cells));
     }
     write_grid(order, &cells, &rows)

@@ -1,6 +1,7 @@
 //! Chooses the convex parts of a success set from which a table is made.
 
 use super::{Nearest, slab_start};
+use crate::certify::radians;
 use crate::shape::{ConvexPart, Parts, PoseGroup, Ranges, SuccessSet};
 use crate::table::Cells;
 use core::f64::consts::TAU;
@@ -8,7 +9,6 @@ use core::f64::consts::TAU;
 /// Returns the poses that a table covers.
 pub(crate) fn ranges(cells: &Cells) -> Ranges {
     let metres = |um: i32| f64::from(um) * 1e-6;
-    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
     let start = slab_start(cells);
     [
         [metres(cells.x_lo_um), metres(cells.x_hi_um())],

@@ -1,64 +1,15 @@
 //! The runs of every row: the cells that lie in the set.
 
-use super::lines::{Node, intersect, meets};
 use super::slab_edge;
-use crate::shape::{ConvexPart, Parts, SuccessSet, is_whole_circle};
+use crate::certify::radians;
+use crate::shape::{Binds, ConvexPart, Planar, Ready, SuccessSet, is_whole_circle};
 use crate::table::{Cells, Run};
 use rayon::prelude::*;
 
 /// The runs of each row of a slab.
 pub type Rows = Vec<Vec<Run>>;
 
-/// A row of a slab: its runs, usually none or one.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Row {
-    first: Option<Run>,
-    more: Vec<Run>,
-}
-
-impl<'a> IntoIterator for &'a Row {
-    type Item = &'a Run;
-    type IntoIter = core::iter::Chain<core::option::Iter<'a, Run>, core::slice::Iter<'a, Run>>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.first.iter().chain(&self.more)
-    }
-}
-
-impl Row {
-    pub(super) const fn is_empty(&self) -> bool {
-        self.first.is_none()
-    }
-
-    const fn of(first: Option<Run>) -> Self {
-        Self {
-            first,
-            more: Vec::new(),
-        }
-    }
-
-    /// Returns the union of runs as a row.
-    fn union(rows: impl Iterator<Item = Run>) -> Self {
-        let mut runs: Vec<Run> = rows.collect();
-        runs.sort_unstable_by_key(|run| (run.first, run.last));
-        let mut joined: Vec<Run> = Vec::with_capacity(runs.len());
-        for run in runs {
-            match joined.last_mut() {
-                Some(last) if u32::from(run.first) <= u32::from(last.last) + 1 => {
-                    last.last = last.last.max(run.last);
-                }
-                _ => joined.push(run),
-            }
-        }
-        let mut joined = joined.into_iter();
-        Self {
-            first: joined.next(),
-            more: joined.collect(),
-        }
-    }
-}
-
-/// Distance that runs keep from the computed border, metres: covers the rounding of the computation.
+/// Distance that runs keep from a curved border, metres: covers the rounding of the computation.
 const CLEARANCE: f64 = 1e-8;
 
 /// Largest distance by which an edge on a border may seem to be outside of it, metres: half of the proof's allowance.
@@ -70,55 +21,54 @@ const LOOKS: [u32; 3] = [24, 24, 12];
 const MOST_PARTS: usize = 96;
 
 /// Returns the runs of every slab, in order.
-pub(super) fn of_set(
-    set: &SuccessSet,
-    cells: &Cells,
-    progress: &(dyn Fn() + Sync),
-) -> Vec<Vec<Row>> {
-    let only = Parts::of(set).only();
-    let several = if only.is_some() {
-        Vec::new()
-    } else {
-        super::parts::covering(set, super::parts::ranges(cells), LOOKS, MOST_PARTS)
-    };
+pub(super) fn of_set(set: &SuccessSet, cells: &Cells, progress: &(dyn Fn() + Sync)) -> Vec<Rows> {
+    let parts = super::parts::covering(set, super::parts::ranges(cells), LOOKS, MOST_PARTS);
     (0..cells.slabs)
         .into_par_iter()
         .map(|k| {
-            let rows = match &only {
-                Some(part) => of_slab(part, cells, k).map(Row::of).collect(),
-                None => of_slab_in_parts(&several, cells, k),
-            };
+            let mut rows: Rows = vec![Vec::new(); usize::from(cells.rows)];
+            for part in &parts {
+                for (row, run) in rows.iter_mut().zip(of_slab(part, cells, k)) {
+                    row.extend(run);
+                }
+            }
+            rows.iter_mut().for_each(unite);
             progress();
             rows
         })
         .collect()
 }
 
-fn of_slab_in_parts(parts: &[ConvexPart], cells: &Cells, k: u16) -> Vec<Row> {
-    let runs: Vec<Vec<Option<Run>>> = parts
-        .iter()
-        .map(|part| of_slab(part, cells, k).collect())
-        .collect();
-    (0..usize::from(cells.rows))
-        .map(|j| Row::union(runs.iter().filter_map(|rows| rows[j])))
-        .collect()
+/// Replaces the runs of a row by their union in order.
+fn unite(runs: &mut Vec<Run>) {
+    runs.sort_unstable_by_key(|run| (run.first, run.last));
+    runs.dedup_by(|next, known| {
+        let joins = u32::from(next.first) <= u32::from(known.last) + 1;
+        if joins {
+            known.last = known.last.max(next.last);
+        }
+        joins
+    });
 }
 
-/// Returns the headings of a slab, rad.
-fn headings(cells: &Cells, k: u16) -> [f64; 2] {
-    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
-    [slab_edge(cells, k), slab_edge(cells, k + 1)].map(radians)
+/// The first and the last edge of cells on a line of constant y that lie in a set; none if the first is beyond the last.
+type Edges = [u16; 2];
+
+/// No edge of a line.
+const NONE: Edges = [u16::MAX, 0];
+
+fn intersect(a: Edges, b: Edges) -> Edges {
+    [a[0].max(b[0]), a[1].min(b[1])]
 }
 
 /// Returns the run of each row of a slab of a convex set.
 fn of_slab(part: &ConvexPart, cells: &Cells, k: u16) -> impl Iterator<Item = Option<Run>> {
-    let yaw = headings(cells, k);
-    let y_at = |j: u16| f64::from(cells.y_lo_um) * 1e-6 + f64::from(j) * step(cells);
+    let yaw = [slab_edge(cells, k), slab_edge(cells, k + 1)].map(radians);
+    let slab = Slab::of(cells);
     let mut lines = if part.boxes().count() == part.constraints().count() {
-        // The clearance is for curved borders; a box's border is exact.
-        vec![Some([f64::NEG_INFINITY, f64::INFINITY]); usize::from(cells.rows) + 1]
+        vec![[0, cells.columns]; slab.lines()]
     } else {
-        lines_of_slab(part, cells, yaw, y_at)
+        slab.edges(part, yaw)
     };
     for shape in part.boxes() {
         let [lo, hi] = shape.yaw_deg.map(f64::to_radians);
@@ -129,72 +79,176 @@ fn of_slab(part: &ConvexPart, cells: &Cells, k: u16) -> impl Iterator<Item = Opt
         // A unit of 2^-32 turn, as the proof allows.
         let unit = 1.5e-9;
         let turned = whole || (yaw[0] + shift >= lo - unit && yaw[1] + shift <= hi + unit);
-        for (j, line) in (0..=cells.rows).zip(&mut lines) {
-            let y = y_at(j);
-            let holds = turned && y >= shape.y[0] - ROUNDING && y <= shape.y[1] + ROUNDING;
-            let sides = [shape.x[0] - CLEARANCE, shape.x[1] + CLEARANCE];
-            *line = line
-                .filter(|_| holds)
-                .and_then(|line| intersect(line, sides));
+        // Edges on the border except for their rounding count as inside.
+        let within = |from: f64, [lo, hi]: [f64; 2], last: u16| {
+            let first = libm::ceil((lo - ROUNDING - from) / slab.step);
+            let end = libm::floor((hi + ROUNDING - from) / slab.step);
+            if turned && end >= 0.0 {
+                [first as u16, (end as u16).min(last)]
+            } else {
+                NONE
+            }
+        };
+        let across = within(slab.y_lo, shape.y, cells.rows);
+        let along = within(slab.x_lo, shape.x, cells.columns);
+        for (j, line) in (0..).zip(&mut lines) {
+            let holds = across[0] <= j && j <= across[1];
+            *line = if holds { intersect(*line, along) } else { NONE };
         }
     }
-    (0..cells.rows).map(move |j| {
-        let j = usize::from(j);
-        let both = lines[j]
-            .zip(lines[j + 1])
-            .and_then(|(a, b)| intersect(a, b));
-        both.and_then(|line| run(line, cells))
+    (0..usize::from(cells.rows)).map(move |j| {
+        let [first, end] = intersect(lines[j], lines[j + 1]);
+        let last = end.wrapping_sub(1);
+        (first < end).then_some(Run { first, last })
     })
 }
 
-fn step(cells: &Cells) -> f64 {
-    f64::from(cells.step_um) * 1e-6
+/// The edges of the cells in metres, goal frame.
+struct Slab<'a> {
+    cells: &'a Cells,
+    x_lo: f64,
+    y_lo: f64,
+    step: f64,
 }
 
-/// Returns for each row edge the x-interval that holds at every yaw of the slab: the intersection over
-/// yaw samples. The samples are so close that the change between them is below a hundredth of a cell.
-fn lines_of_slab(
-    part: &ConvexPart,
-    cells: &Cells,
-    [from, to]: [f64; 2],
-    y_at: impl Fn(u16) -> f64,
-) -> Vec<Option<[f64; 2]>> {
-    let reach = super::reach(cells);
-    let curvature = Node::curvature(part, reach);
-    let wanted = 0.01 * step(cells);
-    let nodes = libm::ceil((to - from) * libm::sqrt(curvature / (8.0 * wanted))).clamp(1.0, 1e4);
-    let width = (to - from) / nodes;
-    // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
-    let dip = curvature * width * width / 8.0 + 1e-9;
-    // One step wider than the cells, so that only the set ends a run.
-    let x_lo = f64::from(cells.x_lo_um) * 1e-6;
-    let x_hi = x_lo + f64::from(cells.columns) * step(cells);
-    let x = [x_lo - step(cells), x_hi + step(cells)];
-    let y = [y_at(0), y_at(cells.rows)];
-    let ys: Vec<f64> = (0..=cells.rows).map(y_at).collect();
-    let mut lines = vec![x; ys.len()];
-    for number in 0..=(nodes as u32) {
-        if !lines.iter().any(meets) {
-            break;
+/// Number of places from one edge to the next at which a line is tried.
+const PLACES: u32 = 1024;
+
+impl<'a> Slab<'a> {
+    fn of(cells: &'a Cells) -> Self {
+        Self {
+            cells,
+            x_lo: f64::from(cells.x_lo_um) * 1e-6,
+            y_lo: f64::from(cells.y_lo_um) * 1e-6,
+            step: f64::from(cells.step_um) * 1e-6,
         }
-        let node = Node::at(part, from + width * f64::from(number), dip);
-        node.within(x, y).draw_in(&ys, &mut lines);
     }
-    lines
-        .into_iter()
-        .map(|line| meets(&line).then_some(line))
-        .collect()
+
+    /// Returns the number of lines of constant y: the edges of all rows.
+    fn lines(&self) -> usize {
+        usize::from(self.cells.rows) + 1
+    }
+
+    /// Returns for each line the edges that lie in a part at every yaw of the slab. (Without its boxes.)
+    ///
+    /// They are evaluated at yaw samples that are so close that the change between them is below a hundredth of a cell. At a yaw every
+    /// slack is concave in (x, y), and so is the least of them: a place inside is found by halving, then the lines on both sides of it, and on
+    /// each line both ends.
+    fn edges(&self, part: &ConvexPart, [from, to]: [f64; 2]) -> Vec<Edges> {
+        let curvature = curvature(part, super::reach(self.cells));
+        let wanted = 0.01 * self.step;
+        let nodes =
+            libm::ceil((to - from) * libm::sqrt(curvature / (8.0 * wanted))).clamp(1.0, 1e4);
+        let width = (to - from) / nodes;
+        // A function with |g''| <= c dips below the smaller of its ends by at most c w^2 / 8.
+        let dip = curvature * width * width / 8.0 + 1e-9;
+        let turns: Vec<[f64; 2]> = (0..=(nodes as u32))
+            .map(|number| from + width * f64::from(number))
+            .map(|yaw| [libm::cos(yaw), libm::sin(yaw)])
+            .collect();
+        // The least slack near a place of a line, moved by the clearance to each of these sides.
+        let least = |line: u16, place: u32, sides: &[f64]| {
+            let x = self.x_lo + f64::from(place) * (self.step / f64::from(PLACES));
+            let y = self.y_lo + f64::from(line) * self.step;
+            let mut least = f64::INFINITY;
+            for side in sides {
+                let x = x + side * (CLEARANCE - ROUNDING);
+                for [cos, sin] in &turns {
+                    let (cos, sin) = (*cos, *sin);
+                    least = least.min(part.slack_without_boxes(&Planar { x, y, cos, sin }));
+                }
+            }
+            least - dip
+        };
+        let both = |line: u16, place: u32| least(line, place, &[-1.0, 1.0]);
+        let columns = self.cells.columns;
+        let top = |line: u16| highest(u32::from(columns) * PLACES, |place| both(line, place));
+        let middle = highest(self.cells.rows.into(), |line| {
+            both(line as u16, top(line as u16))
+        }) as u16;
+        let mut edges = vec![NONE; self.lines()];
+        let mut fill = |lines: &mut dyn Iterator<Item = u16>| {
+            let mut place = top(middle);
+            for line in lines {
+                if both(line, place) < 0.0 {
+                    place = top(line);
+                    if both(line, place) < 0.0 {
+                        return;
+                    }
+                }
+                let before = (place / PLACES) as u16;
+                let clear =
+                    |edge: u16, side: f64| least(line, u32::from(edge) * PLACES, &[side]) >= 0.0;
+                let first = farthest(before + 1, 0, |edge| clear(edge, -1.0));
+                let last = farthest(before, columns, |edge| clear(edge, 1.0));
+                edges[usize::from(line)] = [first, last];
+                place = u32::from(first.midpoint(last)) * PLACES;
+            }
+        };
+        fill(&mut (0..=middle).rev());
+        fill(&mut (middle + 1..=self.cells.rows));
+        edges
+    }
 }
 
-/// Returns the cells that lie within an interval.
-fn run([lo, hi]: [f64; 2], cells: &Cells) -> Option<Run> {
-    let x_lo = f64::from(cells.x_lo_um) * 1e-6;
-    let last = f64::from(cells.columns);
-    // Edges on the border except for their rounding count as inside.
-    let first = libm::ceil((lo + CLEARANCE - x_lo - ROUNDING) / step(cells)).clamp(0.0, last);
-    let end = libm::floor((hi - CLEARANCE - x_lo + ROUNDING) / step(cells)).clamp(0.0, last);
-    (first < end).then_some(Run {
-        first: first as u16,
-        last: (end - 1.0) as u16,
-    })
+/// Returns a number up to `last` at which a function that rises and then falls is at least 0; the one of its largest value if it is not.
+fn highest(mut last: u32, value: impl Fn(u32) -> f64) -> u32 {
+    let mut first = 0;
+    while first < last {
+        let middle = first.midpoint(last);
+        let here = value(middle);
+        if here >= 0.0 {
+            return middle;
+        }
+        if here < value(middle + 1) {
+            first = middle + 1;
+        } else {
+            last = middle;
+        }
+    }
+    first
+}
+
+/// Returns the number nearest to `end` that holds, where all from there to `start` hold; `start`, which is not tried, if no other does.
+fn farthest(start: u16, end: u16, holds: impl Fn(u16) -> bool) -> u16 {
+    if start == end || holds(end) {
+        return end;
+    }
+    let (mut inside, mut outside) = (start, end);
+    while inside.abs_diff(outside) > 1 {
+        let middle = inside.midpoint(outside);
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}
+
+/// Returns a bound on the second derivative by the yaw of every constraint, metres, for poses up to `reach` from the goal.
+fn curvature(part: &ConvexPart, reach: f64) -> f64 {
+    let away = |[x, y]: &[f64; 2]| libm::hypot(*x, *y);
+    let of = |set: &Ready<f64>| match set {
+        Ready::Box(_) | Ready::Nothing => 0.0,
+        // A vertex moves on a circle.
+        Ready::Footprint(shape) => shape.lever(),
+        // The tag moves around the robot, the camera around the robot's centre; |r| of a point
+        // on a circle of radius m has |r|'' <= m + m^2 / |r|.
+        Ready::Visibility(tag) => {
+            let corners = tag.corners.iter().map(|[x, y, _]| away(&[*x, *y]));
+            let arm = away(&[tag.set.mount.x, tag.set.mount.y]);
+            let near = tag.set.z_near.max(0.01);
+            2.0 * (corners.fold(0.0, f64::max) + reach) + arm + arm * arm / near
+        }
+        // A point of the robot moves around its centre, a point of the goal frame around the robot.
+        Ready::Side(line) => {
+            let farthest = line.points.iter().map(away).fold(0.0, f64::max);
+            match line.binds {
+                Binds::Robot => farthest,
+                Binds::Goal => farthest + reach,
+            }
+        }
+    };
+    part.ready().map(of).fold(0.0, f64::max)
 }

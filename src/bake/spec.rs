@@ -102,11 +102,8 @@ impl TableSpec {
         // At least one run per row, two or four bytes each.
         let least = f64::from(rows) * f64::from(slabs) * if columns > 255 { 4.0 } else { 2.0 };
         if least > LARGEST_TABLE as f64 {
-            return Err(BakeError::TooLarge {
-                what: "bytes",
-                count: least,
-                limit: LARGEST_TABLE as f64,
-            });
+            let limit = LARGEST_TABLE as f64;
+            return Err(BakeError::too_large("bytes", least, limit));
         }
         let span = high - low;
         if !(span >= f64::from(slabs)) {
@@ -139,10 +136,6 @@ fn counted(count: f64, what: &'static str, most: f64) -> Result<u16, BakeError> 
     if count <= most {
         Ok(count as u16)
     } else {
-        Err(BakeError::TooLarge {
-            what,
-            count,
-            limit: most,
-        })
+        Err(BakeError::too_large(what, count, most))
     }
 }

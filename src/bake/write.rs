@@ -1,6 +1,6 @@
 //! Writes cells and runs as the bytes of format version 1.
 
-use super::{BakeError, BakeInput, FacetPlan, check, goal_frame, sight_record};
+use super::{BakeError, BakeInput, FacetPlan, Rows, check, goal_frame, sight_record};
 use crate::confidence::core_radius;
 use crate::table::{
     Axes, CRC_LENGTH, Cells, HEADER_LENGTH, MAGIC, Run, SightRecord, VERSION, checksum,
@@ -14,14 +14,11 @@ pub const LARGEST_TABLE: usize = 64 << 20;
 ///
 /// # Errors
 /// [`BakeError`] if the table exceeds the format.
-pub fn write_grid<Row>(
+pub fn write_grid(
     order: &BakeInput<'_>,
     cells: &Cells,
-    slabs: &[Vec<Row>],
-) -> Result<Vec<u8>, BakeError>
-where
-    for<'a> &'a Row: IntoIterator<Item = &'a Run>,
-{
+    slabs: &[Rows],
+) -> Result<Vec<u8>, BakeError> {
     write(order, cells, &grid(cells, slabs)?, &[])
 }
 
@@ -46,11 +43,8 @@ fn write(
     let sight = sight.as_ref().map_or(&[][..], |bytes| bytes);
     let total = HEADER_LENGTH + grid.len() + facets.len() + sight.len() + CRC_LENGTH;
     if total > LARGEST_TABLE {
-        return Err(BakeError::TooLarge {
-            what: "bytes",
-            count: total as f64,
-            limit: LARGEST_TABLE as f64,
-        });
+        let limit = LARGEST_TABLE as f64;
+        return Err(BakeError::too_large("bytes", total as f64, limit));
     }
     let mut bytes = Vec::with_capacity(total);
     bytes.extend(MAGIC);
@@ -108,11 +102,7 @@ fn padded<const N: usize>(name: &str) -> Result<[u8; N], BakeError> {
 }
 
 /// Encodes the grid layout; slabs with equal rows share them.
-fn grid<Row>(cells: &Cells, slabs: &[Vec<Row>]) -> Result<Vec<u8>, BakeError>
-where
-    for<'a> &'a Row: IntoIterator<Item = &'a Run>,
-{
-    let count = |row: &Row| row.into_iter().count();
+fn grid(cells: &Cells, slabs: &[Rows]) -> Result<Vec<u8>, BakeError> {
     let wide = cells.columns > 255;
     let directory = 4 + 8 * slabs.len();
     let mut head = Vec::with_capacity(directory);
@@ -120,26 +110,23 @@ where
     let mut body: Vec<u8> = Vec::new();
     let mut known: BTreeMap<Vec<u8>, u32> = BTreeMap::new();
     for rows in slabs {
-        let filled = |row: &Row| count(row) > 0;
+        let filled = |row: &Vec<Run>| !row.is_empty();
         let first = rows.iter().position(filled).unwrap_or(0);
         let end = rows.iter().rposition(filled).map_or(first, |last| last + 1);
         let rows = &rows[first..end];
-        let several = rows.iter().any(|row| count(row) > 1);
+        let several = rows.iter().any(|row| row.len() > 1);
         let mut bytes = Vec::new();
         if several {
             let mut start = 0usize;
             let mut put = |start: usize| -> Result<(), BakeError> {
-                let start = u16::try_from(start).map_err(|_| BakeError::TooLarge {
-                    what: "runs in a slab",
-                    count: start as f64,
-                    limit: f64::from(u16::MAX),
-                })?;
-                bytes.extend(start.to_le_bytes());
+                let most = f64::from(u16::MAX);
+                let beyond = |_| BakeError::too_large("runs in a slab", start as f64, most);
+                bytes.extend(u16::try_from(start).map_err(beyond)?.to_le_bytes());
                 Ok(())
             };
             put(0)?;
             for row in rows {
-                start += count(row);
+                start += row.len();
                 put(start)?;
             }
         }
@@ -161,11 +148,7 @@ where
             }
         }
         if rows.len() > 0x7fff {
-            return Err(BakeError::TooLarge {
-                what: "rows",
-                count: rows.len() as f64,
-                limit: 32767.0,
-            });
+            return Err(BakeError::too_large("rows", rows.len() as f64, 32767.0));
         }
         let offset = *known.entry(bytes).or_insert_with_key(|bytes| {
             let offset = directory + body.len();
@@ -173,11 +156,8 @@ where
             offset as u32
         });
         if directory + body.len() > LARGEST_TABLE {
-            return Err(BakeError::TooLarge {
-                what: "bytes",
-                count: (directory + body.len()) as f64,
-                limit: LARGEST_TABLE as f64,
-            });
+            let count = (directory + body.len()) as f64;
+            return Err(BakeError::too_large("bytes", count, LARGEST_TABLE as f64));
         }
         head.extend(offset.to_le_bytes());
         head.extend((first as u16).to_le_bytes());
@@ -193,11 +173,7 @@ fn facets(plan: &FacetPlan) -> Result<Vec<u8>, BakeError> {
         u16::try_from(count)
             .ok()
             .filter(|count| *count <= most)
-            .ok_or(BakeError::TooLarge {
-                what,
-                count: count as f64,
-                limit: f64::from(most),
-            })
+            .ok_or(BakeError::too_large(what, count as f64, f64::from(most)))
     };
     let frames = || plan.pieces.iter().flat_map(|piece| &piece.frames);
     let all = counted(frames().map(|f| f.facets.len()).sum(), "facets", u16::MAX)?;

@@ -126,10 +126,14 @@ impl Prover {
     }
 }
 
+/// Converts 2^-32 turn to radians, in plain floats.
+pub(crate) fn radians(units: i64) -> f64 {
+    units as f64 / 4_294_967_296.0 * core::f64::consts::TAU
+}
+
 /// Returns the corners and the middle of a block: m, m, rad.
 fn samples(block: &Block) -> [[f64; 3]; 9] {
     let metres = |um: i64| um as f64 * 1e-6;
-    let radians = |units: i64| units as f64 / 4_294_967_296.0 * core::f64::consts::TAU;
     let [x0, x1] = block.x_um.map(metres);
     let [y0, y1] = block.y_um.map(metres);
     let [w0, w1] = block.yaw.map(radians);
@@ -379,9 +383,13 @@ fn sides<S: Scalar>(shape: &BoxSet, x: S, y: S) -> [S; 4] {
     [x - x0, x1 - x, y - y0, y1 - y].map(|side| side + border)
 }
 
+/// Encloses micrometres in metres.
+fn metres(um: i64) -> Interval {
+    Interval::point(um as f64) * Interval::point(1e6).reciprocal()
+}
+
 /// Returns the four corners of a rectangle, metres.
 fn corners(block: &Block) -> [[Interval; 2]; 4] {
-    let metres = |um: i64| Interval::point(um as f64) * Interval::point(1e6).reciprocal();
     let [x0, x1] = block.x_um.map(metres);
     let [y0, y1] = block.y_um.map(metres);
     [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
@@ -394,7 +402,6 @@ fn is_within([lo, hi]: [Interval; 2], [from, to]: [Interval; 2], border: f64) ->
 }
 
 fn is_in_box(shape: &BoxSet, block: &Block) -> bool {
-    let metres = |um: i64| Interval::point(um as f64) * Interval::point(1e6).reciprocal();
     let position = [block.x_um, block.y_um].map(|ends| ends.map(metres));
     is_position_in_box(shape, position) && is_in_arc(shape, block.yaw)
 }

@@ -45,8 +45,8 @@
 //! 4. *Its interior* follows. F is open there (J has an inverse), so u and v have no maximum or minimum in the
 //!    interior of the polygon. Their extremes are on the border, which lies in the image by 3.
 
-pub(crate) use self::block::PartProver;
 pub use self::block::{BOX_BORDER_M, BOX_BORDER_RAD, Block, Prover, goal_cos_sin};
+pub(crate) use self::block::{PartProver, radians};
 pub use self::body::{Body, ProofBudget};
 pub use self::interval::Interval;
 pub use self::lens::{Calibration, CertifiedCamera, Image, LensError, Roi};

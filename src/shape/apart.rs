@@ -7,11 +7,11 @@
 
 use super::clear::Clear;
 use super::footprint::farthest;
-use super::scalar::dot;
-use super::side::SeparatingHalfPlane;
+use super::polygon::edges;
+use super::side::{Line, SeparatingHalfPlane};
 use super::visibility::{Resolved, Visibility};
 use super::wall::{self, Wall};
-use super::{Planar, PoseDeg, Scalar, Tolerance};
+use super::{PoseDeg, Scalar, Tolerance};
 use std::sync::Arc;
 
 /// A set that is the outside of something convex.
@@ -78,15 +78,6 @@ impl Exclusion {
         }
     }
 
-    /// Returns `true` if its slack is exactly the largest of its sides' slacks: the excluded region has no
-    /// curved border.
-    pub const fn is_polyhedral(&self) -> bool {
-        match self {
-            Self::Obstacle(_) | Self::Gap { .. } | Self::Hidden { .. } => true,
-            Self::Near { .. } | Self::Square { .. } => false,
-        }
-    }
-
     /// Returns the distance from the robot's reference point of the farthest point that must not reach into the region, metres.
     pub(super) fn lever(&self) -> f64 {
         match self {
@@ -105,28 +96,10 @@ impl Exclusion {
         }
     }
 
-    /// Returns the slack of a pose in the goal frame: at least 0 in the set, roughly in metres. Exact
-    /// except for the rounding of `f64`: for obstacles and walls some side determines the slack.
-    pub(crate) fn slack(&self, goal: PoseDeg, pose: &Planar<f64>) -> f64 {
-        let ray = |view: &Visibility| view.resolve::<f64>(goal).tag_to_camera(pose);
-        match self {
-            Self::Near { view, d_min } => {
-                let ray = ray(view);
-                libm::sqrt(dot(ray, ray)) - d_min - view.tolerance_margins().ray
-            }
-            Self::Square { view, psi_min_deg } => {
-                let normal = view.resolve::<f64>(goal).normal;
-                let (psi_min_deg, back) = view.too_head_on(*psi_min_deg);
-                let plain = ray(view);
-                let ray = [0, 1, 2].map(|i| plain[i] + back * normal[i]);
-                f64::cos_sin_deg(psi_min_deg)[0] * libm::sqrt(dot(ray, ray)) - dot(normal, ray)
-            }
-            Self::Obstacle(_) | Self::Gap { .. } | Self::Hidden { .. } => self
-                .sides(goal)
-                .iter()
-                .map(|side| side.resolve::<f64>(goal).room(pose))
-                .fold(f64::NEG_INFINITY, f64::max),
-        }
+    /// Returns the half-planes of [`Self::sides`] in `f64`.
+    pub fn lines(&self, goal: PoseDeg) -> impl Iterator<Item = Line<f64>> {
+        let sides = self.sides(goal).into_iter();
+        sides.map(move |side| side.resolve(goal))
     }
 
     /// Returns half-planes whose union is the set, except for the space between neighbouring tangents of a
@@ -197,12 +170,6 @@ impl Exclusion {
                 .collect(),
         }
     }
-}
-
-/// Returns the edges of a polygon.
-fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
-    let ends = corners.iter().cycle().skip(1);
-    corners.iter().zip(ends).map(|(a, b)| [*a, *b])
 }
 
 /// Returns two unit vectors perpendicular to a unit vector and to each other.

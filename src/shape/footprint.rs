@@ -1,6 +1,7 @@
 //! Footprints in regions: every vertex of the robot's outline lies inside a convex polygon.
 
 use super::planar::Planar;
+use super::polygon::edges;
 use super::scalar::{NONE, Scalar, Selection, selected};
 use super::{Round, Tolerance};
 
@@ -166,8 +167,7 @@ impl Footprint {
         note: &mut impl FnMut(usize, &'static str, S),
     ) -> usize {
         let mut index = first;
-        let ends = self.region.iter().cycle().skip(1);
-        for (&[ax, ay], &[bx, by]) in self.region.iter().zip(ends) {
+        for [[ax, ay], [bx, by]] in edges(&self.region) {
             let unit = S::exact(1.0 / libm::hypot(bx - ax, by - ay));
             let (from_x, from_y) = (S::exact(ax), S::exact(ay));
             let along = [S::exact(bx) - from_x, S::exact(by) - from_y];
@@ -261,8 +261,7 @@ fn check_polygon(corners: &[[f64; 2]]) -> Result<(), PolygonError> {
 /// hull, in the hull's direction.
 fn all_on_side(corners: &[[f64; 2]], side: f64) -> bool {
     let mut encloses = false;
-    let ends = corners.iter().cycle().skip(1);
-    for (&start, &end) in corners.iter().zip(ends) {
+    for [start, end] in edges(corners) {
         for &corner in corners {
             let turn = side * orientation(start, end, corner);
             if turn < 0.0 {

@@ -121,7 +121,7 @@ fn divided(shape: &Shape) -> (Vec<Shape>, Vec<Footprint>) {
 
 /// A group prepared for sampling.
 struct Sampler<'a> {
-    set: SetEvaluator<'a>,
+    set: SetEvaluator,
     across: Option<&'a [Footprint; 2]>,
 }
 

@@ -1,9 +1,10 @@
 //! Is a pose in a success set? The slacks of its constraints.
 
 use super::planar::Planar;
+use super::prepared::Prepared;
 use super::scalar::{ALL, Scalar};
 use super::visibility::ToleranceMargins;
-use super::{PoseDeg, Resolved, Shape, Sight, SuccessSet};
+use super::{PoseDeg, Resolved, Sight, SuccessSet};
 
 /// Membership of a pose in a success set, with slacks.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,22 +13,57 @@ pub struct Membership {
     pub inside: bool,
     /// The slack of each constraint by name: at least 0 inside, roughly metres or radians.
     pub slack: Vec<(&'static str, f64)>,
-    /// The tag as the camera sees it, if the set has exactly one view ([`Shape::visibility`]).
+    /// The tag as the camera sees it, if the set has exactly one view ([`Shape::visibility`](super::Shape::visibility)).
     pub sight: Option<Sight>,
+}
+
+/// The least slack of a pose, at least 0 inside, and the constraint that has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MinSlack {
+    /// The slack, roughly in metres or radians.
+    pub slack: f64,
+    /// The constraint's name, as in [`SuccessSet::membership`].
+    pub name: &'static str,
+}
+
+impl MinSlack {
+    /// The slack of an empty union.
+    pub(super) const NOTHING: Self = Self {
+        slack: f64::NEG_INFINITY,
+        name: "any",
+    };
+
+    /// The slack of an empty list of constraints.
+    pub const EVERYTHING: Self = Self {
+        slack: f64::INFINITY,
+        name: "all",
+    };
+
+    /// Returns the lower of two slacks, the first of equal ones.
+    pub(super) fn lower(self, other: Self) -> Self {
+        if other.slack < self.slack {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+impl PoseDeg {
+    /// Transforms a world pose `(x m, y m, yaw rad)` to this frame, yaw not wrapped.
+    pub(super) fn to_goal(self, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
+        let [c, s] = f64::cos_sin_deg(self.yaw_deg);
+        let (dx, dy) = (x - self.x, y - self.y);
+        let yaw = yaw - self.yaw_deg.to_radians();
+        [c * dx + s * dy, c * dy - s * dx, yaw]
+    }
 }
 
 impl SuccessSet {
     /// Transforms a world pose `(x m, y m, yaw rad)` to the goal frame, yaw not wrapped.
     #[must_use]
-    pub fn to_goal(&self, [x, y, yaw]: [f64; 3]) -> [f64; 3] {
-        let PoseDeg {
-            x: gx,
-            y: gy,
-            yaw_deg,
-        } = self.goal;
-        let [c, s] = f64::cos_sin_deg(yaw_deg);
-        let (dx, dy) = (x - gx, y - gy);
-        [c * dx + s * dy, c * dy - s * dx, yaw - yaw_deg.to_radians()]
+    pub fn to_goal(&self, world: [f64; 3]) -> [f64; 3] {
+        self.goal.to_goal(world)
     }
 
     /// Transforms a pose of the goal frame to the world: m, m, rad, yaw not wrapped.
@@ -52,29 +88,24 @@ impl SuccessSet {
     /// `f64`: a pose within 1e-12 of a border may be on either side.
     #[must_use]
     pub fn membership(&self, world: [f64; 3]) -> Membership {
-        let [x, y, yaw] = self.to_goal(world);
-        let pose = Planar {
-            x,
-            y,
-            cos: libm::cos(yaw),
-            sin: libm::sin(yaw),
-        };
-        let slack = slacks(&self.shape, self.goal, &pose, [x, y, yaw]);
-        let sight = self
-            .shape
-            .visibility()
-            .map(|set| set.resolve::<f64>(self.goal).sight(&pose));
+        let prepared = Prepared::of(self);
+        let pose = self.to_goal(world).into();
+        let slack = prepared.slacks(&pose);
         Membership {
             inside: slack.iter().all(|(_, value)| *value >= 0.0),
             slack,
-            sight,
+            sight: prepared.view().map(|view| view.sight(&pose.planar)),
         }
     }
 }
 
 /// Computes the slacks of a view. An image through a lens ends at its pixel borders, not at the window with which
 /// tables are made. With tolerances the window is used.
-pub fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'static str, f64)) {
+pub(super) fn seen(
+    view: &Resolved<f64>,
+    pose: &Planar<f64>,
+    note: &mut impl FnMut(&'static str, f64),
+) {
     let exact = view.less == ToleranceMargins::default() && view.image_slack(pose).is_some();
     view.slacks(pose, ALL, 0, &mut |_, name, value| {
         if !(exact && name.starts_with("image")) {
@@ -88,7 +119,7 @@ pub fn seen(view: &Resolved<f64>, pose: &Planar<f64>, note: &mut impl FnMut(&'st
 
 /// Returns `true` if a view contains a pose: none of [`seen`]'s slacks is below 0. Constraints that most poses
 /// violate are evaluated first.
-pub fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
+pub(super) fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
     let mut holds = true;
     view.slacks(pose, view.cones(), 0, &mut |_, name, slack| {
         // Selections share their last bit, so image constraints of a lens with many sides may be among them.
@@ -98,50 +129,4 @@ pub fn is_seen(view: &Resolved<f64>, pose: &Planar<f64>) -> bool {
         seen(view, pose, &mut |_, slack| holds &= slack >= 0.0);
     }
     holds
-}
-
-/// Returns the slacks of a set at a pose, by name; of a union those of the set with the largest least slack.
-fn slacks(
-    shape: &Shape,
-    goal: PoseDeg,
-    pose: &Planar<f64>,
-    plain: [f64; 3],
-) -> Vec<(&'static str, f64)> {
-    let mut smallest: Vec<(&'static str, f64)> = Vec::new();
-    // Several constraints may share a name: the smallest slack of each name is kept.
-    let mut note = |name, value: f64| match smallest.iter_mut().find(|(known, _)| *known == name) {
-        Some((_, least)) => *least = least.min(value),
-        None => smallest.push((name, value)),
-    };
-    match shape {
-        Shape::Box(set) => set.slacks(plain[0], plain[1], plain[2], &mut note),
-        Shape::Footprint(set) => set.exact_slacks(pose, &mut note),
-        Shape::Visibility(set) => {
-            seen(&set.resolve::<f64>(goal), pose, &mut note);
-        }
-        Shape::Bounded { view, limit } => {
-            let resolved = view.resolve::<f64>(goal);
-            seen(&resolved, pose, &mut note);
-            note("error", limit.slack(view, &resolved.sight(pose)));
-        }
-        Shape::Apart(set) => note(set.name(), set.slack(goal, pose)),
-        Shape::All(sets) => {
-            for set in sets {
-                for (name, value) in slacks(set, goal, pose, plain) {
-                    note(name, value);
-                }
-            }
-        }
-        Shape::Any(sets) => {
-            let least = |slacks: &[(&'static str, f64)]| {
-                slacks.iter().map(|(_, v)| *v).fold(f64::INFINITY, f64::min)
-            };
-            return sets
-                .iter()
-                .map(|set| slacks(set, goal, pose, plain))
-                .max_by(|a, b| least(a).total_cmp(&least(b)))
-                .unwrap_or_default();
-        }
-    }
-    smallest
 }

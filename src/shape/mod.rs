@@ -38,18 +38,18 @@ pub use self::footprint::{Footprint, PolygonError};
 pub(crate) use self::groups::halves;
 pub use self::groups::{GroupName, PoseGroup, Ranges};
 pub use self::lens::{Lens, Optic};
-pub use self::membership::{Membership, is_seen, seen};
-pub(crate) use self::part::Parts;
-pub(crate) use self::part::Ready;
-pub use self::part::{Convex, ConvexPart};
+pub use self::membership::{Membership, MinSlack};
+pub(crate) use self::part::{ConvexPart, Parts, Ready};
 pub use self::planar::Planar;
+pub use self::polygon::hull;
+pub(crate) use self::polygon::{clipped, edges};
 pub use self::round::{Round, RoundError};
 pub use self::scalar::Scalar;
+pub(crate) use self::scalar::farthest_holding;
 pub use self::scalar::{ALL, NONE, Selection, rotation, selected};
 pub use self::side::SeparatingHalfPlane;
 pub use self::side::{Binds, Line};
 pub use self::tolerance::{Intrinsics, Sharpness, Tolerance};
-pub use self::union::hull;
 pub use self::visibility::Resolved;
 pub use self::visibility::{Mount, Sight, Tag, Visibility};
 pub use self::wall::Wall;
@@ -71,6 +71,8 @@ mod lens;
 mod membership;
 mod part;
 mod planar;
+mod polygon;
+mod prepared;
 mod round;
 mod scalar;
 mod side;
@@ -248,7 +250,10 @@ impl SuccessSet {
         fn obstacles(shape: &Shape, goal: PoseDeg) -> f64 {
             let origin = Planar::from([0.0; 3]);
             match shape {
-                Shape::Apart(set @ Exclusion::Obstacle(_)) => set.slack(goal, &origin),
+                Shape::Apart(set @ Exclusion::Obstacle(_)) => {
+                    let rooms = set.lines(goal).map(|line| line.room(&origin));
+                    rooms.fold(f64::NEG_INFINITY, f64::max)
+                }
                 Shape::All(sets) => sets
                     .iter()
                     .map(|set| obstacles(set, goal))

@@ -7,6 +7,7 @@
 
 use super::boxed::maximal;
 use super::planar::Planar;
+use super::prepared::Pose;
 use super::scalar::{ALL, NONE, Scalar, Selection, selected};
 use super::side::Line;
 use super::{
@@ -18,7 +19,7 @@ use std::sync::Arc;
 
 /// A set that is convex in (x, y) at every heading.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Convex {
+pub(crate) enum Convex {
     /// A box.
     Box(BoxSet),
     /// A footprint in a region.
@@ -35,7 +36,7 @@ pub enum Convex {
 #[derive(Clone, Debug)]
 pub(crate) enum Ready<S> {
     /// A box's sides are decimal numbers, and its yaw is an arc, so proofs use the box directly.
-    Box,
+    Box(BoxSet),
     Footprint(Footprint),
     Visibility(Box<Resolved<S>>),
     Side(Line<S>),
@@ -46,7 +47,7 @@ impl Convex {
     /// Converts the numbers of the site to some arithmetic.
     pub(crate) fn resolve<S: Scalar>(&self, goal: PoseDeg) -> Ready<S> {
         match self {
-            Self::Box(_) => Ready::Box,
+            Self::Box(set) => Ready::Box(*set),
             Self::Footprint(set) => Ready::Footprint(set.clone()),
             Self::Visibility(set) => Ready::Visibility(Box::new(set.resolve(goal))),
             Self::Side(set) => Ready::Side(set.resolve(goal)),
@@ -66,7 +67,7 @@ impl<S: Scalar> Ready<S> {
         note: &mut impl FnMut(usize, &'static str, S),
     ) -> usize {
         match self {
-            Self::Box => first,
+            Self::Box(_) => first,
             Self::Footprint(set) => set.slacks(pose, selection, first, note),
             Self::Visibility(set) => set.slacks(pose, selection, first, note),
             Self::Side(set) => set.slacks(pose, selection, first, note),
@@ -82,27 +83,10 @@ impl<S: Scalar> Ready<S> {
 
 /// A part of a success set that is convex in (x, y) at every heading: the intersection of these sets.
 #[derive(Clone, Debug)]
-pub struct ConvexPart {
+pub(crate) struct ConvexPart {
     /// The goal pose: frame g in the world.
     pub goal: PoseDeg,
     all: Vec<Arc<Leaf>>,
-}
-
-/// A pose in the goal frame; its yaw (not wrapped), rad, and its cosine and sine.
-struct Pose {
-    planar: Planar<f64>,
-    yaw: f64,
-}
-
-impl Pose {
-    /// Creates a pose from x, y, yaw: m, m, rad.
-    fn new([x, y, yaw]: [f64; 3]) -> Self {
-        let (cos, sin) = (libm::cos(yaw), libm::sin(yaw));
-        Self {
-            planar: Planar { x, y, cos, sin },
-            yaw,
-        }
-    }
 }
 
 /// A success set prepared for the choice of convex parts.
@@ -125,23 +109,12 @@ enum Node {
 #[derive(Debug)]
 struct Leaf {
     set: Convex,
-    ready: Plain,
-}
-
-#[derive(Debug)]
-enum Plain {
-    Own,
-    Visibility(Box<Resolved<f64>>),
-    Side(Line<f64>),
+    ready: Ready<f64>,
 }
 
 impl Leaf {
     fn new(set: Convex, goal: PoseDeg) -> Self {
-        let ready = match set.resolve::<f64>(goal) {
-            Ready::Box | Ready::Footprint(_) | Ready::Nothing => Plain::Own,
-            Ready::Visibility(set) => Plain::Visibility(set),
-            Ready::Side(set) => Plain::Side(set),
-        };
+        let ready = set.resolve(goal);
         Self { set, ready }
     }
 
@@ -149,19 +122,14 @@ impl Leaf {
     fn slack(&self, Pose { planar: pose, yaw }: &Pose) -> f64 {
         let mut least = f64::INFINITY;
         let mut note = |_: usize, _: &'static str, slack: f64| least = least.min(slack);
-        match (&self.set, &self.ready) {
-            (Convex::Box(set), _) => set.slacks(pose.x, pose.y, *yaw, &mut |name, slack| {
+        match &self.ready {
+            Ready::Box(set) => set.slacks(pose.x, pose.y, *yaw, &mut |name, slack| {
                 note(0, name, slack)
             }),
-            (Convex::Footprint(set), _) => {
-                set.slacks(pose, ALL, 0, &mut note);
-            }
-            (_, Plain::Visibility(set)) => {
-                set.slacks(pose, ALL, 0, &mut note);
-            }
-            (_, Plain::Side(set)) => note(0, "side", set.room(pose)),
-            (Convex::Visibility(_) | Convex::Side(_) | Convex::Nothing, Plain::Own) => {
-                note(0, "nothing", f64::NEG_INFINITY);
+            Ready::Side(line) => return line.room(pose),
+            Ready::Nothing => return f64::NEG_INFINITY,
+            Ready::Footprint(_) | Ready::Visibility(_) => {
+                self.ready.slacks(pose, ALL, 0, &mut note);
             }
         }
         least
@@ -271,7 +239,7 @@ impl Parts {
     /// Returns the part with the largest least slack at these poses of the goal frame, and that slack (in
     /// `f64`: the choice need not be exact).
     pub(crate) fn holding(&self, poses: &[[f64; 3]]) -> (ConvexPart, f64) {
-        let poses: Vec<Pose> = poses.iter().map(|pose| Pose::new(*pose)).collect();
+        let poses: Vec<Pose> = poses.iter().map(|pose| Pose::from(*pose)).collect();
         let mut all = Vec::new();
         let slack = self.node.choose(&poses, &mut all);
         let goal = self.goal;
@@ -292,7 +260,7 @@ impl ConvexPart {
 
     /// Returns the least slack of each part at each pose of the goal frame, in `f64`. A set that several parts share is evaluated once.
     pub(crate) fn slacks(parts: &[Self], poses: &[[f64; 3]]) -> Vec<Vec<f64>> {
-        let poses: Vec<Pose> = poses.iter().map(|pose| Pose::new(*pose)).collect();
+        let poses: Vec<Pose> = poses.iter().map(|pose| Pose::from(*pose)).collect();
         let mut known: HashMap<*const Leaf, Vec<f64>> = HashMap::new();
         let of_part = |part: &Self| {
             let mut least = vec![f64::INFINITY; poses.len()];
@@ -310,29 +278,41 @@ impl ConvexPart {
     }
 
     /// Returns the sets whose intersection is the part, each convex at every heading.
-    pub fn constraints(&self) -> impl Iterator<Item = &Convex> {
+    pub(crate) fn constraints(&self) -> impl Iterator<Item = &Convex> {
         self.all.iter().map(|leaf| &leaf.set)
+    }
+
+    /// Returns the same sets with their numbers in `f64`.
+    pub(crate) fn ready(&self) -> impl Iterator<Item = &Ready<f64>> {
+        self.all.iter().map(|leaf| &leaf.ready)
     }
 
     /// Returns the boxes among the constraints.
     pub(crate) fn boxes(&self) -> impl Iterator<Item = &BoxSet> {
-        self.constraints().filter_map(|set| match set {
-            Convex::Box(set) => Some(set),
+        self.ready().filter_map(|set| match set {
+            Ready::Box(set) => Some(set),
             _ => None,
         })
     }
 
-    /// Returns the half-planes among the constraints, in `f64`.
-    pub(crate) fn lines(&self) -> impl Iterator<Item = &Line<f64>> {
-        self.all.iter().filter_map(|leaf| match &leaf.ready {
-            Plain::Side(line) => Some(line),
-            _ => None,
-        })
+    /// Returns the least slack at a pose of the goal frame of all constraints but boxes, in `f64`.
+    pub(crate) fn slack_without_boxes(&self, planar: &Planar<f64>) -> f64 {
+        let pose = Pose {
+            planar: *planar,
+            yaw: 0.0,
+        };
+        let others = self
+            .all
+            .iter()
+            .filter(|leaf| !matches!(leaf.ready, Ready::Box(_)));
+        others
+            .map(|leaf| leaf.slack(&pose))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the least slack at a pose of the goal frame, in `f64`.
     pub(crate) fn slack(&self, pose: [f64; 3]) -> f64 {
-        let pose = Pose::new(pose);
+        let pose = Pose::from(pose);
         let slacks = self.all.iter().map(|leaf| leaf.slack(&pose));
         slacks.fold(f64::INFINITY, f64::min)
     }

@@ -37,6 +37,25 @@ impl Scalar for f64 {
     }
 }
 
+/// Returns the last number from `inside` towards `outside` at which a condition holds, found by halving the distance so many times. It
+/// holds at `inside`, and beyond the returned number no more.
+pub(crate) fn farthest_holding(
+    mut inside: f64,
+    mut outside: f64,
+    halvings: u32,
+    holds: impl Fn(f64) -> bool,
+) -> f64 {
+    for _ in 0..halvings {
+        let middle = 0.5 * (inside + outside);
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}
+
 /// A selection of a set's slacks, one bit each in the order in which they are computed; the slacks
 /// from number 63 on share the last bit.
 pub type Selection = u64;

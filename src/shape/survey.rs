@@ -19,7 +19,7 @@
 //! onto the floor, and turns the yaw by up to `asin(sin(alpha) / cos(beta))`. Both are included for a beta of
 //! [`LARGEST_LEAN_DEG`]. The yaw is off by at most the detector's own error, delta, and this angle.
 
-use super::Visibility;
+use super::{Visibility, farthest_holding};
 use core::f64::consts::{FRAC_PI_2, PI};
 
 /// Largest lean of a detector's pose of the robot that the bounds allow for, degrees.
@@ -95,19 +95,10 @@ impl Visibility {
         if holds(most) {
             return most;
         }
-        let (mut near, mut far) = (0.0, most);
-        if !holds(near) {
+        if !holds(0.0) {
             return 0.0;
         }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (near + far);
-            if holds(middle) {
-                near = middle;
-            } else {
-                far = middle;
-            }
-        }
-        near
+        farthest_holding(0.0, most, HALVINGS, holds)
     }
 
     /// Reduces `d_max` until the error that the tolerances add is within [`Self::error_room`]. If no distance satisfies

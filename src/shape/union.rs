@@ -4,7 +4,7 @@
 //! overlap the part of the rectangle outside of the union. That part is cut into convex cells, which are
 //! obstacles. (A footprint of one point has no interior.)
 
-use super::footprint::orientation;
+use super::polygon::{clipped, edges, hull};
 use super::{Clear, Exclusion, Footprint, Shape};
 use std::sync::Arc;
 
@@ -72,10 +72,9 @@ impl Shape {
 fn without(cell: &[[f64; 2]], polygon: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let mut rest = cell.to_vec();
     let mut left = Vec::new();
-    let ends = polygon.iter().cycle().skip(1);
-    for (from, to) in polygon.iter().zip(ends) {
-        left.push(beside(&rest, *to, *from));
-        rest = beside(&rest, *from, *to);
+    for [from, to] in edges(polygon) {
+        left.push(beside(&rest, to, from));
+        rest = beside(&rest, from, to);
     }
     left.retain(|piece| width(piece) > CRACK);
     left
@@ -83,55 +82,19 @@ fn without(cell: &[[f64; 2]], polygon: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
 
 /// Returns the part of a convex polygon to the left of a line.
 fn beside(polygon: &[[f64; 2]], from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
-    let height =
-        |p: [f64; 2]| (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0]);
-    let mut part = Vec::new();
-    let ends = polygon.iter().cycle().skip(1);
-    for (a, b) in polygon.iter().zip(ends) {
-        let (ha, hb) = (height(*a), height(*b));
-        if ha >= 0.0 {
-            part.push(*a);
-        }
-        if (ha > 0.0 && hb < 0.0) || (ha < 0.0 && hb > 0.0) {
-            let t = ha / (ha - hb);
-            part.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
-        }
-    }
-    part
+    clipped(polygon, |p| {
+        (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0])
+    })
 }
 
 /// Returns an upper bound of a polygon's width: twice its area over its longest side.
 fn width(polygon: &[[f64; 2]]) -> f64 {
-    let ends = polygon.iter().cycle().skip(1);
     let (mut area, mut longest) = (0.0, 0.0f64);
-    for (a, b) in polygon.iter().zip(ends) {
+    for [a, b] in edges(polygon) {
         area += a[0] * b[1] - a[1] * b[0];
         longest = longest.max(libm::hypot(b[0] - a[0], b[1] - a[1]));
     }
     if longest > 0.0 { area / longest } else { 0.0 }
-}
-
-/// Returns the convex hull, counter-clockwise. Used for cells that rounding has made non-convex.
-pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    points.dedup();
-    let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {
-        let mut chain: Vec<[f64; 2]> = Vec::new();
-        for point in points {
-            while let [.., a, b] = chain.as_slice() {
-                if orientation(*a, *b, point) > 0.0 {
-                    break;
-                }
-                chain.pop();
-            }
-            chain.push(point);
-        }
-        chain.pop();
-        chain
-    };
-    let mut lower = chain(&mut points.iter().copied());
-    lower.extend(chain(&mut points.iter().rev().copied()));
-    lower
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ pub struct Sight {
 /// A visibility set with its tag transformed to the goal frame, in some arithmetic.
 #[derive(Clone, Copy, Debug)]
 pub struct Resolved<S> {
-    pub(super) set: Visibility,
+    pub(crate) set: Visibility,
     /// Tag centre in the goal frame, metres.
     pub(crate) centre: Vector<S>,
     /// Tag corners in the goal frame, metres, in AprilTag's order.

@@ -2,7 +2,7 @@
 //!
 //! [`verify`] reads the bytes as the firmware does ([`crate::table`]), and proves every run inside the
 //! success set of the site with outward-rounded intervals ([`crate::certify`]). It computes no border as
-//! the baker does: [`crate::bake`] solves for the borders in closed form on plain floats, this module
+//! the baker does: [`crate::bake`] searches the borders on plain floats, this module
 //! encloses the definition of the set. What both use: that definition and the choice of its parts ([`crate::shape`]; a wrong choice
 //! costs area), which the reference cases and the tests' oracle check independently; the cosine and sine of the goal; and the clearance that baking
 //! leaves to the rounding of the estimate, whose row of the error budget a search measures.

@@ -1,7 +1,7 @@
 //! The volume of SE(2) that a table contains.
 
 use super::facets::{Line, lines};
-use crate::certify::{Interval, goal_cos_sin};
+use crate::certify::{Interval, goal_cos_sin, radians};
 use crate::shape::SuccessSet;
 use crate::table::Table;
 use rayon::prelude::*;
@@ -46,10 +46,6 @@ fn of_cells(table: &Table<'_>) -> f64 {
         }
     }
     count as f64 * edge * edge * slab
-}
-
-fn radians(units: i64) -> f64 {
-    units as f64 / 4_294_967_296.0 * core::f64::consts::TAU
 }
 
 /// A piece's arc, 2^-32 turn above the goal's heading, and its lines.

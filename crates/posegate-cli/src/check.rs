@@ -2,9 +2,10 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site_and_text};
 use posegate::bake::{BakeInput, check};
+use posegate::shape::MinSlack;
 use posegate_files::files::{Files, Input, OutputFolder};
 use posegate_show::doctor::{Findings, Look, Warning, decision_costs, examine};
-use posegate_show::draw::{MinSlack, site_pictures};
+use posegate_show::draw::site_pictures;
 use serde_json::{Value, json};
 
 /// Checks a site file: everything is validated, nothing is built

@@ -221,6 +221,45 @@ fn yaw_arcs_end_at_their_headings() {
     assert!(!along.at(ends[1] - 1e-9).stretches(&standing).is_empty());
 }
 
+/// Returns three numbers from -0.5 to 0.5 that look random.
+fn shares(k: u32) -> [f64; 3] {
+    let share = |base: u32| f64::from(k.wrapping_mul(base) >> 16 & 0xffff) / 65_536.0 - 0.5;
+    [2_654_435_761, 2_246_822_519, 3_266_489_917].map(share)
+}
+
+/// At poses of every task of some sites, half of them near the goal, because sets may be small.
+#[test]
+fn least_slack_equals_the_least_of_membership() {
+    let bay = include_str!("../../../examples/sites/loading-bay.toml");
+    let lens = include_str!("../../../examples/sites/lens.toml");
+    for text in [posegate_site::SAMPLE, bay, lens] {
+        let site = posegate_site::Site::parse(text, "site.toml").unwrap();
+        for (name, task) in &site.tasks {
+            let evaluator = task.success.evaluator();
+            let goal = task.success.goal;
+            let mut inside = 0;
+            for k in 0..2_000_u32 {
+                let [x, y, yaw] = shares(k);
+                let near = if k % 2 == 0 { 1.0 } else { 0.03 };
+                let pose = [
+                    goal.x + near * 6.0 * x,
+                    goal.y + near * 4.0 * y,
+                    goal.yaw_deg.to_radians() + near * 0.8 * yaw,
+                ];
+                let known = task.success.membership(pose);
+                let slacks = known.slack.iter().map(|(_, slack)| *slack);
+                let least = evaluator.least(pose);
+                let expected = slacks.fold(f64::INFINITY, f64::min);
+                assert_eq!(least.slack, expected, "{name}: {pose:?}");
+                assert!(known.slack.contains(&(least.name, least.slack)), "{name}");
+                assert_eq!(evaluator.holds(pose), known.inside, "{name}: {pose:?}");
+                inside += u32::from(known.inside);
+            }
+            assert!(inside > 0, "{name}");
+        }
+    }
+}
+
 #[test]
 fn view_evaluator_agrees_with_membership() {
     let site = posegate_site::Site::parse(posegate_site::SAMPLE, "site.toml").unwrap();
@@ -228,12 +267,8 @@ fn view_evaluator_agrees_with_membership() {
     let watch = set.evaluator();
     let mut both = [0; 2];
     for k in 0..20_000_u32 {
-        let share = |base: u32| f64::from(k.wrapping_mul(base) >> 16 & 0xffff) / 65_536.0 - 0.5;
-        let pose = [
-            9.0 * share(2_654_435_761),
-            6.0 * share(2_246_822_519),
-            3.0 * share(3_266_489_917),
-        ];
+        let [x, y, yaw] = shares(k);
+        let pose = [9.0 * x, 6.0 * y, 3.0 * yaw];
         let known = set.membership(pose);
         let near = known.slack.iter().any(|(_, slack)| slack.abs() < 1e-9);
         match watch.at(pose) {

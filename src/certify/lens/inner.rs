@@ -5,7 +5,7 @@
 //! corners that add least are removed until few are left.
 
 use super::outline::Outline;
-use crate::shape::Window;
+use crate::shape::{Window, clipped, edges, hull};
 
 type Point = [f64; 2];
 
@@ -27,7 +27,7 @@ impl Outline {
     /// Returns a convex polygon within the outline, counter-clockwise, of at most [`Window::MOST`] corners.
     pub fn inner(&self) -> Vec<Point> {
         // A hull of few corners makes the rotation search fast.
-        let hull = reduced(hull(&self.border), 0.01 * WORTH, usize::MAX);
+        let hull = reduced(hull(self.border.clone()), 0.01 * WORTH, usize::MAX);
         let size = libm::sqrt(solid_angle(&hull));
         let mut cuts: Vec<Cut> = Vec::new();
         let mut polygon = hull.clone();
@@ -46,8 +46,8 @@ impl Outline {
     /// Returns a line parallel to an edge through the deepest outline point behind it, as seen from the
     /// centre; `None` if no outline point is within the polygon.
     fn deepest(&self, polygon: &[Point]) -> Option<Cut> {
-        let edges: Vec<(Cut, f64)> = (0..polygon.len())
-            .map(|at| Cut::along(polygon[at], polygon[(at + 1) % polygon.len()]))
+        let edges: Vec<(Cut, f64)> = edges(polygon)
+            .map(|[from, to]| Cut::along(from, to))
             .map(|edge| (edge, edge.depth(self.centre)))
             .collect();
         // The position of a point between the centre and the edge behind it, as a share.
@@ -162,50 +162,12 @@ fn triangle(a: Point, b: Point, c: Point) -> f64 {
 
 /// Returns `true` if a point is in a convex polygon by more than a distance.
 fn is_within(polygon: &[Point], point: Point, least: f64) -> bool {
-    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    polygon.len() >= 3
-        && edges
-            .into_iter()
-            .all(|(from, to)| Cut::along(*from, *to).depth(point) > least)
-}
-
-/// Returns the convex hull, counter-clockwise (Andrew's monotone chain).
-fn hull(points: &[Point]) -> Vec<Point> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    let chain = |points: &mut dyn Iterator<Item = &Point>| {
-        let mut chain: Vec<Point> = Vec::new();
-        for point in points {
-            while let [.., a, b] = chain[..] {
-                if turn(a, b, *point) > 0.0 {
-                    break;
-                }
-                chain.pop();
-            }
-            chain.push(*point);
-        }
-        chain.pop();
-        chain
-    };
-    let mut lower = chain(&mut sorted.iter());
-    lower.extend(chain(&mut sorted.iter().rev()));
-    lower
+    polygon.len() >= 3 && edges(polygon).all(|[from, to]| Cut::along(from, to).depth(point) > least)
 }
 
 /// Returns the part of a convex polygon in a half-plane.
 fn clip(polygon: &[Point], cut: &Cut) -> Vec<Point> {
-    let mut part = Vec::with_capacity(polygon.len() + 1);
-    for (from, to) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
-        let (a, b) = (cut.depth(*from), cut.depth(*to));
-        if a >= 0.0 {
-            part.push(*from);
-        }
-        if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
-            let share = a / (a - b);
-            part.push([0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])));
-        }
-    }
-    part
+    clipped(polygon, |point| cut.depth(point))
 }
 
 /// Removes the corners that add least: all that add less than a share of the polygon, and more until few

@@ -2,7 +2,7 @@
 //! proven.
 
 use super::proof::Region;
-use crate::shape::Lens;
+use crate::shape::{Lens, edges, farthest_holding};
 
 /// Number of rays of an outline, evenly spaced around its centre.
 const RAYS: u32 = 96;
@@ -131,7 +131,7 @@ impl Region {
         const PARTS: u32 = 32;
         let [x, y] = outline.centre;
         let mut angles = Vec::new();
-        for (from, to) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        for [from, to] in edges(polygon) {
             for part in 0..PARTS {
                 let share = f64::from(part) / f64::from(PARTS);
                 let off = [
@@ -168,15 +168,9 @@ impl Region {
                 break;
             }
         }
-        for _ in 0..44 {
-            let middle = 0.5 * (inside + outside);
-            if self.contains(at(middle)) {
-                inside = middle;
-            } else {
-                outside = middle;
-            }
-        }
-        at(inside)
+        at(farthest_holding(inside, outside, 44, |t| {
+            self.contains(at(t))
+        }))
     }
 }
 

@@ -4,7 +4,7 @@ use super::LensError;
 use super::field::FARTHEST;
 use super::inner::solid_angle;
 use super::proof::Region;
-use crate::shape::{Camera, Edge, Lens, Window};
+use crate::shape::{Camera, Edge, Lens, Window, edges};
 
 /// The image that a detector reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -266,9 +266,8 @@ impl Region {
 
 /// Returns the planes of a polygon's edges, counter-clockwise.
 fn planes(polygon: &[[f64; 2]]) -> Vec<[f64; 3]> {
-    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    edges
-        .map(|([ax, ay], [bx, by])| {
+    edges(polygon)
+        .map(|[[ax, ay], [bx, by]]| {
             let (dx, dy) = (bx - ax, by - ay);
             let length = libm::hypot(dx, dy);
             let (a, b) = (-dy / length, dx / length);

@@ -10,10 +10,10 @@ pub use self::view::ViewAlongLine;
 use self::stretch::{intersect, roots, unite};
 use self::view::{ViewAt, cone, length, moved, sphere};
 use super::boxed::is_whole_circle;
+use super::prepared::{Kind, Node, Prepared};
 use super::scalar::{ALL, dot};
-use super::side::Line;
-use super::visibility::{Resolved, Sight};
-use super::{BoxSet, ErrorLimit, Exclusion, Footprint, Planar, PoseDeg, Scalar, Shape, SuccessSet};
+use super::visibility::Sight;
+use super::{BoxSet, ErrorLimit, Planar, SuccessSet};
 
 mod stretch;
 mod view;
@@ -46,56 +46,36 @@ impl LineSegment {
 /// A success set prepared for intersection with line segments.
 #[derive(Debug)]
 pub struct LineClipper {
-    node: Node,
-    views: Vec<Resolved<f64>>,
-}
-
-#[derive(Debug)]
-enum Node {
-    Box(BoxSet, u32),
-    Footprint(Footprint, u32),
-    /// Index among the views.
-    View(usize, u32),
-    Limit(usize, ErrorLimit, u32),
-    /// At least this far from the tag, metres.
-    Near(Box<Resolved<f64>>, f64, u32),
-    /// Outside of a cone about the tag's normal: cosine, and distance of its tip behind the tag.
-    Square(Box<Resolved<f64>>, [f64; 2], u32),
-    /// In at least one of these half-planes, each with its number. Half-planes without any pose are omitted.
-    Sides(Vec<(u32, Line<f64>)>, u32),
-    Any(Vec<Self>),
-    All(Vec<Self>),
+    set: Prepared,
 }
 
 impl LineClipper {
     /// Prepares a set.
     pub fn of(set: &SuccessSet) -> Self {
-        let mut views = Vec::new();
-        let mut number = 0;
-        let node = node(&set.shape, set.goal, &mut views, &mut number);
-        Self { node, views }
+        let set = Prepared::of(set);
+        Self { set }
     }
 
     /// Returns the number of views of tags in the set.
     pub fn views(&self) -> usize {
-        self.views.len()
+        self.set.views.len()
     }
 
     /// Returns the headings of the goal frame at which arcs end, radians: a set may begin or end there abruptly.
     pub fn ends_of_arcs(&self) -> Vec<f64> {
         fn collect(node: &Node, into: &mut Vec<f64>) {
-            match node {
-                Node::Box(set, _) if !is_whole_circle(set.yaw_deg) => {
+            match &node.kind {
+                Kind::Box(set) if !is_whole_circle(set.yaw_deg) => {
                     into.extend(set.yaw_deg.map(f64::to_radians));
                 }
-                Node::Any(nodes) | Node::All(nodes) => {
+                Kind::Any(nodes) | Kind::All(nodes) => {
                     nodes.iter().for_each(|node| collect(node, into));
                 }
                 _ => {}
             }
         }
         let mut all = Vec::new();
-        collect(&self.node, &mut all);
+        collect(&self.set.root, &mut all);
         all
     }
 
@@ -108,60 +88,12 @@ impl LineClipper {
             cos,
             sin,
         };
-        let views = self.views.iter().map(|view| ViewAt::new(view, &origin));
+        let views = self.set.views.iter().map(|view| ViewAt::new(view, &origin));
         Headed {
             all: self,
             yaw,
             origin,
             views: views.collect(),
-        }
-    }
-}
-
-fn node(shape: &Shape, goal: PoseDeg, views: &mut Vec<Resolved<f64>>, number: &mut u32) -> Node {
-    *number = number.wrapping_add(EACH);
-    let own = *number;
-    match shape {
-        Shape::Box(set) => Node::Box(*set, own),
-        Shape::Footprint(set) => Node::Footprint(set.clone(), own),
-        Shape::Visibility(set) => {
-            views.push(set.resolve(goal));
-            Node::View(views.len() - 1, own)
-        }
-        Shape::Bounded { view, limit } => {
-            views.push(view.resolve(goal));
-            let place = views.len() - 1;
-            Node::All(std::vec![
-                Node::View(place, own),
-                Node::Limit(place, *limit, own + EACH / 2),
-            ])
-        }
-        Shape::Apart(Exclusion::Near { view, d_min }) => {
-            let least = d_min + view.tolerance_margins().ray;
-            Node::Near(Box::new(view.resolve(goal)), least, own)
-        }
-        Shape::Apart(Exclusion::Square { view, psi_min_deg }) => {
-            let (psi_min_deg, back) = view.too_head_on(*psi_min_deg);
-            let cosine = f64::cos_sin_deg(psi_min_deg)[0];
-            Node::Square(Box::new(view.resolve(goal)), [cosine, back], own)
-        }
-        Shape::Apart(set) => {
-            let sides = set.sides(goal).into_iter();
-            let lines = sides.map(|side| side.resolve::<f64>(goal));
-            let numbered = (0..).zip(lines);
-            Node::Sides(
-                numbered.filter(|(_, line)| line.is_possible()).collect(),
-                own,
-            )
-        }
-        Shape::Any(sets) | Shape::All(sets) => {
-            let nodes = sets.iter().map(|set| node(set, goal, views, number));
-            let nodes = nodes.collect();
-            if matches!(shape, Shape::Any(_)) {
-                Node::Any(nodes)
-            } else {
-                Node::All(nodes)
-            }
         }
     }
 }
@@ -187,7 +119,7 @@ impl Headed<'_> {
     /// Like [`Self::stretches`], into a list that is cleared first: many line segments need one allocation.
     pub fn stretches_into(&self, walk: &LineSegment, into: &mut Vec<LineInterval>) {
         into.clear();
-        self.of_node(&self.all.node, walk, None, into);
+        self.of_node(&self.all.set.root, walk, None, into);
     }
 
     /// Returns the intervals as [`Self::stretches`], and those from which each view sees its tag: the view's number,
@@ -201,7 +133,7 @@ impl Headed<'_> {
             self.of_view(view, 0, walk, |interval| seen.push((view, interval)));
         }
         let mut all = Vec::new();
-        self.of_node(&self.all.node, walk, Some(&seen), &mut all);
+        self.of_node(&self.all.set.root, walk, Some(&seen), &mut all);
         (all, seen)
     }
 
@@ -219,7 +151,7 @@ impl Headed<'_> {
 
     /// Returns the distance and angles of a view along a line segment, whether or not the tag is visible.
     pub fn sight(&self, view: usize, walk: &LineSegment) -> ViewAlongLine {
-        let (resolved, at) = (&self.all.views[view], &self.views[view]);
+        let (resolved, at) = (&self.all.set.views[view], &self.views[view]);
         ViewAlongLine {
             ray: moved(&at.ray, walk),
             back: self.back(at.back, walk),
@@ -236,7 +168,7 @@ impl Headed<'_> {
     /// Returns the unit directions on the floor from the tag to where a view sees it best: along the tag's normal,
     /// against the optical axis, and between the two. Fewer if one of them is vertical.
     pub fn before_tag(&self, view: usize) -> impl Iterator<Item = [f64; 2]> {
-        let view = &self.all.views[view];
+        let view = &self.all.set.views[view];
         let Planar { cos, sin, .. } = self.origin;
         let [x, y] = [view.axes[0][0], view.axes[1][0]];
         let ahead = unit([cos * x - sin * y, sin * x + cos * y]);
@@ -271,62 +203,53 @@ impl Headed<'_> {
     ) {
         let whole = LineInterval::of(walk.length);
         let from = all.len();
-        match node {
-            Node::Box(set, number) => all.extend(self.of_box(set, *number, walk)),
-            Node::Footprint(set, number) => {
+        let number = node.number.wrapping_mul(EACH);
+        match &node.kind {
+            Kind::Box(set) => all.extend(self.of_box(set, number, walk)),
+            Kind::Footprint(set) => {
                 let slacks = |t: f64, note: &mut dyn FnMut(usize, f64)| {
                     let pose = self.pose(walk, t);
                     set.slacks(&pose, ALL, 0, &mut |index, _, slack| note(index, slack));
                 };
-                all.extend(affine(whole, *number, slacks));
+                all.extend(affine(whole, number, slacks));
             }
-            Node::View(view, number) => match seen {
-                Some(seen) => {
-                    let own = seen.iter().filter(|(of, _)| of == view);
-                    all.extend(own.map(|(_, interval)| interval.numbered(*number)));
+            Kind::View(view, limit) => {
+                match seen {
+                    Some(seen) => {
+                        let own = seen.iter().filter(|(of, _)| of == view);
+                        all.extend(own.map(|(_, interval)| interval.numbered(number)));
+                    }
+                    None => self.of_view(*view, number, walk, |interval| all.push(interval)),
                 }
-                None => self.of_view(*view, *number, walk, |interval| all.push(interval)),
-            },
-            Node::Limit(view, limit, number) => {
-                let sight = self.sight(*view, walk);
-                let set = &self.all.views[*view].set;
-                let slack = |t: f64| {
-                    let [d, phi, psi] = sight.at(t);
-                    let corners_px = [None; 4];
-                    let sight = Sight {
-                        d,
-                        phi,
-                        psi,
-                        corners_px,
-                    };
-                    limit.slack(set, &sight)
-                };
-                let mut ends = roots(&whole, SAMPLES, slack);
-                whole.parts(
-                    &mut ends,
-                    *number,
-                    |t| slack(t) >= 0.0,
-                    |part| all.push(part),
-                );
+                let middle = all.len();
+                if let Some(limit) = limit.as_ref().filter(|_| middle > from) {
+                    self.of_limit(*view, limit, number + EACH / 2, walk, all);
+                    intersect(all, from, middle);
+                }
             }
-            Node::Near(view, least, number) => {
+            Kind::Near(view, d_min) => {
+                let least = d_min + view.less.ray;
                 let [at, way] = self.back(view.tag_to_camera(&self.origin), walk);
-                let mut ends = sphere(at, way, *least);
-                let far = |t: f64| length(at, way, t) >= *least;
-                whole.parts(&mut ends, *number, far, |part| all.push(part));
+                let mut ends = sphere(at, way, least);
+                let far = |t: f64| length(at, way, t) >= least;
+                whole.parts(&mut ends, number, far, |part| all.push(part));
             }
-            Node::Square(view, [cosine, behind], number) => {
+            Kind::Square {
+                view,
+                cosine,
+                back: behind,
+            } => {
                 let back = view.tag_to_camera(&self.origin);
                 let back = [0, 1, 2].map(|i| back[i] + behind * view.normal[i]);
                 let [at, way] = self.back(back, walk);
                 let along = [dot(view.normal, at), dot(view.normal, way)];
                 let mut ends = cone(at, way, along, *cosine);
                 let outside = |t: f64| cosine * length(at, way, t) >= along[0] + t * along[1];
-                whole.parts(&mut ends, *number, outside, |part| all.push(part));
+                whole.parts(&mut ends, number, outside, |part| all.push(part));
             }
-            Node::Sides(sides, number) => {
+            Kind::Sides { lines, .. } => {
                 let (start, end) = (self.pose(walk, 0.0), self.pose(walk, whole.to));
-                for (index, side) in sides {
+                for (index, side) in lines {
                     let number = number.wrapping_add(64 * (index % 64));
                     let mut left = Some(whole);
                     for (index, point) in (0..).zip(&side.points) {
@@ -334,19 +257,17 @@ impl Headed<'_> {
                         let slope = (side.of_point(&end, *point) - at) / whole.to;
                         left = left.and_then(|left| left.clipped(at, slope, number + index % 64));
                     }
-                    if let Some(left) = left {
-                        all.push(left);
-                    }
+                    all.extend(left);
                 }
                 unite(all, from);
             }
-            Node::Any(nodes) => {
+            Kind::Any(nodes) => {
                 for node in nodes {
                     self.of_node(node, walk, seen, all);
                 }
                 unite(all, from);
             }
-            Node::All(nodes) => {
+            Kind::All(nodes) => {
                 all.push(whole);
                 for node in nodes {
                     let middle = all.len();
@@ -358,6 +279,34 @@ impl Headed<'_> {
                 }
             }
         }
+    }
+
+    /// Appends the intervals in which the error of a view's observation is within a limit.
+    fn of_limit(
+        &self,
+        view: usize,
+        limit: &ErrorLimit,
+        number: u32,
+        walk: &LineSegment,
+        all: &mut Vec<LineInterval>,
+    ) {
+        let sight = self.sight(view, walk);
+        let set = &self.all.set.views[view].set;
+        let slack = |t: f64| {
+            let [d, phi, psi] = sight.at(t);
+            let corners_px = [None; 4];
+            let sight = Sight {
+                d,
+                phi,
+                psi,
+                corners_px,
+            };
+            limit.slack(set, &sight)
+        };
+        let whole = LineInterval::of(walk.length);
+        let mut ends = roots(&whole, SAMPLES, slack);
+        let holds = |t: f64| slack(t) >= 0.0;
+        whole.parts(&mut ends, number, holds, |part| all.push(part));
     }
 
     fn of_box(&self, set: &BoxSet, number: u32, walk: &LineSegment) -> Option<LineInterval> {

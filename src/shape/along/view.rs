@@ -90,7 +90,7 @@ impl Headed<'_> {
         walk: &LineSegment,
         mut note: impl FnMut(LineInterval),
     ) {
-        let resolved = &self.all.views[view];
+        let resolved = &self.all.set.views[view];
         let at = &self.views[view];
         let Some(left) = self.of_convex_view(resolved, at, number, walk) else {
             return;

@@ -29,10 +29,7 @@ impl Bodies {
         fn collect(set: &SuccessSet, shape: &Shape, in_union: bool, into: &mut Vec<Body>) {
             match shape {
                 Shape::Apart(apart) => {
-                    let sides = apart.sides(set.goal).into_iter();
-                    into.push(Body::Beyond(
-                        sides.map(|side| side.resolve(set.goal)).collect(),
-                    ));
+                    into.push(Body::Beyond(apart.lines(set.goal).collect()));
                 }
                 Shape::Box(set) if in_union => into.push(Body::Box(*set)),
                 Shape::Footprint(set) if in_union => into.push(Body::Footprint(set.clone())),

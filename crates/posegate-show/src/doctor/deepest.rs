@@ -1,7 +1,7 @@
 //! Searches the deepest pose of a success set, to check that the set is not empty.
 
 use crate::draw::ingredients::{frame, radians};
-use crate::draw::{MinSlack, SlackEvaluator};
+use posegate::shape::{MinSlack, SetEvaluator};
 use posegate_site::Task;
 
 /// The deepest pose that was found in a set.
@@ -23,7 +23,7 @@ const FAR: f64 = 10.0;
 /// Searches the deepest pose within the range that the site file gives for the task's table: its extent,
 /// or twice its expected pose-set. Without either, the range is 10 m and a quarter turn about the goal.
 #[must_use]
-pub fn deepest(task: &Task, depth: &SlackEvaluator) -> Deepest {
+pub fn deepest(task: &Task, depth: &SetEvaluator) -> Deepest {
     let quarter = core::f64::consts::FRAC_PI_2;
     let about = |reach: f64, turn: f64| [[-reach, reach], [-reach, reach], [-turn, turn]];
     let ranges = match (task.wish.extent, task.wish.expected) {
@@ -41,7 +41,7 @@ pub fn deepest(task: &Task, depth: &SlackEvaluator) -> Deepest {
         let pose = [x, y, goal[2] + pose[2]];
         Deepest {
             pose,
-            least: depth.at(pose),
+            least: depth.least(pose),
         }
     };
     let along = |axis: usize, k: u32| {

@@ -469,7 +469,7 @@ fn hidden(shape: &Shape, task: &Task, about: [&str; 2], all: &mut Vec<Warning>) 
             sets.iter().for_each(|set| hidden(set, task, about, all));
         }
         Shape::Apart(set @ Exclusion::Hidden { view, wall })
-            if set.sides(task.success.goal).is_empty() =>
+            if set.lines(task.success.goal).next().is_none() =>
         {
             all.push(warn(
                 "tag_in_wall",

@@ -29,7 +29,7 @@ mod tests;
 mod warning;
 
 use crate::draw::ingredients::{Ingredients, axes, heading, radians};
-use crate::draw::{MinSlack, SlackEvaluator};
+use posegate::shape::MinSlack;
 use posegate::shape::{Exclusion, Pose3Deg, Shape, SuccessSet, Tag, Tolerance, Visibility};
 use posegate_site::{Site, SiteCamera, Task};
 
@@ -121,7 +121,7 @@ pub fn examine(site: &Site) -> Findings {
         }
     });
     let tasks = site.tasks.iter().map(|(name, task)| {
-        let depth = SlackEvaluator::of(&task.success);
+        let depth = task.success.evaluator();
         TaskFinding {
             name: name.clone(),
             at_goal: slack_at_goal(&task.success),
@@ -207,14 +207,8 @@ fn slack_at_goal(set: &SuccessSet) -> MinSlack {
         .iter()
         .filter(|(name, slack)| *name != "wall" || *slack < 0.0);
     let least = known.min_by(|a, b| a.1.total_cmp(&b.1));
-    least.map_or(
-        MinSlack {
-            slack: f64::INFINITY,
-            name: "all",
-        },
-        |(name, slack)| MinSlack {
-            slack: *slack,
-            name,
-        },
-    )
+    least.map_or(MinSlack::EVERYTHING, |(name, slack)| MinSlack {
+        slack: *slack,
+        name,
+    })
 }

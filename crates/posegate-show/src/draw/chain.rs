@@ -1,7 +1,6 @@
 //! Draws a chain step by step, as in the paper's Figs. 2 and 3: the pose-sets before and after each step, and
 //! S.
 
-use super::depth::SlackEvaluator;
 use super::hall::{hall, hall_legend};
 use super::legend::{Sample, legend};
 use super::palette;
@@ -131,7 +130,7 @@ fn panel(
     };
     panel.draw(picture, &what, tick_at_scale(scale, 60.0), |inside| {
         if let Some(set) = success {
-            let depth = SlackEvaluator::of(set);
+            let depth = set.evaluator();
             let heading = shown(step).pose[2];
             let holds = |[x, y]: [f64; 2]| depth.holds([x, y, heading]);
             let area: Vec<Vec<[f64; 2]>> = border(&holds, &window, 1.5 / scale);

@@ -1,6 +1,5 @@
 //! Fig. 2 of the paper: a look at the tag makes docking certain. The pose-set before and after each task.
 
-use super::depth::SlackEvaluator;
 use super::legend::{Sample, legend};
 use super::palette;
 use super::panel::{Panel, Window, tick_at_scale};
@@ -106,7 +105,7 @@ fn panel(
     };
     panel.draw(picture, title, tick_at_scale(scale, 60.0), |inside| {
         if let Some(set) = set {
-            let depth = SlackEvaluator::of(set);
+            let depth = set.evaluator();
             let holds = |[x, y]: [f64; 2]| depth.holds([x, y, heading]);
             inside.success_set(&border(&holds, &window, 1.5 / scale));
         }

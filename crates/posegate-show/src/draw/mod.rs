@@ -17,7 +17,6 @@
 pub use self::belief::PoseSetF64;
 pub(crate) use self::borders::borders_picture;
 pub use self::chain::chain_picture;
-pub use self::depth::{MinSlack, SlackEvaluator};
 pub use self::fig2::fig2_chain;
 pub use self::fig4::fig4_placement;
 pub use self::growth::logarithmic;
@@ -41,7 +40,6 @@ mod answers;
 mod belief;
 mod borders;
 mod chain;
-mod depth;
 mod fig2;
 mod fig4;
 mod floor;

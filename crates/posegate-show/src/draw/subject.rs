@@ -1,13 +1,13 @@
 //! The subject of a picture: a task's set, its table, and pose-sets.
 
 use super::belief::PoseSetF64;
-use super::depth::SlackEvaluator;
 use super::panel::Window;
 use super::section::border;
 use posegate::bake::extent;
 use posegate::confidence::core_radius;
 use posegate::gate::{Verdict, judge};
 use posegate::set::{RadiusSquared, Uncertainty};
+use posegate::shape::SetEvaluator;
 use posegate::shape::{Planar, PoseDeg, Scalar};
 use posegate::table::{Table, TableError};
 use posegate_replay::{Row, factor_text};
@@ -23,7 +23,7 @@ pub struct Subject<'a> {
     /// The task.
     pub task: &'a Task,
     /// The task's set, prepared for evaluation.
-    pub depth: SlackEvaluator,
+    pub depth: SetEvaluator,
     /// The task's table; `None` if none was added.
     pub table: Option<Table<'a>>,
     /// Pose-sets to draw.
@@ -82,7 +82,7 @@ impl<'a> Subject<'a> {
             site,
             name,
             task,
-            depth: SlackEvaluator::of(&task.success),
+            depth: task.success.evaluator(),
             table: None,
             beliefs: Vec::new(),
             left_out: 0,
