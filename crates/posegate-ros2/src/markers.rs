@@ -39,38 +39,27 @@ pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerA
             let (s, c) = (libm::sin(angle), libm::cos(angle));
             [x + axes[0] * c, y + axes[1] * c + axes[2] * s, 0.02]
         });
-        markers.push(marker(
-            answer,
-            last,
-            0,
-            LINE_STRIP,
-            [0.01; 3],
-            rgb,
-            0.9,
-            corners.collect(),
-        ));
-        markers.push(marker(
-            answer,
-            last,
-            1,
-            TRIANGLE_LIST,
-            [1.0; 3],
-            rgb,
-            0.4,
-            fan([x, y, yaw], reach),
-        ));
+        let outline = Marker {
+            kind: LINE_STRIP,
+            scale: [0.01; 3],
+            color: color(rgb, 0.9),
+            ..marker(answer, last, 0, corners.collect())
+        };
+        let headings = Marker {
+            kind: TRIANGLE_LIST,
+            scale: [1.0; 3],
+            color: color(rgb, 0.4),
+            ..marker(answer, last, 1, fan([x, y, yaw], reach))
+        };
+        markers.extend([outline, headings]);
     }
     let (points, step) = section(table, yaw);
-    markers.push(marker(
-        answer,
-        last,
-        2,
-        CUBE_LIST,
-        [step, step, 0.005],
-        [0.2, 0.5, 0.9],
-        0.4,
-        points,
-    ));
+    markers.push(Marker {
+        kind: CUBE_LIST,
+        scale: [step, step, 0.005],
+        color: color([0.2, 0.5, 0.9], 0.4),
+        ..marker(answer, last, 2, points)
+    });
     MarkerArray { markers }
 }
 
@@ -142,17 +131,13 @@ fn section(table: &Table<'_>, yaw: f64) -> (Vec<[f64; 3]>, f64) {
     (points, f64::from(step) * 1e-6)
 }
 
-#[expect(clippy::too_many_arguments, reason = "a marker has so many fields")]
-fn marker(
-    answer: &Answer,
-    last: &LastReport,
-    id: i32,
-    kind: i32,
-    scale: [f64; 3],
-    [r, g, b]: [f32; 3],
-    opacity: f32,
-    points: Vec<[f64; 3]>,
-) -> Marker {
+fn color([r, g, b]: [f32; 3], opacity: f32) -> Color {
+    Color {
+        rgba: [r, g, b, opacity],
+    }
+}
+
+fn marker(answer: &Answer, last: &LastReport, id: i32, points: Vec<[f64; 3]>) -> Marker {
     Marker {
         header: Header {
             stamp: answer.now.time(),
@@ -160,28 +145,15 @@ fn marker(
         },
         ns: "posegate".into(),
         id,
-        kind,
         // Viewers refuse an empty list: delete the earlier markers.
         action: if points.is_empty() { 2 } else { 0 },
         pose: Pose {
             position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
         },
-        scale,
-        color: Color {
-            rgba: [r, g, b, opacity],
-        },
         // Markers of a node that has ended disappear.
         lifetime: (3, 0),
-        frame_locked: false,
         points,
-        colors: Vec::new(),
-        texture_resource: String::new(),
-        texture: (Header::default(), String::new(), Vec::new()),
-        uv_coordinates: Vec::new(),
-        text: String::new(),
-        mesh_resource: String::new(),
-        mesh_file: (String::new(), Vec::new()),
-        mesh_use_embedded_materials: false,
+        ..Marker::default()
     }
 }

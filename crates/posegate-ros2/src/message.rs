@@ -42,7 +42,7 @@ pub struct Header {
 }
 
 /// `geometry_msgs/msg/Pose`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// x, y, z, metres.
     pub position: [f64; 3],
@@ -290,14 +290,14 @@ pub struct DiagnosticArray {
 }
 
 /// `std_msgs/msg/ColorRGBA`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Color {
     /// Red, green, blue and opacity, from 0 to 1.
     pub rgba: [f32; 4],
 }
 
 /// `visualization_msgs/msg/Marker`, with `sensor_msgs/msg/CompressedImage` and `MeshFile` written out.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
     /// Time and frame.
     pub header: Header,
