@@ -1,11 +1,11 @@
 //! The parameters of the node as the services of `rcl_interfaces` report them. None of them can be set while the node runs: they are settings
 //! of the gate, which checks that its settings do not change.
 
-use crate::parameters::Value;
 use ros2_client::parameters::raw::{
     Parameter, ParameterDescriptor, ParameterType, ParameterValue, SetParametersResult,
 };
 use ros2_client::rcl_interfaces::{ListParametersRequest, ListParametersResult};
+use serde_norway::Value;
 use std::collections::BTreeMap;
 
 /// The parameters that a node reports, by name, with their values as given or by default.
@@ -89,23 +89,25 @@ fn raw(value: Option<&Value>) -> ParameterValue {
         string_array: Vec::new(),
     };
     match value {
-        None => {}
         Some(Value::Bool(value)) => {
             raw.ptype = ParameterType::BOOL;
             raw.boolean_value = *value;
         }
-        Some(Value::Integer(value)) => {
-            raw.ptype = ParameterType::INTEGER;
-            raw.int_value = *value;
-        }
-        Some(Value::Double(value)) => {
-            raw.ptype = ParameterType::DOUBLE;
-            raw.double_value = *value;
-        }
-        Some(Value::Text(value)) => {
+        Some(Value::String(value)) => {
             raw.ptype = ParameterType::STRING;
             raw.string_value.clone_from(value);
         }
+        Some(Value::Number(number)) => match number.as_i64() {
+            Some(value) => {
+                raw.ptype = ParameterType::INTEGER;
+                raw.int_value = value;
+            }
+            None => {
+                raw.ptype = ParameterType::DOUBLE;
+                raw.double_value = number.as_f64().unwrap_or_default();
+            }
+        },
+        _ => {}
     }
     raw
 }
@@ -117,10 +119,10 @@ mod tests {
     #[test]
     fn parameters_are_listed_and_described_with_their_types() {
         let reported = ReportedParameters(BTreeMap::from([
-            ("frame_id", Value::Text("map".into())),
-            ("max_speed", Value::Double(0.3)),
-            ("cycle_ms", Value::Integer(20)),
-            ("markers", Value::Bool(true)),
+            ("frame_id", Value::from("map")),
+            ("max_speed", Value::from(0.3)),
+            ("cycle_ms", Value::from(20)),
+            ("markers", Value::from(true)),
         ]));
         let listed = reported.list(&ListParametersRequest {
             prefixes: Vec::new(),
@@ -144,7 +146,7 @@ mod tests {
         );
         let wanted = Parameter {
             name: "max_speed".into(),
-            value: raw(Some(&Value::Double(0.1))),
+            value: raw(Some(&Value::from(0.1))),
         };
         assert!(!refused(&[wanted]).successful);
     }
