@@ -5,10 +5,7 @@ use crate::clock::Now;
 use crate::decider::Decider;
 use crate::diagnostics::explanation;
 use crate::link::{Link, SOURCE};
-use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, MarkerArray, OK,
-    Odometry, Time,
-};
+use crate::message::{DiagnosticStatus, ERROR, KeyValue, OK, Time};
 use crate::permission::{DENY, PERMIT};
 use crate::permit_gate::{Answer, Order, Origin};
 use crate::poses::PoseReport;
@@ -196,20 +193,6 @@ impl Decider for Bridge {
         self.answer(now)
     }
 
-    fn detections(&mut self, now: Now, _: &AprilTagDetectionArray, _: Origin) -> Answer {
-        self.answer(now)
-    }
-
-    fn camera_info(&mut self, _: Option<&CameraInfo>) {}
-
-    fn odometry(&mut self, now: Now, _: &Odometry, _: Origin) -> Answer {
-        self.answer(now)
-    }
-
-    fn odometry_lost(&mut self, now: Now) -> Answer {
-        self.answer(now)
-    }
-
     fn tick(&mut self, now: Now) -> Answer {
         self.listen();
         self.answer(now)
@@ -308,10 +291,6 @@ impl Decider for Bridge {
             (false, Some(problem)) => format!("deny: {problem}."),
             _ => explanation(answer, verdict, hint),
         }
-    }
-
-    fn markers(&self, _: &Answer) -> Option<MarkerArray> {
-        None
     }
 
     fn patience(&self) -> Option<Duration> {

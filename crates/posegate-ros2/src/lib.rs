@@ -11,6 +11,7 @@ pub mod clock;
 pub mod decider;
 pub mod diagnostics;
 pub mod docks;
+pub mod entities;
 pub mod graph;
 pub mod lifecycle;
 pub mod link;

@@ -1,14 +1,14 @@
 //! `posegate-node`: the gate as a ROS 2 node.
 
 use posegate::gate::Settings;
-use posegate_ros2::arguments::Arguments;
 use posegate_ros2::arguments::{Command, USAGE};
 use posegate_ros2::bridge::Bridge;
 use posegate_ros2::clock::Now;
-use posegate_ros2::docks::{self, DockGate};
+use posegate_ros2::decider::Decider;
+use posegate_ros2::docks::{self, Dock, DockGate};
+use posegate_ros2::entities::GraphError;
 use posegate_ros2::graph::Environment;
 use posegate_ros2::names::Names;
-use posegate_ros2::permit_gate::PermitGate;
 use posegate_ros2::run::Runner;
 use posegate_ros2::settings::NodeSettings;
 use std::error::Error;
@@ -26,9 +26,7 @@ fn main() -> ExitCode {
     }
 }
 
-type Outcome = Result<(), Box<dyn Error>>;
-
-fn start() -> Outcome {
+fn start() -> Result<(), Box<dyn Error>> {
     let arguments = match Command::parse(std::env::args().skip(1))? {
         Command::Help => {
             println!("{USAGE}");
@@ -45,10 +43,38 @@ fn start() -> Outcome {
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
-    if arguments.table.is_dir() {
-        many(&arguments, environment, &stop)?;
+    let is_site = arguments.table.is_dir();
+    let docks = match is_site {
+        true => docks::read(&arguments)?,
+        false => vec![Dock::read(&arguments)?],
+    };
+    let gates: Vec<Settings<'_>> = docks.iter().map(|dock| dock.settings.gate()).collect();
+    let settings = &docks.first().ok_or("the site has no table")?.settings;
+    let names = &arguments.names;
+    let (node, task, poses) = (names.full_node(), settings.task(), source(names, settings));
+    let run = Run {
+        environment,
+        names,
+        settings,
+        stop: &stop,
+    };
+    let topics = [names.detections.clone(), names.camera_info.clone()];
+    if is_site {
+        let gate = DockGate::new(&docks, &gates, topics);
+        let (tasks, asked) = (docks.len(), &names.task);
+        run.with(
+            gate,
+            format!("{node} has {tasks} tasks, decides by {poses} on the one that {asked} names"),
+        )?;
+    } else if let Some(serial) = &settings.serial {
+        let device = serial.path.display();
+        run.with(Bridge::open(serial)?, format!("{node} passes {poses} to the controller on {device}, which decides on the task `{task}`"))?;
     } else {
-        one(&arguments, environment, &stop)?;
+        let gate = DockGate::alone(&docks, &gates, topics, Now::read())?;
+        run.with(
+            gate,
+            format!("{node} decides on the task `{task}` by {poses}"),
+        )?;
     }
     // DDS needs many seconds to leave the graph in order, and the denial has been published.
     std::process::exit(0);
@@ -66,55 +92,22 @@ fn source<'n>(names: &'n Names, settings: &NodeSettings) -> &'n str {
     topic
 }
 
-/// Runs a node with one table.
-fn one(arguments: &Arguments, environment: Environment, stop: &AtomicBool) -> Outcome {
-    let table = std::fs::read(&arguments.table).map_err(|error| {
-        format!(
-            "cannot read the table {}: {error}",
-            arguments.table.display()
-        )
-    })?;
-    let settings = NodeSettings::new(arguments, &table)?;
-    let gate_settings = settings.gate();
-    let (names, domain) = (&arguments.names, environment.domain);
-    let (node, task) = (names.full_node(), settings.task());
-    let poses = source(names, &settings);
-    if let Some(serial) = &settings.serial {
-        let bridge = Bridge::open(serial)?;
-        let mut runner = Runner::join(environment, names, bridge, &settings)?;
-        eprintln!(
-            "posegate-node: {node} passes {poses} to the controller on {}, which decides on the task `{task}`, in domain {domain}",
-            serial.path.display()
-        );
-        runner.run(stop)?;
-    } else {
-        let gate = PermitGate::new(&table, &settings, &gate_settings, Now::read())?
-            .with_tags([names.detections.clone(), names.camera_info.clone()]);
-        let mut runner = Runner::join(environment, names, gate, &settings)?;
-        eprintln!(
-            "posegate-node: {node} decides on the task `{task}` by {poses}, in domain {domain}"
-        );
-        runner.run(stop)?;
-    }
-    Ok(())
+/// What a node runs with.
+struct Run<'n> {
+    environment: Environment,
+    names: &'n Names,
+    settings: &'n NodeSettings,
+    stop: &'n AtomicBool,
 }
 
-/// Runs a node with the tables of a built site.
-fn many(arguments: &Arguments, environment: Environment, stop: &AtomicBool) -> Outcome {
-    let docks = docks::read(arguments)?;
-    let gates: Vec<Settings<'_>> = docks.iter().map(|dock| dock.settings.gate()).collect();
-    let (names, domain) = (&arguments.names, environment.domain);
-    let topics = [names.detections.clone(), names.camera_info.clone()];
-    let gate = DockGate::new(&docks, &gates, topics);
-    let first = docks.first().ok_or("the site has no table")?;
-    let settings = &first.settings;
-    let mut runner = Runner::join(environment, names, gate, settings)?;
-    eprintln!(
-        "posegate-node: {} has {} tasks, decides by {} on the one that {} names, in domain {domain}",
-        names.full_node(),
-        docks.len(),
-        source(names, settings),
-        names.task
-    );
-    Ok(runner.run(stop)?)
+impl Run<'_> {
+    /// Runs the node by a decider. `what` is printed once it has joined the graph.
+    fn with(&self, decider: impl Decider, what: String) -> Result<(), GraphError> {
+        let mut runner = Runner::join(self.environment, self.names, decider, self.settings)?;
+        eprintln!(
+            "posegate-node: {what}, in domain {}",
+            self.environment.domain
+        );
+        runner.run(self.stop)
+    }
 }

@@ -5,20 +5,19 @@
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
 use crate::diagnostics::{diagnostics, words, wrong_frame};
-use crate::graph::{Environment, Graph, GraphError, Input};
+use crate::entities::GraphError;
+use crate::graph::{Environment, Graph, Input};
 use crate::lifecycle::State;
 use crate::message::{Bool, TriggerResponse};
 use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
-use crate::poses::{PoseReport, Poses};
-use crate::received::Received;
+use crate::poses::Poses;
+use crate::services::Served;
 use crate::settings::NodeSettings;
 use posegate::gate::Reason;
-use ros2_client::{MessageInfo, Subscription};
 use rustdds::StatusEvented;
 use rustdds::mio1::Events;
-use serde::de::DeserializeOwned;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -45,14 +44,11 @@ pub struct Runner<'a, D> {
     heartbeat: Heartbeat,
     watch: ClockWatch,
     clock_steps: u64,
-    pose: Received,
     poses: Poses,
     /// Why the last pose was not used.
     refused: Option<String>,
     /// The number of poses that transforms gave.
     composed: i64,
-    camera_info: Option<Received>,
-    odometry: Option<Received>,
     /// Active, unless a manager decides on it.
     lifecycle: State,
     was_open: bool,
@@ -66,25 +62,6 @@ struct Sent {
     heartbeat: Option<Instant>,
     permit: Option<Instant>,
     slow: Option<Instant>,
-}
-
-/// Processes the messages of a topic that have arrived, at most `most`, and counts those that cannot be decoded. `take`
-/// gets `None` for such a message.
-fn drain<M: DeserializeOwned + 'static>(
-    topic: &Subscription<M>,
-    most: usize,
-    received: &mut Received,
-    mut take: impl FnMut(&mut Received, Option<(M, MessageInfo)>),
-) {
-    for _ in 0..most {
-        let taken = match topic.take() {
-            Ok(None) => return,
-            Ok(taken) => taken,
-            Err(_) => None,
-        };
-        received.unreadable += u64::from(taken.is_none());
-        take(received, taken);
-    }
 }
 
 fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
@@ -104,12 +81,9 @@ impl<'a, D: Decider> Runner<'a, D> {
     ) -> Result<Self, GraphError> {
         let graph = Graph::join(environment, names, settings, gate.takes_tasks())?;
         Ok(Self {
-            pose: graph.received_poses(names, settings),
             poses: Poses::new(&settings.poses, names.of_poses(settings.poses.kind)),
             refused: None,
             composed: 0,
-            camera_info: graph.received_camera_info(names, settings),
-            odometry: graph.received_odometry(names, settings),
             graph,
             environment,
             names,
@@ -134,24 +108,11 @@ impl<'a, D: Decider> Runner<'a, D> {
             "posegate-node: the threads of DDS were interrupted and have ended: joining the graph again"
         );
         let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
-        let graph = Graph::join(
-            self.environment,
-            self.names,
-            self.settings,
-            self.gate.takes_tasks(),
-        )?;
-        self.pose.peers = graph.received_poses(self.names, self.settings).peers;
-        let (names, settings) = (self.names, self.settings);
-        for (received, again) in [
-            (&mut self.odometry, graph.received_odometry(names, settings)),
-            (
-                &mut self.camera_info,
-                graph.received_camera_info(names, settings),
-            ),
-        ] {
-            if let (Some(received), Some(again)) = (received, again) {
-                received.peers = again.peers;
-            }
+        let takes_tasks = self.gate.takes_tasks();
+        let mut graph = Graph::join(self.environment, self.names, self.settings, takes_tasks)?;
+        for (received, earlier) in graph.received().zip(self.graph.received()) {
+            std::mem::swap(received, earlier);
+            std::mem::swap(&mut received.peers, &mut earlier.peers);
         }
         // A graph without threads cannot leave in order.
         std::mem::forget(std::mem::replace(&mut self.graph, graph));
@@ -173,7 +134,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                 .gate
                 .patience()
                 .map_or(timeout, |patience| timeout.min(patience));
-            match self.graph.poll.poll(&mut events, Some(timeout)) {
+            match self.graph.poll().poll(&mut events, Some(timeout)) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => other?,
             }
@@ -196,11 +157,7 @@ impl<'a, D: Decider> Runner<'a, D> {
             let _ = self.gate.inhibit(Now::read(), Reason::TimeBackwards);
         }
         while let Some(event) = self.graph.events.try_recv_status() {
-            self.pose.peers.note(&event);
-            for received in [&mut self.odometry, &mut self.camera_info]
-                .into_iter()
-                .flatten()
-            {
+            for received in self.graph.received() {
                 received.peers.note(&event);
             }
         }
@@ -225,10 +182,10 @@ impl<'a, D: Decider> Runner<'a, D> {
     /// task.
     fn take_task(&mut self) {
         let mut last = None;
-        if let Some(topic) = &self.graph.task {
-            while let Ok(Some((message, _))) = topic.take() {
-                last = Some(message.data);
-            }
+        if let Some(topic) = &mut self.graph.task {
+            topic.drain(BATCH, |_, taken| {
+                last = taken.map(|(message, _)| message.data).or(last.take());
+            });
         }
         let Some(name) = last else {
             return;
@@ -239,108 +196,84 @@ impl<'a, D: Decider> Runner<'a, D> {
     }
 
     fn take_odometry(&mut self) {
-        if let (Some(topic), Some(received)) = (&self.graph.odom, &mut self.odometry) {
-            drain(topic, BATCH, received, |received, taken| {
-                let _ = match taken {
-                    Some((message, info)) => {
-                        received.note(Now::read(), message.header.stamp);
-                        self.gate.odometry(Now::read(), &message, origin(&info))
-                    }
-                    None => self.gate.odometry_lost(Now::read()),
-                };
-            });
-        }
+        let Some(topic) = &mut self.graph.odom else {
+            return;
+        };
+        topic.drain(BATCH, |received, taken| {
+            let _ = match taken {
+                Some((message, origin)) => {
+                    received.note(Now::read(), message.header.stamp);
+                    self.gate.odometry(Now::read(), &message, origin)
+                }
+                None => self.gate.odometry_lost(Now::read()),
+            };
+        });
     }
 
     fn take_camera_info(&mut self) {
-        if let (Input::Detections(_, topic), Some(received)) =
-            (&self.graph.input, &mut self.camera_info)
-        {
-            drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, _)) = &taken {
-                    received.note(Now::read(), message.header.stamp);
-                }
-                self.gate
-                    .camera_info(taken.as_ref().map(|(message, _)| message));
-            });
-        }
+        let Some(topic) = &mut self.graph.camera_info else {
+            return;
+        };
+        topic.drain(BATCH, |received, taken| {
+            let message = taken.map(|(message, _)| message);
+            if let Some(message) = &message {
+                received.note(Now::read(), message.header.stamp);
+            }
+            self.gate.camera_info(message.as_ref());
+        });
     }
 
     /// Takes poses or detections. After one that could not be read the next has a gap before it, and is denied. A node that is not active
     /// drops them.
     fn take_reports(&mut self) {
-        if self.lifecycle != State::Active {
-            return self.drop_reports();
-        }
-        let (received, poses) = (&mut self.pose, &mut self.poses);
-        let (gate, has_report) = (&mut self.gate, &mut self.has_report);
-        let (refused, composed) = (&mut self.refused, &mut self.composed);
-        let mut take = |received: &mut Received, report: &PoseReport, origin: Origin| {
-            *has_report = true;
+        let is_active = self.lifecycle == State::Active;
+        let most = match self.settings.detector {
+            Some(_) if is_active => DETECTIONS,
+            _ => BATCH,
+        };
+        self.graph.input.drain(most, |received, taken| {
+            let Some((message, mut origin)) = taken else {
+                return;
+            };
+            if !is_active {
+                received.messages += 1;
+                return;
+            }
+            let report = match message {
+                Input::WithCovariance(message) => self.poses.with_covariance(&message),
+                Input::Odometry(message) => self.poses.odometry(&message),
+                Input::Plain(message) => self.poses.pose(&message),
+                Input::Transforms(message) => {
+                    let Some(report) = self.poses.transforms(&message, origin.publisher) else {
+                        return;
+                    };
+                    // Several publishers share the topic, so their counts do not number the poses.
+                    self.composed += 1;
+                    origin = Origin {
+                        publisher: [0; 16],
+                        number: self.composed,
+                    };
+                    report
+                }
+                Input::Detections(message) => {
+                    self.has_report = true;
+                    received.note(Now::read(), message.header.stamp);
+                    let _ = self.gate.detections(Now::read(), &message, origin);
+                    return;
+                }
+            };
+            self.has_report = true;
             let now = Now::read();
             received.note(now, report.stamp);
-            *refused = report.pose.as_ref().err().map(ToString::to_string);
-            let _ = gate.pose(now, report, origin);
-        };
-        match &self.graph.input {
-            Input::Poses(topic) => drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    take(received, &poses.with_covariance(&message), origin(&info));
-                }
-            }),
-            Input::Odometry(topic) => drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    take(received, &poses.odometry(&message), origin(&info));
-                }
-            }),
-            Input::Plain(topic) => drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    take(received, &poses.pose(&message), origin(&info));
-                }
-            }),
-            Input::Transforms(topic) => drain(topic, BATCH, received, |received, taken| {
-                let Some((message, info)) = taken else {
-                    return;
-                };
-                let publisher = info.publisher_gid().to_bytes16();
-                if let Some(report) = poses.transforms(&message, publisher) {
-                    // Several publishers share the topic, so their counts do not number the poses.
-                    *composed += 1;
-                    let origin = Origin {
-                        publisher: [0; 16],
-                        number: *composed,
-                    };
-                    take(received, &report, origin);
-                }
-            }),
-            Input::Detections(topic, _) => drain(topic, DETECTIONS, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    *has_report = true;
-                    received.note(Now::read(), message.header.stamp);
-                    let _ = gate.detections(Now::read(), &message, origin(&info));
-                }
-            }),
-        }
-    }
-
-    fn drop_reports(&mut self) {
-        fn count<M>(received: &mut Received, taken: Option<M>) {
-            received.messages += u64::from(taken.is_some());
-        }
-        let received = &mut self.pose;
-        match &self.graph.input {
-            Input::Poses(topic) => drain(topic, BATCH, received, count),
-            Input::Odometry(topic) => drain(topic, BATCH, received, count),
-            Input::Plain(topic) => drain(topic, BATCH, received, count),
-            Input::Transforms(topic) => drain(topic, BATCH, received, count),
-            Input::Detections(topic, _) => drain(topic, BATCH, received, count),
-        }
+            self.refused = report.pose.as_ref().err().map(ToString::to_string);
+            let _ = self.gate.pose(now, &report, origin);
+        });
     }
 
     /// Returns the action that the node knows and the gate does not: the fault of the topic, of the last pose, of stamps,
     /// the hold that would open, or the movement that a set includes.
     fn hint(&self, answer: &Answer) -> Option<String> {
-        let (pose, settings) = (&self.pose, self.settings);
+        let (pose, settings) = (&self.graph.input.received, self.settings);
         let reason = answer.reason()?;
         if self.lifecycle != State::Active {
             let state = self.lifecycle.labelled().label;
@@ -409,21 +342,24 @@ impl<'a, D: Decider> Runner<'a, D> {
             let refused = self.refused.clone();
             let refused =
                 refused.or_else(|| frame.and_then(|frame| wrong_frame(frame, self.settings)));
-            let others = [
-                ("odometry", &self.odometry),
-                ("camera info", &self.camera_info),
-            ];
-            let others = others.into_iter();
-            let others = others.filter_map(|(name, received)| {
-                Some(received.as_ref()?.status(name, answer.now, None))
-            });
+            let topics = &self.graph;
+            let odometry = topics
+                .odom
+                .as_ref()
+                .map(|topic| ("odometry", &topic.received));
+            let camera_info = topics
+                .camera_info
+                .as_ref()
+                .map(|topic| ("camera info", &topic.received));
+            let others = odometry.into_iter().chain(camera_info);
+            let others = others.map(|(name, received)| received.status(name, answer.now, None));
             let more = others.chain(self.gate.diagnostics(answer.now)).collect();
             let message = diagnostics(
                 answer,
                 self.settings,
                 self.gate.chosen(self.settings),
                 self.hint(answer).as_deref(),
-                (&self.pose, refused),
+                (&self.graph.input.received, refused),
                 self.clock_steps,
                 more,
             );
@@ -435,15 +371,18 @@ impl<'a, D: Decider> Runner<'a, D> {
     }
 
     fn serve(&mut self) {
-        if let Some(servers) = &self.graph.lifecycle {
-            let state = servers.serve(self.lifecycle);
-            if state != self.lifecycle {
-                self.lifecycle = state;
-                let answer = self.now();
-                self.publish(&answer, Instant::now(), false);
-            }
+        let mut served = Served {
+            parameters: &self.settings.parameters,
+            state: self.lifecycle,
+        };
+        for service in &self.graph.services {
+            service(&mut served);
         }
-        self.graph.parameters.serve(&self.settings.parameters);
+        if served.state != self.lifecycle {
+            self.lifecycle = served.state;
+            let answer = self.now();
+            self.publish(&answer, Instant::now(), false);
+        }
         while let Ok(Some((id, _))) = self.graph.explain.receive_request() {
             let answer = self.now();
             let response = TriggerResponse {
@@ -462,12 +401,5 @@ impl<'a, D: Decider> Runner<'a, D> {
             let response = TriggerResponse { success, message };
             let _ = self.graph.reset.send_response(id, response);
         }
-    }
-}
-
-fn origin(info: &MessageInfo) -> Origin {
-    Origin {
-        publisher: info.publisher_gid().to_bytes16(),
-        number: info.sequence_number(),
     }
 }

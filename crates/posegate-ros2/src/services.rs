@@ -1,102 +1,145 @@
 //! The services of the node's parameters, and of the lifecycle of a managed node.
 
+use crate::entities::{Entities, GraphError};
 use crate::lifecycle::{
     AvailableStates, AvailableTransitions, ChangeState, Changed, CurrentState, State,
 };
 use crate::message::TriggerRequest;
 use crate::parameter_services::{ReportedParameters, refused};
-use ros2_client::parameters::raw::SetParametersResult;
+use ros2_client::Message;
 use ros2_client::rcl_interfaces::{
     DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest,
     GetParameterTypesResponse, GetParametersRequest, GetParametersResponse, ListParametersRequest,
     ListParametersResponse, SetParametersAtomicallyResponse, SetParametersRequest,
     SetParametersResponse,
 };
-use ros2_client::{Message, Server};
 
-/// The six services of a node's parameters.
-pub struct ParameterServers {
-    /// `get_parameters`.
-    pub get: Server<GetParametersRequest, GetParametersResponse>,
-    /// `get_parameter_types`.
-    pub types: Server<GetParameterTypesRequest, GetParameterTypesResponse>,
-    /// `set_parameters`.
-    pub set: Server<SetParametersRequest, SetParametersResponse>,
-    /// `set_parameters_atomically`.
-    pub set_at_once: Server<SetParametersRequest, SetParametersAtomicallyResponse>,
-    /// `list_parameters`.
-    pub list: Server<ListParametersRequest, ListParametersResponse>,
-    /// `describe_parameters`.
-    pub describe: Server<DescribeParametersRequest, DescribeParametersResponse>,
+/// A service: answers the requests that have arrived.
+pub type Service = Box<dyn Fn(&mut Served<'_>)>;
+
+/// What services report and change.
+pub struct Served<'s> {
+    /// The parameters.
+    pub parameters: &'s ReportedParameters,
+    /// The state of the node.
+    pub state: State,
 }
 
-/// The services of a managed node. An empty request is that of `std_srvs/srv/Trigger`.
-pub struct LifecycleServers {
-    /// `change_state`.
-    pub change: Server<ChangeState, Changed>,
-    /// `get_state`.
-    pub current: Server<TriggerRequest, CurrentState>,
-    /// `get_available_states`.
-    pub states: Server<TriggerRequest, AvailableStates>,
-    /// `get_available_transitions`.
-    pub transitions: Server<TriggerRequest, AvailableTransitions>,
+/// Offers services under the name of a node.
+struct Services<'e> {
+    entities: &'e mut Entities,
+    node: String,
+    package: &'static str,
+    all: Vec<Service>,
 }
 
-/// Answers the requests that have arrived. Responses that cannot be sent are not repeated: the caller asks again.
-pub fn answer<Q: Message + Clone + 'static, R: Message + 'static>(
-    server: &Server<Q, R>,
-    mut response: impl FnMut(Q) -> R,
-) {
-    while let Ok(Some((id, request))) = server.receive_request() {
-        let _ = server.send_response(id, response(request));
+impl Services<'_> {
+    /// Offers a service. Responses that cannot be sent are not repeated: the caller asks again.
+    fn add<Q: Message + Clone + 'static, R: Message + 'static>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        response: impl Fn(&mut Served<'_>, Q) -> R + 'static,
+    ) -> Result<(), GraphError> {
+        let name = format!("{}/{name}", self.node);
+        let server = self.entities.server::<Q, R>(&name, [self.package, kind])?;
+        self.all.push(Box::new(move |served| {
+            while let Ok(Some((id, request))) = server.receive_request() {
+                let _ = server.send_response(id, response(served, request));
+            }
+        }));
+        Ok(())
     }
 }
 
-impl ParameterServers {
-    /// Answers requests. No parameter can be set.
-    pub fn serve(&self, reported: &ReportedParameters) {
-        answer(&self.get, |request| GetParametersResponse {
-            values: reported.values(&request.names),
-        });
-        answer(&self.types, |request| GetParameterTypesResponse {
-            values: reported.types(&request.names),
-        });
-        answer(&self.set, |request| {
-            let each = |given| -> SetParametersResult { refused(std::slice::from_ref(given)) };
-            SetParametersResponse {
-                results: request.parameter.iter().map(each).collect(),
-            }
-        });
-        answer(&self.set_at_once, |request| {
-            SetParametersAtomicallyResponse {
-                result: refused(&request.parameter),
-            }
-        });
-        answer(&self.list, |request| ListParametersResponse {
-            result: reported.list(&request),
-        });
-        answer(&self.describe, |request| DescribeParametersResponse {
-            values: reported.descriptors(&request.names),
-        });
+/// Offers the six services of a node's parameters, of which none can be set, and those of the lifecycle of a managed node. `node` is its
+/// full name.
+///
+/// # Errors
+/// [`GraphError`]
+pub fn offer(
+    entities: &mut Entities,
+    node: String,
+    is_managed: bool,
+) -> Result<Vec<Service>, GraphError> {
+    let mut services = Services {
+        entities,
+        node,
+        package: "rcl_interfaces",
+        all: Vec::new(),
+    };
+    services.add(
+        "get_parameters",
+        "GetParameters",
+        |served, request: GetParametersRequest| GetParametersResponse {
+            values: served.parameters.values(&request.names),
+        },
+    )?;
+    services.add(
+        "get_parameter_types",
+        "GetParameterTypes",
+        |served, request: GetParameterTypesRequest| GetParameterTypesResponse {
+            values: served.parameters.types(&request.names),
+        },
+    )?;
+    services.add(
+        "set_parameters",
+        "SetParameters",
+        |_, request: SetParametersRequest| SetParametersResponse {
+            results: request.parameter.chunks(1).map(refused).collect(),
+        },
+    )?;
+    services.add(
+        "set_parameters_atomically",
+        "SetParametersAtomically",
+        |_, request: SetParametersRequest| SetParametersAtomicallyResponse {
+            result: refused(&request.parameter),
+        },
+    )?;
+    services.add(
+        "list_parameters",
+        "ListParameters",
+        |served, request: ListParametersRequest| ListParametersResponse {
+            result: served.parameters.list(&request),
+        },
+    )?;
+    services.add(
+        "describe_parameters",
+        "DescribeParameters",
+        |served, request: DescribeParametersRequest| DescribeParametersResponse {
+            values: served.parameters.descriptors(&request.names),
+        },
+    )?;
+    if !is_managed {
+        return Ok(services.all);
     }
-}
-
-impl LifecycleServers {
-    /// Answers requests, and returns the state after them.
-    pub fn serve(&self, before: State) -> State {
-        let mut state = before;
-        answer(&self.change, |request| {
-            let next = state.after(&request.transition);
-            state = next.unwrap_or(state);
+    services.package = "lifecycle_msgs";
+    services.add(
+        "change_state",
+        "ChangeState",
+        |served, request: ChangeState| {
+            let next = served.state.after(&request.transition);
+            served.state = next.unwrap_or(served.state);
             Changed {
                 success: next.is_some(),
             }
-        });
-        answer(&self.current, |_| CurrentState {
-            current_state: state.labelled(),
-        });
-        answer(&self.states, |_| State::all());
-        answer(&self.transitions, |_| state.available());
-        state
-    }
+        },
+    )?;
+    // An empty request is that of `std_srvs/srv/Trigger`.
+    services.add("get_state", "GetState", |served, _: TriggerRequest| {
+        CurrentState {
+            current_state: served.state.labelled(),
+        }
+    })?;
+    services.add(
+        "get_available_states",
+        "GetAvailableStates",
+        |_, _: TriggerRequest| -> AvailableStates { State::all() },
+    )?;
+    services.add(
+        "get_available_transitions",
+        "GetAvailableTransitions",
+        |served, _: TriggerRequest| -> AvailableTransitions { served.state.available() },
+    )?;
+    Ok(services.all)
 }
