@@ -2,7 +2,7 @@
 
 use crate::clock::Now;
 use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, MarkerArray, Odometry,
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, Marker, Odometry,
 };
 use crate::permit_gate::{Answer, Origin};
 use crate::poses::PoseReport;
@@ -58,7 +58,7 @@ pub trait Decider {
     fn explain(&self, answer: &Answer, hint: Option<&str>) -> String;
 
     /// Returns the markers of the last report.
-    fn markers(&self, _: &Answer) -> Option<MarkerArray> {
+    fn markers(&self, _: &Answer) -> Option<Vec<Marker>> {
         None
     }
 

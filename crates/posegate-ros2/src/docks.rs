@@ -9,7 +9,7 @@ use crate::decider::Decider;
 use crate::diagnostics::explanation;
 use crate::markers::markers;
 use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, MarkerArray, Odometry,
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, Marker, Odometry,
 };
 use crate::permission::report_values;
 use crate::permit_gate::{Answer, Origin, PermitGate};
@@ -322,7 +322,7 @@ impl Decider for DockGate<'_> {
         }
     }
 
-    fn markers(&self, answer: &Answer) -> Option<MarkerArray> {
+    fn markers(&self, answer: &Answer) -> Option<Vec<Marker>> {
         let gate = self.gate()?;
         Some(markers(answer, gate.last()?, gate.gate().table().ok()?))
     }

@@ -166,10 +166,11 @@ impl Entities {
     ) -> Result<Server<Q, R>, GraphError> {
         let qos = reliable().history(History::KeepLast { depth: 10 });
         let (name, kind) = (parsed(name)?, ServiceTypeName::new(package, kind));
-        let server = self
+        let mut server = self
             .node
-            .create_server(self.services, &name, &kind, qos.clone(), qos);
-        Ok(server?)
+            .create_server(self.services, &name, &kind, qos.clone(), qos)?;
+        self.wake_at(&mut server)?;
+        Ok(server)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::entities::{Entities, GraphError, Topic, reliable};
 use crate::message::{
-    AprilTagDetectionArray, Bool, CameraInfo, DiagnosticArray, MarkerArray, Odometry, PoseStamped,
-    PoseWithCovarianceStamped, Text, TfMessage, TriggerRequest, TriggerResponse,
+    AprilTagDetectionArray, CameraInfo, DiagnosticArray, Marker, Odometry, PoseStamped,
+    PoseWithCovarianceStamped, Single, TransformStamped, TriggerResponse,
 };
 use crate::names::Names;
 use crate::poses::PoseType;
@@ -91,7 +91,7 @@ pub enum Input {
     /// A pose without covariance.
     Plain(PoseStamped),
     /// Transforms.
-    Transforms(TfMessage),
+    Transforms(Vec<TransformStamped>),
     /// Detections of tags.
     Detections(AprilTagDetectionArray),
 }
@@ -111,19 +111,19 @@ pub struct Graph {
     /// The odometry, if it is used.
     pub odom: Option<Topic<Odometry>>,
     /// The name of the task, if it is asked for.
-    pub task: Option<Topic<Text>>,
+    pub task: Option<Topic<String>>,
     /// The fail-safe permit.
     pub permission: Publisher<DiagnosticArray>,
     /// The permit for display only.
-    pub permit: Publisher<Bool>,
+    pub permit: Publisher<bool>,
     /// The diagnostics.
     pub diagnostics: Publisher<DiagnosticArray>,
     /// The markers.
-    pub markers: Publisher<MarkerArray>,
+    pub markers: Publisher<Vec<Marker>>,
     /// The service that resets the gate.
-    pub reset: Server<TriggerRequest, TriggerResponse>,
+    pub reset: Server<Single<u8>, TriggerResponse>,
     /// The service that returns the reason why the gate is closed.
-    pub explain: Server<TriggerRequest, TriggerResponse>,
+    pub explain: Server<Single<u8>, TriggerResponse>,
     /// The services of the parameters, and of the lifecycle of a managed node.
     pub services: Vec<Service>,
     threads: DdsThreads,
@@ -195,19 +195,9 @@ impl Graph {
             }
             false => None,
         };
-        let permission =
-            entities.publisher(&names.permission, DIAGNOSTICS, heartbeat_qos(settings))?;
         let latched = reliable().durability(Durability::TransientLocal);
-        let permit = entities.publisher(&names.permit, ["std_msgs", "Bool"], latched)?;
         let several = reliable().history(History::KeepLast { depth: 10 });
-        let diagnostics = entities.publisher(&names.diagnostics, DIAGNOSTICS, several)?;
         let of_markers = ["visualization_msgs", "MarkerArray"];
-        let markers = entities.publisher(&names.markers, of_markers, reliable())?;
-        let mut reset = entities.server(&names.reset, TRIGGER)?;
-        let mut explain = entities.server(&names.explain, TRIGGER)?;
-        let services = services::offer(&mut entities, names.full_node(), settings.is_managed)?;
-        entities.wake_at(&mut reset)?;
-        entities.wake_at(&mut explain)?;
         entities.wake_at(events.as_status_source_mio1())?;
         Ok(Self {
             events,
@@ -215,13 +205,17 @@ impl Graph {
             camera_info,
             odom,
             task,
-            permission,
-            permit,
-            diagnostics,
-            markers,
-            reset,
-            explain,
-            services,
+            permission: entities.publisher(
+                &names.permission,
+                DIAGNOSTICS,
+                heartbeat_qos(settings),
+            )?,
+            permit: entities.publisher(&names.permit, ["std_msgs", "Bool"], latched)?,
+            diagnostics: entities.publisher(&names.diagnostics, DIAGNOSTICS, several)?,
+            markers: entities.publisher(&names.markers, of_markers, reliable())?,
+            reset: entities.server(&names.reset, TRIGGER)?,
+            explain: entities.server(&names.explain, TRIGGER)?,
+            services: services::offer(&mut entities, names.full_node(), settings.is_managed)?,
             threads: DdsThreads::now().without(&before),
             entities,
         })

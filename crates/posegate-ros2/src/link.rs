@@ -9,7 +9,7 @@
 //! new. If the clock is faster than assumed, a state looks younger by at most what the clock gains in [`LIFE`].
 
 use posegate::gate::State;
-use posegate::wire::{LinkCounters, Receiver, Telemetry};
+use posegate::wire::{Receiver, Telemetry};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -207,13 +207,6 @@ impl Link {
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
-    }
-
-    /// Returns the counts of the controller's end.
-    #[must_use]
-    pub fn controller_counts(&self) -> LinkCounters {
-        self.last()
-            .map_or_else(LinkCounters::default, |said| said.line)
     }
 }
 

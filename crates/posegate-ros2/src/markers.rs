@@ -1,11 +1,12 @@
 //! Markers for a viewer: the pose-set of the robot, and the section of the success set at its heading. For display
 //! only.
 
-use crate::message::{Color, Header, Marker, MarkerArray, Pose};
+use crate::message::{Header, Marker, Pose};
 use crate::permit_gate::{Answer, LastReport};
 use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet, Uncertainty};
 use posegate::table::Table;
+use posegate_replay::coordinates;
 
 /// Lines of an ellipse.
 const SIDES: u32 = 48;
@@ -20,18 +21,17 @@ const TRIANGLE_LIST: i32 = 11;
 
 /// Returns the markers of the last report.
 #[must_use]
-pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerArray {
+pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> Vec<Marker> {
     let mut markers = Vec::new();
-    let rgb = match (answer.is_open, last.verdict.is_permit()) {
+    let [r, g, b] = match (answer.is_open, last.verdict.is_permit()) {
         (true, _) => [0.1, 0.8, 0.2],
         (false, true) => [0.9, 0.7, 0.1],
         (false, false) => [0.9, 0.2, 0.2],
     };
     let Ok(mean) = last.estimate.mean() else {
-        return MarkerArray { markers };
+        return markers;
     };
-    let (x, y) = (f64::from(mean.x_um) * 1e-6, f64::from(mean.y_um) * 1e-6);
-    let yaw = f64::from(mean.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
+    let [x, y, yaw] = coordinates(mean);
     let radius = libm::sqrt(f64::from(table.radius_squared().q16()) / 65_536.0);
     if let Some((axes, reach)) = spread(last.estimate.spread.as_ref(), radius) {
         let corners = (0..=SIDES).map(|k| {
@@ -42,13 +42,13 @@ pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerA
         let outline = Marker {
             kind: LINE_STRIP,
             scale: [0.01; 3],
-            color: color(rgb, 0.9),
+            color: [r, g, b, 0.9],
             ..marker(answer, last, 0, corners.collect())
         };
         let headings = Marker {
             kind: TRIANGLE_LIST,
             scale: [1.0; 3],
-            color: color(rgb, 0.4),
+            color: [r, g, b, 0.4],
             ..marker(answer, last, 1, fan([x, y, yaw], reach))
         };
         markers.extend([outline, headings]);
@@ -57,10 +57,10 @@ pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerA
     markers.push(Marker {
         kind: CUBE_LIST,
         scale: [step, step, 0.005],
-        color: color([0.2, 0.5, 0.9], 0.4),
+        color: [0.2, 0.5, 0.9, 0.4],
         ..marker(answer, last, 2, points)
     });
-    MarkerArray { markers }
+    markers
 }
 
 /// Returns the lower triangular root of the plane's covariance times the radius, and the extent in heading.
@@ -129,12 +129,6 @@ fn section(table: &Table<'_>, yaw: f64) -> (Vec<[f64; 3]>, f64) {
         }
     }
     (points, f64::from(step) * 1e-6)
-}
-
-fn color([r, g, b]: [f32; 3], opacity: f32) -> Color {
-    Color {
-        rgba: [r, g, b, opacity],
-    }
 }
 
 fn marker(answer: &Answer, last: &LastReport, id: i32, points: Vec<[f64; 3]>) -> Marker {

@@ -1,8 +1,10 @@
 //! The ROS 2 messages of the node, field by field in the order of their definitions.
 //!
 //! CDR has no field names: the order is the format. Structs of equal numbers (`Point`, `Quaternion`) are arrays here,
-//! because CDR encodes both in the same way.
+//! because CDR encodes both in the same way. A message with one field is that field: `std_msgs/msg/Bool` is `bool`,
+//! `tf2_msgs/msg/TFMessage` is `Vec<TransformStamped>`.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
@@ -89,20 +91,6 @@ pub struct TransformStamped {
     pub translation: [f64; 3],
     /// x, y, z, w.
     pub rotation: [f64; 4],
-}
-
-/// `tf2_msgs/msg/TFMessage`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TfMessage {
-    /// The transforms.
-    pub transforms: Vec<TransformStamped>,
-}
-
-/// `std_msgs/msg/String`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Text {
-    /// The text.
-    pub data: String,
 }
 
 /// `geometry_msgs/msg/TwistWithCovariance`.
@@ -222,13 +210,6 @@ impl CameraInfo {
     }
 }
 
-/// `std_msgs/msg/Bool`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Bool {
-    /// The value.
-    pub data: bool,
-}
-
 /// `diagnostic_msgs/msg/KeyValue`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyValue {
@@ -289,13 +270,6 @@ pub struct DiagnosticArray {
     pub status: Vec<DiagnosticStatus>,
 }
 
-/// `std_msgs/msg/ColorRGBA`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Color {
-    /// Red, green, blue and opacity, from 0 to 1.
-    pub rgba: [f32; 4],
-}
-
 /// `visualization_msgs/msg/Marker`, with `sensor_msgs/msg/CompressedImage` and `MeshFile` written out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
@@ -313,8 +287,8 @@ pub struct Marker {
     pub pose: Pose,
     /// The size, metres.
     pub scale: [f64; 3],
-    /// The colour.
-    pub color: Color,
+    /// Red, green, blue and opacity, from 0 to 1.
+    pub color: [f32; 4],
     /// The lifetime: seconds and nanoseconds; zero for no limit.
     pub lifetime: (i32, u32),
     /// `true` if the marker moves with its frame.
@@ -322,7 +296,7 @@ pub struct Marker {
     /// Points of lines and polygons.
     pub points: Vec<[f64; 3]>,
     /// A colour per point.
-    pub colors: Vec<Color>,
+    pub colors: Vec<[f32; 4]>,
     /// Unused.
     pub texture_resource: String,
     /// Unused: header, format, bytes.
@@ -339,20 +313,6 @@ pub struct Marker {
     pub mesh_use_embedded_materials: bool,
 }
 
-/// `visualization_msgs/msg/MarkerArray`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MarkerArray {
-    /// The markers.
-    pub markers: Vec<Marker>,
-}
-
-/// The request of `std_srvs/srv/Trigger`. An empty message has one byte.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TriggerRequest {
-    /// Unused.
-    pub structure_needs_at_least_one_member: u8,
-}
-
 /// The response of `std_srvs/srv/Trigger`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TriggerResponse {
@@ -362,5 +322,11 @@ pub struct TriggerResponse {
     pub message: String,
 }
 
-impl ros2_client::Message for TriggerRequest {}
 impl ros2_client::Message for TriggerResponse {}
+
+/// The request or the response of a service with one field. (CDR encodes an empty one as one byte.)
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Single<T>(pub T);
+
+impl<T: Serialize + DeserializeOwned> ros2_client::Message for Single<T> {}

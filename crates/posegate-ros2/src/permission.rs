@@ -11,6 +11,7 @@ use crate::permit_gate::{Answer, LastReport};
 use crate::settings::NodeSettings;
 use posegate::gate::{Reason, Verdict};
 use posegate::pose::Pose;
+use posegate_replay::coordinates;
 use std::hash::{BuildHasher, Hasher};
 
 /// The name of the status.
@@ -134,7 +135,5 @@ pub fn report_values(last: &LastReport) -> [KeyValue; 6] {
 
 /// Returns a pose as `x y yaw`, metres and radians.
 fn pose_text(pose: Pose) -> String {
-    let [x, y] = [pose.x_um, pose.y_um].map(|um| f64::from(um) / 1e6);
-    let yaw = f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
-    format!("{x} {y} {yaw}")
+    coordinates(pose).map(|value| value.to_string()).join(" ")
 }

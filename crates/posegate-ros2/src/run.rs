@@ -8,7 +8,7 @@ use crate::diagnostics::{diagnostics, words, wrong_frame};
 use crate::entities::GraphError;
 use crate::graph::{Environment, Graph, Input};
 use crate::lifecycle::State;
-use crate::message::{Bool, TriggerResponse};
+use crate::message::{PoseStamped, PoseWithCovarianceStamped, TriggerResponse};
 use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
@@ -184,7 +184,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         let mut last = None;
         if let Some(topic) = &mut self.graph.task {
             topic.drain(BATCH, |_, taken| {
-                last = taken.map(|(message, _)| message.data).or(last.take());
+                last = taken.map(|(name, _)| name).or(last.take());
             });
         }
         let Some(name) = last else {
@@ -240,9 +240,13 @@ impl<'a, D: Decider> Runner<'a, D> {
                 return;
             }
             let report = match message {
-                Input::WithCovariance(message) => self.poses.with_covariance(&message),
-                Input::Odometry(message) => self.poses.odometry(&message),
-                Input::Plain(message) => self.poses.pose(&message),
+                Input::WithCovariance(PoseWithCovarianceStamped { header, pose }) => self
+                    .poses
+                    .pose(header, None, &pose.pose, Some(pose.covariance)),
+                Input::Odometry(message) => self.poses.odometry(message),
+                Input::Plain(PoseStamped { header, pose }) => {
+                    self.poses.pose(header, None, &pose, None)
+                }
                 Input::Transforms(message) => {
                     let Some(report) = self.poses.transforms(&message, origin.publisher) else {
                         return;
@@ -332,9 +336,7 @@ impl<'a, D: Decider> Runner<'a, D> {
             )
         {
             self.sent.permit = Some(now);
-            let _ = self.graph.permit.publish(Bool {
-                data: answer.is_open,
-            });
+            let _ = self.graph.permit.publish(answer.is_open);
         }
         if has_changed || is_due(self.sent.slow, now, SLOW_PERIOD) {
             self.sent.slow = Some(now);

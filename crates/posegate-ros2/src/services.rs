@@ -1,18 +1,13 @@
 //! The services of the node's parameters, and of the lifecycle of a managed node.
 
 use crate::entities::{Entities, GraphError};
-use crate::lifecycle::{
-    AvailableStates, AvailableTransitions, ChangeState, Changed, CurrentState, State,
-};
-use crate::message::TriggerRequest;
+use crate::lifecycle::{Labelled, State};
+use crate::message::Single;
 use crate::parameter_services::{ReportedParameters, refused};
-use ros2_client::Message;
-use ros2_client::rcl_interfaces::{
-    DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest,
-    GetParameterTypesResponse, GetParametersRequest, GetParametersResponse, ListParametersRequest,
-    ListParametersResponse, SetParametersAtomicallyResponse, SetParametersRequest,
-    SetParametersResponse,
-};
+use ros2_client::parameters::raw::Parameter;
+use ros2_client::rcl_interfaces::ListParametersRequest;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// A service: answers the requests that have arrived.
 pub type Service = Box<dyn Fn(&mut Served<'_>)>;
@@ -34,18 +29,24 @@ struct Services<'e> {
 }
 
 impl Services<'_> {
-    /// Offers a service. Responses that cannot be sent are not repeated: the caller asks again.
-    fn add<Q: Message + Clone + 'static, R: Message + 'static>(
+    /// Offers a service whose request and response have one field each, or are `Q` and `R` themselves. Responses that
+    /// cannot be sent are not repeated: the caller asks again.
+    fn add<Q, R>(
         &mut self,
         name: &str,
         kind: &str,
         response: impl Fn(&mut Served<'_>, Q) -> R + 'static,
-    ) -> Result<(), GraphError> {
+    ) -> Result<(), GraphError>
+    where
+        Q: Serialize + DeserializeOwned + Clone + 'static,
+        R: Serialize + DeserializeOwned + 'static,
+    {
         let name = format!("{}/{name}", self.node);
-        let server = self.entities.server::<Q, R>(&name, [self.package, kind])?;
+        let kind = [self.package, kind];
+        let server = self.entities.server::<Single<Q>, Single<R>>(&name, kind)?;
         self.all.push(Box::new(move |served| {
-            while let Ok(Some((id, request))) = server.receive_request() {
-                let _ = server.send_response(id, response(served, request));
+            while let Ok(Some((id, Single(request)))) = server.receive_request() {
+                let _ = server.send_response(id, Single(response(served, request)));
             }
         }));
         Ok(())
@@ -62,84 +63,61 @@ pub fn offer(
     node: String,
     is_managed: bool,
 ) -> Result<Vec<Service>, GraphError> {
+    type Names = Vec<String>;
     let mut services = Services {
         entities,
         node,
         package: "rcl_interfaces",
         all: Vec::new(),
     };
-    services.add(
-        "get_parameters",
-        "GetParameters",
-        |served, request: GetParametersRequest| GetParametersResponse {
-            values: served.parameters.values(&request.names),
-        },
-    )?;
+    services.add("get_parameters", "GetParameters", |served, names: Names| {
+        served.parameters.values(&names)
+    })?;
     services.add(
         "get_parameter_types",
         "GetParameterTypes",
-        |served, request: GetParameterTypesRequest| GetParameterTypesResponse {
-            values: served.parameters.types(&request.names),
-        },
-    )?;
-    services.add(
-        "set_parameters",
-        "SetParameters",
-        |_, request: SetParametersRequest| SetParametersResponse {
-            results: request.parameter.chunks(1).map(refused).collect(),
-        },
-    )?;
-    services.add(
-        "set_parameters_atomically",
-        "SetParametersAtomically",
-        |_, request: SetParametersRequest| SetParametersAtomicallyResponse {
-            result: refused(&request.parameter),
-        },
-    )?;
-    services.add(
-        "list_parameters",
-        "ListParameters",
-        |served, request: ListParametersRequest| ListParametersResponse {
-            result: served.parameters.list(&request),
-        },
+        |served, names: Names| served.parameters.types(&names),
     )?;
     services.add(
         "describe_parameters",
         "DescribeParameters",
-        |served, request: DescribeParametersRequest| DescribeParametersResponse {
-            values: served.parameters.descriptors(&request.names),
-        },
+        |served, names: Names| served.parameters.descriptors(&names),
+    )?;
+    services.add(
+        "set_parameters",
+        "SetParameters",
+        |_, wanted: Vec<Parameter>| wanted.chunks(1).map(refused).collect::<Vec<_>>(),
+    )?;
+    services.add(
+        "set_parameters_atomically",
+        "SetParametersAtomically",
+        |_, wanted: Vec<Parameter>| refused(&wanted),
+    )?;
+    services.add(
+        "list_parameters",
+        "ListParameters",
+        |served, request: ListParametersRequest| served.parameters.list(&request),
     )?;
     if !is_managed {
         return Ok(services.all);
     }
+    // An empty request has one byte.
     services.package = "lifecycle_msgs";
-    services.add(
-        "change_state",
-        "ChangeState",
-        |served, request: ChangeState| {
-            let next = served.state.after(&request.transition);
-            served.state = next.unwrap_or(served.state);
-            Changed {
-                success: next.is_some(),
-            }
-        },
-    )?;
-    // An empty request is that of `std_srvs/srv/Trigger`.
-    services.add("get_state", "GetState", |served, _: TriggerRequest| {
-        CurrentState {
-            current_state: served.state.labelled(),
-        }
+    services.add("get_state", "GetState", |served, _: u8| {
+        served.state.labelled()
     })?;
-    services.add(
-        "get_available_states",
-        "GetAvailableStates",
-        |_, _: TriggerRequest| -> AvailableStates { State::all() },
-    )?;
+    services.add("get_available_states", "GetAvailableStates", |_, _: u8| {
+        State::all()
+    })?;
     services.add(
         "get_available_transitions",
         "GetAvailableTransitions",
-        |served, _: TriggerRequest| -> AvailableTransitions { served.state.available() },
+        |served, _: u8| served.state.available(),
     )?;
+    services.add("change_state", "ChangeState", |served, wanted: Labelled| {
+        let next = served.state.after(&wanted);
+        served.state = next.unwrap_or(served.state);
+        next.is_some()
+    })?;
     Ok(services.all)
 }

@@ -5,7 +5,7 @@ use damage::{Random, damage};
 use posegate_ros2::arguments::Command;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{
-    Header, Odometry, Pose, PoseWithCovariance, PoseWithCovarianceStamped, TriggerRequest,
+    Header, Odometry, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Single,
 };
 use posegate_ros2::permit_gate::{Origin, PermitGate};
 use posegate_ros2::poses::Poses;
@@ -99,7 +99,7 @@ fn damaged_payloads_never_permit_wrongly() {
             &payload,
             RepresentationIdentifier::CDR_LE,
         );
-        let _ = CDRDeserializerAdapter::<TriggerRequest>::from_bytes(
+        let _ = CDRDeserializerAdapter::<Single<u8>>::from_bytes(
             &payload,
             RepresentationIdentifier::CDR_LE,
         );
@@ -120,7 +120,9 @@ fn damaged_payloads_never_permit_wrongly() {
             publisher: [1; 16],
             number: 1,
         };
-        let report = Poses::new(&settings.poses, "/amcl_pose").with_covariance(&message);
+        let mut poses = Poses::new(&settings.poses, "/amcl_pose");
+        let PoseWithCovarianceStamped { header, pose } = message;
+        let report = poses.pose(header, None, &pose.pose, Some(pose.covariance));
         if node.pose(now(0), &report, origin).is_open {
             permits += 1;
             let is_right = read(&payload).is_some_and(|numbers| may_permit(&numbers));

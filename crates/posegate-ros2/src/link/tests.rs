@@ -1,4 +1,5 @@
 use super::*;
+use posegate::wire::LinkCounters;
 use posegate::gate::{InterlockFault, Reason};
 use posegate::wire::{ReportOutcome, encode};
 use proptest::prelude::*;

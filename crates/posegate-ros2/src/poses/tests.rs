@@ -1,6 +1,6 @@
 use super::*;
 use crate::arguments::Command;
-use crate::message::{Header, Pose, TransformStamped, TwistWithCovariance};
+use crate::message::{Header, Pose, PoseWithCovariance, TransformStamped, TwistWithCovariance};
 use crate::settings::NodeSettings;
 use posegate::set::Uncertainty;
 use std::fs;
@@ -66,10 +66,10 @@ fn site() -> std::path::PathBuf {
 fn pose_of_another_frame_is_refused_or_moved_to_the_base() {
     let mut plain = poses(STILL);
     for base in ["base_link", "/base_footprint"] {
-        assert!(plain.odometry(&odometry(base, 0.0, 1e-4)).pose.is_ok());
+        assert!(plain.odometry(odometry(base, 0.0, 1e-4)).pose.is_ok());
     }
     let refused = plain
-        .odometry(&odometry("antenna", 0.0, 1e-4))
+        .odometry(odometry("antenna", 0.0, 1e-4))
         .pose
         .unwrap_err();
     assert_eq!(refused.reason(), Reason::FrameMismatch);
@@ -78,13 +78,13 @@ fn pose_of_another_frame_is_refused_or_moved_to_the_base() {
         words.contains("[frame.antenna]") && words.contains("child_frame_id:=antenna"),
         "{words}"
     );
-    let refused = plain.odometry(&odometry("robot1/gps", 0.0, 1e-4)).pose;
+    let refused = plain.odometry(odometry("robot1/gps", 0.0, 1e-4)).pose;
     let words = refused.unwrap_err().to_string();
     assert!(words.contains("[frame.\"robot1/gps\"]"), "{words}");
     let mut named = poses(&format!("{STILL} -p child_frame_id:=robot1/base_link"));
     assert!(
         named
-            .odometry(&odometry("robot1/base_link", 0.0, 1e-4))
+            .odometry(odometry("robot1/base_link", 0.0, 1e-4))
             .pose
             .is_ok()
     );
@@ -95,11 +95,7 @@ fn pose_without_covariance_has_the_stated_bound() {
     let mut bounded = poses(&format!(
         "{STILL} -p pose_type:=pose -p set_translation_m:=0.02 -p set_yaw_deg:=1"
     ));
-    let message = PoseStamped {
-        header: header("map"),
-        pose: pose(0.25),
-    };
-    let report = bounded.pose(&message);
+    let report = bounded.pose(header("map"), None, &pose(0.25), None);
     let estimate = report.pose.unwrap();
     assert_eq!((report.frame.as_str(), estimate.x_m), ("map", 0.25));
     let Some(Uncertainty::Bounded {
@@ -116,7 +112,7 @@ fn pose_without_covariance_has_the_stated_bound() {
 fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     let mut plain = poses(STILL);
     let zero = plain
-        .odometry(&odometry("base_link", 0.0, 0.0))
+        .odometry(odometry("base_link", 0.0, 0.0))
         .pose
         .unwrap_err();
     assert_eq!(zero, RefusedPose::ZeroCovariance);
@@ -125,7 +121,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     for _ in 0..50 {
         assert!(
             plain
-                .odometry(&odometry("base_link", 0.0, 1e-4))
+                .odometry(odometry("base_link", 0.0, 1e-4))
                 .pose
                 .is_ok()
         );
@@ -134,7 +130,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     let refused = loop {
         accepted += 1;
         match plain
-            .odometry(&odometry("base_link", 0.01 * f64::from(accepted), 1e-4))
+            .odometry(odometry("base_link", 0.01 * f64::from(accepted), 1e-4))
             .pose
         {
             Ok(_) => assert!(accepted < 50),
@@ -145,7 +141,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     // Another covariance is an uncertainty again; a stated bound replaces a fixed one.
     assert!(
         plain
-            .odometry(&odometry("base_link", 0.0, 2e-4))
+            .odometry(odometry("base_link", 0.0, 2e-4))
             .pose
             .is_ok()
     );
@@ -153,7 +149,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
         "{STILL} -p set_translation_m:=0.02 -p set_yaw_deg:=1"
     ));
     for k in 0..50 {
-        let report = bounded.odometry(&odometry("base_link", 0.01 * f64::from(k), 0.0));
+        let report = bounded.odometry(odometry("base_link", 0.01 * f64::from(k), 0.0));
         assert!(matches!(
             report.pose.unwrap().spread,
             Some(Uncertainty::Bounded { .. })
@@ -166,8 +162,8 @@ fn transforms_of_one_robot_give_its_pose() {
     let mut tf = poses(&format!(
         "{STILL} -p pose_type:=tf -p set_translation_m:=0.02 -p set_yaw_deg:=1"
     ));
-    let message = |parent: &str, child: &str, sec: i32, x: f64| TfMessage {
-        transforms: vec![TransformStamped {
+    let message = |parent: &str, child: &str, sec: i32, x: f64| {
+        [TransformStamped {
             header: Header {
                 stamp: Time { sec, nanosec: 7 },
                 frame_id: parent.into(),
@@ -175,7 +171,7 @@ fn transforms_of_one_robot_give_its_pose() {
             child_frame_id: child.into(),
             translation: [x, 0.0, 0.0],
             rotation: [0.0, 0.0, 0.0, 1.0],
-        }],
+        }]
     };
     let [localization, wheels, other] = [[1; 16], [2; 16], [3; 16]];
     assert!(
@@ -218,7 +214,7 @@ fn place_and_origin_of_the_site_are_used() {
     };
     let mut poses = Poses::new(&settings, "/pose");
     let estimate = poses
-        .odometry(&odometry("antenna", 1000.6, 1e-4))
+        .odometry(odometry("antenna", 1000.6, 1e-4))
         .pose
         .unwrap();
     assert!((estimate.x_m - 0.1).abs() < 1e-9, "{estimate:?}");
