@@ -34,22 +34,13 @@ impl Now {
     /// Returns the gate's clock: wrapping milliseconds, rounded up, so that no estimate appears younger than it is.
     #[must_use]
     pub const fn ms(self) -> u32 {
-        self.ns
-            .div_euclid(1_000_000)
-            .wrapping_add(if self.ns.rem_euclid(1_000_000) == 0 {
-                0
-            } else {
-                1
-            }) as u32
+        (-(-self.ns).div_euclid(1_000_000)) as u32
     }
 
     /// Returns the moment as the stamp of a message.
     #[must_use]
     pub const fn time(self) -> Time {
-        Time {
-            sec: self.ns.div_euclid(1_000_000_000) as i32,
-            nanosec: self.ns.rem_euclid(1_000_000_000) as u32,
-        }
+        Time::from_ns(self.ns as i64)
     }
 
     /// Returns the stamp of a message on the gate's clock, rounded down. `None` if it is not a time, or is farther
@@ -59,7 +50,7 @@ impl Now {
         if !(stamp.nanosec < 1_000_000_000) {
             return None;
         }
-        let ns = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
+        let ns = i128::from(stamp.ns());
         let is_near = (self.ns - ns).abs() < (1 << 31) * 1_000_000;
         is_near.then_some(ns.div_euclid(1_000_000) as u32)
     }
@@ -67,7 +58,7 @@ impl Now {
     /// Returns the age of a stamp, nanoseconds; negative for a stamp in the future.
     #[must_use]
     pub const fn age_ns(self, stamp: Time) -> i128 {
-        self.ns - (stamp.sec as i128 * 1_000_000_000 + stamp.nanosec as i128)
+        self.ns - stamp.ns() as i128
     }
 
     /// Returns the age of a stamp, seconds; negative for a stamp in the future.

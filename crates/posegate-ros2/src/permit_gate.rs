@@ -16,7 +16,7 @@ use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
 use posegate::set::{Growth, Inflation, Uncertainty};
 use posegate::task::Risk;
 use posegate::track::{Increment, Tracker, TrackerSettings};
-use posegate_replay::remembers;
+use posegate_replay::{coordinates, remembers};
 
 /// The number of increments of the odometry that are kept for late fixes: 2.5 s at 50 Hz.
 const INCREMENTS: usize = 128;
@@ -68,6 +68,27 @@ pub struct LastReport {
     pub verdict: Verdict,
     /// The gate's answer: a denial may come from its memory.
     pub step: Result<(), Reason>,
+}
+
+/// What the gate says about a message.
+struct Evaluated {
+    estimate: PoseEstimate,
+    step: Step,
+    verdict: Verdict,
+}
+
+impl Evaluated {
+    /// Returns a denial of the message, whatever the step's reason.
+    fn denied(estimate: PoseEstimate, step: Step, reason: Reason) -> Self {
+        Self {
+            estimate,
+            step: Step {
+                verdict: Err(reason),
+                ..step
+            },
+            verdict: Verdict::deny(reason),
+        }
+    }
 }
 
 /// A gate for ROS messages.
@@ -151,10 +172,8 @@ impl<'a> PermitGate<'a> {
             (None, _) => return,
         }
         // Poses from a camera that is now in doubt are not carried on.
-        if self.tags.as_ref().is_some_and(|tags| !tags.has_camera())
-            && let Some(carried) = &mut self.carried
-        {
-            carried.tracker.drop_fix();
+        if self.tags.as_ref().is_some_and(|tags| !tags.has_camera()) {
+            self.drop_fix();
         }
     }
 
@@ -172,109 +191,112 @@ impl<'a> PermitGate<'a> {
             return self.tick(now);
         };
         let look = tags.look(message);
-        let now_ms = now.ms();
-        let (sequence, has_changed) = self.poses.next(origin);
-        if has_changed {
-            let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
-        }
-        let (mut poses, is_ambiguous) = match look {
-            Look::Poses(poses, is_ambiguous) => (poses, is_ambiguous),
+        let (now_ms, settings) = (now.ms(), self.settings);
+        let sequence = self.sequence(now_ms, origin);
+        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
+        let report = |belief| Report {
+            source: 0,
+            frame: FrameId::of(&settings.frame),
+            sequence,
+            stamp_ms,
+            belief,
+        };
+        let evaluated = match look {
             Look::Nothing => {
                 self.poses.leave_out();
                 return self.tick(now);
             }
-            Look::Contradiction(reason) => {
-                let (step, verdict) = self.refuse(now_ms, reason);
-                self.last = Some(LastReport {
-                    stamp: message.header.stamp,
-                    frame: self.settings.frame.clone(),
-                    estimate: NO_POSE,
-                    verdict,
-                    step: step.verdict,
-                });
-                return answer(now, step);
-            }
-        };
-        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
-        let report = Report {
-            source: 0,
-            frame: FrameId::of(&self.settings.frame),
-            sequence,
-            stamp_ms,
-            belief: poses.first().copied().unwrap_or(NO_POSE),
-        };
-        let (estimate, mut step, mut verdict) = if poses.len() == 1 {
-            let (step, verdict) = self.take_report(now_ms, &report, has_time);
-            (report.belief, step, verdict)
-        } else {
-            // A single pose can be carried, not one of several.
-            if let Some(carried) = &mut self.carried {
-                carried.tracker.drop_fix();
-                // The gate's source has no inflation: the tracker applies it.
-                for pose in &mut poses {
-                    *pose = inflated(pose, self.settings.trust.inflation);
+            Look::Contradiction(reason) => self.refuse(now_ms, reason),
+            Look::Poses(poses, is_ambiguous) => {
+                let evaluated = match poses.as_slice() {
+                    [pose] => self.take_report(now_ms, &report(*pose), has_time),
+                    _ => self.take_several(now_ms, report, poses),
+                };
+                // One of the poses is outside, whichever the gate names.
+                match evaluated.step.verdict {
+                    Err(reason) if is_ambiguous && !remembers(reason) => Evaluated {
+                        estimate: evaluated.estimate,
+                        ..self.inhibited(now_ms, Reason::TagPosesAmbiguous)
+                    },
+                    _ => evaluated,
                 }
             }
-            let report = Report {
-                belief: poses.first().copied().unwrap_or(NO_POSE),
-                ..report
-            };
-            let evidence = Evidence {
-                report: &report,
-                others: poses.get(1..).unwrap_or_default(),
-                beside: Growth::NONE,
-                elsewhere: Risk::NONE,
-                since_fix_ms: None,
-            };
-            let step = self.gate.step_on(now_ms, &evidence);
-            let (number, verdict) = self.gate.examine_on(&evidence);
-            let about = poses.get(usize::from(number)).copied();
-            (about.unwrap_or(report.belief), step, verdict)
         };
-        // One of the poses is outside, whichever the gate names.
-        if is_ambiguous && step.verdict.is_err_and(|reason| !remembers(reason)) {
-            let reason = Reason::TagPosesAmbiguous;
-            step = Step {
-                verdict: Err(reason),
-                ..self.gate.inhibit(now_ms, reason)
-            };
-            verdict = Verdict::deny(reason);
+        self.answer(now, message.header.stamp, &settings.frame, evaluated)
+    }
+
+    /// Gives the gate the poses of which any may be the robot's: it permits only if all are inside.
+    fn take_several(
+        &mut self,
+        now_ms: u32,
+        report: impl Fn(PoseEstimate) -> Report,
+        mut poses: Vec<PoseEstimate>,
+    ) -> Evaluated {
+        // A single pose can be carried, not one of several.
+        if let Some(carried) = &mut self.carried {
+            carried.tracker.drop_fix();
+            // The gate's source has no inflation: the tracker applies it.
+            for pose in &mut poses {
+                *pose = inflated(pose, self.settings.trust.inflation);
+            }
         }
-        self.last = Some(LastReport {
-            stamp: message.header.stamp,
-            frame: self.settings.frame.clone(),
-            estimate,
+        let report = report(poses.first().copied().unwrap_or(NO_POSE));
+        let evidence = Evidence {
+            report: &report,
+            others: poses.get(1..).unwrap_or_default(),
+            beside: Growth::NONE,
+            elsewhere: Risk::NONE,
+            since_fix_ms: None,
+        };
+        let step = self.gate.step_on(now_ms, &evidence);
+        let (number, verdict) = self.gate.examine_on(&evidence);
+        let about = poses.get(usize::from(number)).copied();
+        Evaluated {
+            estimate: about.unwrap_or(report.belief),
+            step,
             verdict,
-            step: step.verdict,
-        });
-        answer(now, step)
+        }
     }
 
     /// Processes a pose. One that is refused ends every permit with the reason of the refusal.
     pub fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
         let now_ms = now.ms();
+        let sequence = self.sequence(now_ms, origin);
+        let evaluated = match &message.pose {
+            Ok(belief) => {
+                let (stamp_ms, has_time) = self.stamp(now, message.stamp);
+                let report = Report {
+                    source: 0,
+                    frame: FrameId::of(&message.frame),
+                    sequence,
+                    stamp_ms,
+                    belief: *belief,
+                };
+                self.take_report(now_ms, &report, has_time)
+            }
+            Err(refused) => self.refuse(now_ms, refused.reason()),
+        };
+        self.answer(now, message.stamp, &message.frame, evaluated)
+    }
+
+    /// Returns the sequence number of a message.
+    fn sequence(&mut self, now_ms: u32, origin: Origin) -> u32 {
         let (sequence, has_changed) = self.poses.next(origin);
         if has_changed {
             // Two alternating publishers end every permit of each other.
             let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
         }
-        let (stamp_ms, has_time) = self.stamp(now, message.stamp);
-        let report = Report {
-            source: 0,
-            frame: FrameId::of(&message.frame),
-            sequence,
-            stamp_ms,
-            belief: message.pose.clone().unwrap_or(NO_POSE),
-        };
-        let (step, verdict) = match &message.pose {
-            Ok(_) => self.take_report(now_ms, &report, has_time),
-            Err(refused) => self.refuse(now_ms, refused.reason()),
-        };
+        sequence
+    }
+
+    /// Keeps what was evaluated as the last report, and returns the answer.
+    fn answer(&mut self, now: Now, stamp: Time, frame: &str, evaluated: Evaluated) -> Answer {
+        let step = evaluated.step;
         self.last = Some(LastReport {
-            stamp: message.stamp,
-            frame: message.frame.clone(),
-            estimate: report.belief,
-            verdict,
+            stamp,
+            frame: frame.to_owned(),
+            estimate: evaluated.estimate,
+            verdict: evaluated.verdict,
             step: step.verdict,
         });
         answer(now, step)
@@ -282,55 +304,68 @@ impl<'a> PermitGate<'a> {
 
     /// Ends a permit because of a message without a usable pose. It is left out of the sequence, and no earlier pose is
     /// carried on.
-    fn refuse(&mut self, now_ms: u32, reason: Reason) -> (Step, Verdict) {
+    fn refuse(&mut self, now_ms: u32, reason: Reason) -> Evaluated {
         self.poses.leave_out();
+        self.drop_fix();
+        self.inhibited(now_ms, reason)
+    }
+
+    /// Ends a permit, and denies a message for a reason.
+    fn inhibited(&mut self, now_ms: u32, reason: Reason) -> Evaluated {
+        let step = self.gate.inhibit(now_ms, reason);
+        Evaluated::denied(NO_POSE, step, reason)
+    }
+
+    /// From now on no earlier pose is carried.
+    fn drop_fix(&mut self) {
         if let Some(carried) = &mut self.carried {
             carried.tracker.drop_fix();
         }
-        let step = Step {
-            verdict: Err(reason),
-            ..self.gate.inhibit(now_ms, reason)
-        };
-        (step, Verdict::deny(reason))
     }
 
     /// Returns a stamp on the gate's clock, and `true` if it is a time. A stamp that is not on that clock counts as
     /// older than every permitted one.
     fn stamp(&self, now: Now, stamp: Time) -> (u32, bool) {
         let known = now.stamp_ms(stamp);
-        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
+        let stale = self.settings.gate().maximum_age_ms.wrapping_add(1);
         (
             known.unwrap_or(now.ms().wrapping_sub(stale)),
             known.is_some(),
         )
     }
 
-    fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> (Step, Verdict) {
+    fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> Evaluated {
+        let estimate = report.belief;
         // A pose without a known time cannot be carried, because the odometry at that time is not known either. The
         // gate denies its stamp.
-        if let Some(carried) = self.carried.as_mut().filter(|_| !has_time) {
-            carried.tracker.drop_fix();
+        if !has_time {
+            self.drop_fix();
         }
         let Some(carried) = self.carried.as_mut().filter(|_| has_time) else {
-            let step = self.gate.step(now_ms, report);
-            return (step, self.gate.examine(report));
+            return Evaluated {
+                estimate,
+                step: self.gate.step(now_ms, report),
+                verdict: self.gate.examine(report),
+            };
         };
         if let Err(reason) = carried.tracker.fix(report) {
             // The carried pose is unchanged.
-            let step = self.gate.tick(now_ms);
-            let step = Step {
-                verdict: Err(reason),
-                ..step
-            };
-            return (step, Verdict::deny(reason));
+            return Evaluated::denied(estimate, self.gate.tick(now_ms), reason);
         }
         match carried.tracker.tracked(now_ms) {
             Ok(tracked) => {
                 let evidence = tracked.evidence();
-                let step = self.gate.step_on(now_ms, &evidence);
-                (step, self.gate.examine_on(&evidence).1)
+                Evaluated {
+                    estimate,
+                    step: self.gate.step_on(now_ms, &evidence),
+                    verdict: self.gate.examine_on(&evidence).1,
+                }
             }
-            Err(reason) => (self.gate.inhibit(now_ms, reason), Verdict::deny(reason)),
+            Err(reason) => Evaluated {
+                estimate,
+                step: self.gate.inhibit(now_ms, reason),
+                verdict: Verdict::deny(reason),
+            },
         }
     }
 
@@ -399,10 +434,6 @@ impl<'a> PermitGate<'a> {
             carried.restart();
         }
         self.gate.reset(now.ms())
-    }
-
-    fn gate_settings(&self) -> Settings<'a> {
-        self.settings.gate()
     }
 }
 
@@ -543,9 +574,9 @@ impl Carried {
 
 /// Returns the movement between two poses, in the robot's axes at its start.
 fn increment(from: Pose, to: Pose, span_ms: [u32; 2]) -> Option<Increment> {
+    let [.., yaw] = coordinates(from);
     let um = |from: i32, to: i32| f64::from(to) - f64::from(from);
     let (dx, dy) = (um(from.x_um, to.x_um), um(from.y_um, to.y_um));
-    let yaw = f64::from(from.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
     let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
     // The unit of an increment; a length that is too large stays too large.
     let q8 = |um: f64| libm::round(um * 256.0) as i32;

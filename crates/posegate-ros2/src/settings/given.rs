@@ -34,8 +34,8 @@ enum Kind {
     Bool,
     /// A text that is not empty.
     Text(&'static str),
-    /// A finite number that satisfies the condition.
-    Number(fn(f64) -> bool, &'static str),
+    /// A number from the first to the second.
+    Number(f64, f64, &'static str),
     /// A whole number from the first to the second.
     Whole(u32, u32, &'static str),
     Word(&'static [&'static str], &'static str),
@@ -52,23 +52,12 @@ const TAG: Kind = Kind::Whole(
     u32::MAX,
     "the id of a tag, a whole number that is not below zero",
 );
-const AMOUNT: Kind = Kind::Number(|number| number >= 0.0, "a number that is not below zero");
-const FACTOR: Kind = Kind::Number(
-    |factor| (1.0..=4096.0).contains(&factor),
-    "a factor from 1 to 4096",
-);
-const PIXELS: Kind = Kind::Number(
-    |pixels| (0.01..=100.0).contains(&pixels),
-    "pixels from 0.01 to 100",
-);
-const TRANSLATION: Kind = Kind::Number(
-    |metres| metres > 0.0 && metres < 268.0,
-    "metres above 0 and below 268",
-);
-const YAW: Kind = Kind::Number(
-    |degrees| degrees > 0.0 && degrees <= 180.0,
-    "degrees above 0, at most 180",
-);
+const AMOUNT: Kind = Kind::Number(0.0, f64::MAX, "a number that is not below zero");
+const FACTOR: Kind = Kind::Number(1.0, 4096.0, "a factor from 1 to 4096");
+const PIXELS: Kind = Kind::Number(0.01, 100.0, "pixels from 0.01 to 100");
+const METRES: Kind = Kind::Number(ABOVE_0, 268f64.next_down(), "metres above 0 and below 268");
+const DEGREES: Kind = Kind::Number(ABOVE_0, 180.0, "degrees above 0, at most 180");
+const ABOVE_0: f64 = f64::MIN_POSITIVE;
 const RELIABILITY: Kind = Kind::Word(&["reliable", "best_effort"], "`reliable` or `best_effort`");
 const DURABILITY: Kind = Kind::Word(
     &["volatile", "transient_local"],
@@ -130,8 +119,8 @@ const DECLARED: [(&str, Of, Kind); 52] = [
     ("report_period_ms", Of::Gate, MS),
     ("restart", Of::Gate, RESTART),
     ("robot", Of::AnyNode, TEXT),
-    ("set_translation_m", Of::Poses, TRANSLATION),
-    ("set_yaw_deg", Of::Poses, YAW),
+    ("set_translation_m", Of::Poses, METRES),
+    ("set_yaw_deg", Of::Poses, DEGREES),
     ("site_digest", Of::AnyNode, DIGEST),
     ("stands_still", Of::Gate, Kind::Bool),
     ("task", Of::AnyNode, TEXT),
@@ -148,9 +137,9 @@ impl Kind {
         let (is_right, expected) = match self {
             Self::Bool => (value.is_bool(), "true or false"),
             Self::Text(words) => (value.as_str().is_some_and(|text| !text.is_empty()), words),
-            Self::Number(is_right, words) => {
-                let number = value.as_f64().filter(|number| number.is_finite());
-                (number.is_some_and(is_right), words)
+            Self::Number(least, most, words) => {
+                let range = least..=most;
+                (value.as_f64().is_some_and(|n| range.contains(&n)), words)
             }
             Self::Whole(least, most, words) => {
                 let range = u64::from(least)..=u64::from(most);
