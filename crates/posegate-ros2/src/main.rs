@@ -1,7 +1,7 @@
 //! `posegate-node`: the gate as a ROS 2 node.
 
 use posegate::gate::Settings;
-use posegate_ros2::arguments::{Command, USAGE};
+use posegate_ros2::arguments::{ArgumentError, Arguments};
 use posegate_ros2::bridge::Bridge;
 use posegate_ros2::clock::Now;
 use posegate_ros2::decider::Decider;
@@ -20,6 +20,11 @@ fn main() -> ExitCode {
     match start() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            if let Some(ArgumentError::Line(asked)) = error.downcast_ref()
+                && !asked.use_stderr()
+            {
+                asked.exit();
+            }
             eprintln!("posegate-node: {error}");
             ExitCode::from(2)
         }
@@ -27,17 +32,7 @@ fn main() -> ExitCode {
 }
 
 fn start() -> Result<(), Box<dyn Error>> {
-    let arguments = match Command::parse(std::env::args().skip(1))? {
-        Command::Help => {
-            println!("{USAGE}");
-            return Ok(());
-        }
-        Command::Version => {
-            println!("posegate-node {}", env!("CARGO_PKG_VERSION"));
-            return Ok(());
-        }
-        Command::Run(arguments) => arguments,
-    };
+    let arguments = Arguments::read(std::env::args().skip(1))?;
     let environment = Environment::read(|name| std::env::var(name).ok())?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {

@@ -7,7 +7,7 @@ const NODE: &str = "posegate";
 
 /// The names in use, each absolute. Names are relative by default: `__ns:=/robot1` moves them all but `/diagnostics`
 /// and `/tf`, which are absolute by convention.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// The namespace, `/` or `/robot1`.
     pub namespace: String,

@@ -2,7 +2,7 @@
 //! of the same bytes and the plain definition of the success set contradict.
 
 use damage::{Random, damage};
-use posegate_ros2::arguments::Command;
+use posegate_ros2::arguments::Arguments;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{
     Header, Odometry, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Single,
@@ -78,13 +78,11 @@ fn may_permit((sec, nanosec, frame, numbers): &(i32, u32, Vec<u8>, [f64; 43])) -
 
 #[test]
 fn damaged_payloads_never_permit_wrongly() {
-    let Ok(Command::Run(arguments)) = Command::parse(
+    let arguments = Arguments::read(
         "dock.posegate --ros-args -p stands_still:=true -p cross_terms:=filled -p permits_in_a_row:=1 -p inhibit_hold_ms:=1"
             .split(' ')
             .map(str::to_owned),
-    ) else {
-        panic!("arguments");
-    };
+    ).unwrap();
     let settings = NodeSettings::new(&arguments, TABLE).unwrap();
     let gate = settings.gate();
     let now = |ms: i128| Now::from_ns(i128::from(START_S) * 1_000_000_000 + ms * 1_000_000);

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use crate::permission::Heartbeat;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
@@ -46,10 +46,8 @@ fn read_with(folder: &Path, more: &str) -> Result<Vec<Dock>, DocksError> {
         "{} {more} -p stands_still:=true -p cross_terms:=filled",
         folder.display()
     );
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => read(&arguments),
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
+    read(&arguments)
 }
 
 fn at(ms: u32) -> Now {

@@ -1,6 +1,6 @@
 use super::*;
-use posegate::wire::LinkCounters;
 use posegate::gate::{InterlockFault, Reason};
+use posegate::wire::LinkCounters;
 use posegate::wire::{ReportOutcome, encode};
 use proptest::prelude::*;
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use crate::message::{Header, Pose as RosPose, PoseWithCovarianceStamped, TwistWithCovariance};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
@@ -10,10 +10,8 @@ const ODOMETRY: &str = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p
 
 fn settings(line: &str) -> NodeSettings {
     let line = format!("dock.posegate --ros-args {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
+    NodeSettings::new(&arguments, TABLE).unwrap()
 }
 
 /// A moment, milliseconds after the start.

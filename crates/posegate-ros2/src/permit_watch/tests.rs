@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use crate::message::{KeyValue, WARN};
 use crate::permission::Heartbeat;
 use crate::permit_gate::Answer;
@@ -21,10 +21,8 @@ fn settings(table: &[u8], number: usize) -> NodeSettings {
     let line = format!(
         "t.posegate --ros-args -r __ns:=/robot{number} -p stands_still:=true -p cross_terms:=filled"
     );
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, table).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
+    NodeSettings::new(&arguments, table).unwrap()
 }
 
 fn answer(ms: i128, is_open: bool) -> Answer {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use crate::message::{Header, Pose, PoseWithCovariance, TransformStamped, TwistWithCovariance};
 use crate::settings::NodeSettings;
 use posegate::set::Uncertainty;
@@ -9,13 +9,9 @@ const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate")
 
 fn poses(line: &str) -> Poses {
     let line = format!("dock.posegate {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => {
-            let settings = NodeSettings::new(&arguments, TABLE).unwrap();
-            Poses::new(&settings.poses, "/pose")
-        }
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
+    let settings = NodeSettings::new(&arguments, TABLE).unwrap();
+    Poses::new(&settings.poses, "/pose")
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";

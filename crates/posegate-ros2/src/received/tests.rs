@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use rustdds::{DomainParticipantStatusEvent, GUID};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
@@ -7,10 +7,8 @@ const START: i128 = 1_800_000_000_000_000_000;
 
 fn settings(line: &str) -> NodeSettings {
     let line = format!("dock.posegate --ros-args -p stands_still:=true {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
+    NodeSettings::new(&arguments, TABLE).unwrap()
 }
 
 fn received() -> Received {

@@ -21,7 +21,7 @@ const CORNER_SIGMA_PX: f64 = 0.5;
 
 impl Given<'_> {
     pub(super) fn serial(&self, arguments: &Arguments) -> Result<Option<Serial>, SettingsError> {
-        let Some((path, baud)) = &arguments.serial else {
+        let Some(path) = &arguments.serial else {
             return match self.has("link_timeout_ms") {
                 false => Ok(None),
                 true => Err(SettingsError::NoSerial),
@@ -34,7 +34,7 @@ impl Given<'_> {
             }),
             None => Ok(Some(Serial {
                 path: path.clone(),
-                baud: *baud,
+                baud: arguments.baud,
                 link_timeout_ms: self.whole("link_timeout_ms", 150),
             })),
         }

@@ -1,15 +1,13 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use posegate::set::{CrossTerms, Inflation};
 
 const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
 
 fn settings(line: &str) -> Result<NodeSettings, SettingsError> {
     let words = format!("dock.posegate {line}");
-    match Command::parse(words.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE),
-        other => panic!("{line}: {other:?}"),
-    }
+    let arguments = Arguments::read(words.split_whitespace().map(str::to_owned)).unwrap();
+    NodeSettings::new(&arguments, TABLE)
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";
@@ -222,9 +220,7 @@ fn invalid_parameters_have_their_own_errors() {
 
 #[test]
 fn invalid_table_bytes_are_refused() {
-    let Ok(Command::Run(arguments)) = Command::parse(["x".to_owned()]) else {
-        panic!("a table");
-    };
+    let arguments = Arguments::read(["x".to_owned()]).unwrap();
     let refused = NodeSettings::new(&arguments, &TABLE[..100]);
     assert!(matches!(refused, Err(SettingsError::Table(_))));
 }

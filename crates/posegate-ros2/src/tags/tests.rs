@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::arguments::Arguments;
 use crate::clock::Now;
 use crate::message::{
     AprilTagDetection, Header, Odometry, Pose, PoseWithCovariance, RegionOfInterest,
@@ -34,10 +34,8 @@ fn table() -> Vec<u8> {
 
 fn settings(table: &[u8], line: &str) -> NodeSettings {
     let line = format!("dock.posegate --site {SITE} --ros-args {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, table).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
+    NodeSettings::new(&arguments, table).unwrap()
 }
 
 fn topics() -> [String; 2] {
