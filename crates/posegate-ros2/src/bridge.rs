@@ -53,7 +53,7 @@ impl Bridge {
         let first = std::hash::RandomState::new().build_hasher().finish() as u32;
         Ok(Self {
             port: Port::open(&serial.path, serial.baud)?,
-            link: Link::new(),
+            link: Link::default(),
             limit: Duration::from_millis(u64::from(serial.link_timeout_ms)),
             order: Order::default(),
             first,
@@ -293,7 +293,7 @@ impl Decider for Bridge {
         }
     }
 
-    fn patience(&self) -> Option<Duration> {
-        Some(READ_PERIOD)
+    fn patience(&self) -> Duration {
+        READ_PERIOD
     }
 }

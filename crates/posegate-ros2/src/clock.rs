@@ -72,18 +72,12 @@ impl Now {
 ///
 /// A gate detects that its clock goes backwards between two steps. It cannot detect a clock that is set forward, or
 /// back by less than a cycle; then stamps from before and after are not of one clock.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ClockWatch {
     last: Option<(Now, [Instant; 2])>,
 }
 
 impl ClockWatch {
-    /// Returns a watch without a reading.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { last: None }
-    }
-
     /// Reads both clocks. Returns `true` if the system's clock was set since the last time.
     pub fn check(&mut self) -> bool {
         let before = Instant::now();
@@ -103,12 +97,6 @@ impl ClockWatch {
         let passed = now.ns - last.ns;
         let most = STEP_MS * 1_000_000;
         !(passed >= shortest - most && passed <= longest + most)
-    }
-}
-
-impl Default for ClockWatch {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -166,7 +154,7 @@ mod tests {
     #[test]
     fn setting_the_clock_is_detected() {
         let start = Instant::now();
-        let mut watch = ClockWatch::new();
+        let mut watch = ClockWatch::default();
         let mut was_set = |system_ms: i128, monotonic_ms: u64, late_ms: u64| {
             let at = |ms| start + Duration::from_millis(ms);
             let monotonic = [at(monotonic_ms), at(monotonic_ms + late_ms)];

@@ -62,9 +62,9 @@ pub trait Decider {
         None
     }
 
-    /// Returns the longest time to wait for a message, if it is shorter than a control cycle.
-    fn patience(&self) -> Option<Duration> {
-        None
+    /// Returns the longest time to wait for a message, if that is shorter than a control cycle.
+    fn patience(&self) -> Duration {
+        Duration::MAX
     }
 
     /// Returns `true` if the task is asked for by name.

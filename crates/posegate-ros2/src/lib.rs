@@ -12,6 +12,8 @@ pub mod decider;
 pub mod diagnostics;
 pub mod docks;
 pub mod entities;
+#[cfg(test)]
+mod fixtures;
 pub mod graph;
 pub mod lifecycle;
 pub mod link;

@@ -42,8 +42,8 @@ pub struct Counts {
     pub restarts: u64,
 }
 
-/// The line to a controller.
-#[derive(Debug)]
+/// The line to a controller, without any telemetry at first.
+#[derive(Debug, Default)]
 pub struct Link {
     receiver: Receiver,
     last: Option<Heard>,
@@ -60,24 +60,12 @@ struct Heard {
 }
 
 impl Link {
-    /// Returns a line without any telemetry.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            receiver: Receiver::new(),
-            last: None,
-            anchor: None,
-            sent: VecDeque::new(),
-            counts: Counts::default(),
-        }
-    }
-
     /// Forgets all telemetry: the line was closed.
     pub fn close(&mut self) {
         let counts = self.counts;
         *self = Self {
             counts,
-            ..Self::new()
+            ..Self::default()
         };
     }
 
@@ -207,12 +195,6 @@ impl Link {
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
-    }
-}
-
-impl Default for Link {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -6,7 +6,6 @@ use posegate_ros2::bridge::Bridge;
 use posegate_ros2::clock::Now;
 use posegate_ros2::decider::Decider;
 use posegate_ros2::docks::{self, Dock, DockGate};
-use posegate_ros2::entities::GraphError;
 use posegate_ros2::graph::Environment;
 use posegate_ros2::names::Names;
 use posegate_ros2::run::Runner;
@@ -47,30 +46,30 @@ fn start() -> Result<(), Box<dyn Error>> {
     let settings = &docks.first().ok_or("the site has no table")?.settings;
     let names = &arguments.names;
     let (node, task, poses) = (names.full_node(), settings.task(), source(names, settings));
-    let run = Run {
-        environment,
-        names,
-        settings,
-        stop: &stop,
-    };
     let topics = [names.detections.clone(), names.camera_info.clone()];
-    if is_site {
-        let gate = DockGate::new(&docks, &gates, topics);
+    let (decider, what): (Box<dyn Decider>, String) = if is_site {
         let (tasks, asked) = (docks.len(), &names.task);
-        run.with(
-            gate,
-            format!("{node} has {tasks} tasks, decides by {poses} on the one that {asked} names"),
-        )?;
+        let what = format!("has {tasks} tasks, decides by {poses} on the one that {asked} names");
+        (Box::new(DockGate::new(&docks, &gates, topics)), what)
     } else if let Some(serial) = &settings.serial {
         let device = serial.path.display();
-        run.with(Bridge::open(serial)?, format!("{node} passes {poses} to the controller on {device}, which decides on the task `{task}`"))?;
+        let what = format!(
+            "passes {poses} to the controller on {device}, which decides on the task `{task}`"
+        );
+        (Box::new(Bridge::open(serial)?), what)
     } else {
         let gate = DockGate::alone(&docks, &gates, topics, Now::read())?;
-        run.with(
-            gate,
-            format!("{node} decides on the task `{task}` by {poses}"),
-        )?;
-    }
+        (
+            Box::new(gate),
+            format!("decides on the task `{task}` by {poses}"),
+        )
+    };
+    let mut runner = Runner::join(environment, names, decider, settings)?;
+    eprintln!(
+        "posegate-node: {node} {what}, in domain {}",
+        environment.domain
+    );
+    runner.run(&stop)?;
     // DDS needs many seconds to leave the graph in order, and the denial has been published.
     std::process::exit(0);
 }
@@ -85,24 +84,4 @@ fn source<'n>(names: &'n Names, settings: &NodeSettings) -> &'n str {
         eprintln!("posegate-node: warning: {warning}");
     }
     topic
-}
-
-/// What a node runs with.
-struct Run<'n> {
-    environment: Environment,
-    names: &'n Names,
-    settings: &'n NodeSettings,
-    stop: &'n AtomicBool,
-}
-
-impl Run<'_> {
-    /// Runs the node by a decider. `what` is printed once it has joined the graph.
-    fn with(&self, decider: impl Decider, what: String) -> Result<(), GraphError> {
-        let mut runner = Runner::join(self.environment, self.names, decider, self.settings)?;
-        eprintln!(
-            "posegate-node: {what}, in domain {}",
-            self.environment.domain
-        );
-        runner.run(self.stop)
-    }
 }

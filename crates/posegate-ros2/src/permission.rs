@@ -33,7 +33,7 @@ pub struct Heartbeat {
 impl Heartbeat {
     /// Starts the heartbeats of a run, with a random name by which consumers detect a restart.
     #[must_use]
-    pub fn new() -> Self {
+    pub fn start() -> Self {
         let random = std::hash::RandomState::new().build_hasher().finish();
         Self {
             run: format!("{random:016x}"),
@@ -77,12 +77,6 @@ impl Heartbeat {
             values,
         };
         array(answer.now, vec![status])
-    }
-}
-
-impl Default for Heartbeat {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

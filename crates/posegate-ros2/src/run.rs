@@ -13,6 +13,7 @@ use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
 use crate::poses::Poses;
+use crate::received::Received;
 use crate::services::Served;
 use crate::settings::NodeSettings;
 use posegate::gate::Reason;
@@ -35,11 +36,11 @@ const BATCH: usize = 64;
 const DETECTIONS: usize = 4;
 
 /// A running node.
-pub struct Runner<'a, D> {
+pub struct Runner<'a> {
     graph: Graph,
     environment: Environment,
     names: &'a Names,
-    gate: D,
+    gate: Box<dyn Decider + 'a>,
     settings: &'a NodeSettings,
     heartbeat: Heartbeat,
     watch: ClockWatch,
@@ -64,11 +65,7 @@ struct Sent {
     slow: Option<Instant>,
 }
 
-fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
-    last.is_none_or(|last| now.saturating_duration_since(last) >= period)
-}
-
-impl<'a, D: Decider> Runner<'a, D> {
+impl<'a> Runner<'a> {
     /// Creates a node and joins a graph.
     ///
     /// # Errors
@@ -76,7 +73,7 @@ impl<'a, D: Decider> Runner<'a, D> {
     pub fn join(
         environment: Environment,
         names: &'a Names,
-        gate: D,
+        gate: Box<dyn Decider + 'a>,
         settings: &'a NodeSettings,
     ) -> Result<Self, GraphError> {
         let graph = Graph::join(environment, names, settings, gate.takes_tasks())?;
@@ -89,8 +86,8 @@ impl<'a, D: Decider> Runner<'a, D> {
             names,
             gate,
             settings,
-            heartbeat: Heartbeat::new(),
-            watch: ClockWatch::new(),
+            heartbeat: Heartbeat::start(),
+            watch: ClockWatch::default(),
             clock_steps: 0,
             lifecycle: match settings.is_managed {
                 true => State::Unconfigured,
@@ -130,10 +127,7 @@ impl<'a, D: Decider> Runner<'a, D> {
         while !(stop.load(Ordering::Relaxed) || self.lifecycle == State::Finalized) {
             // A report that came directly after a heartbeat waits no longer than necessary.
             let timeout = if self.has_report { SHORTEST } else { cycle };
-            let timeout = self
-                .gate
-                .patience()
-                .map_or(timeout, |patience| timeout.min(patience));
+            let timeout = timeout.min(self.gate.patience());
             match self.graph.poll().poll(&mut events, Some(timeout)) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => other?,
@@ -296,11 +290,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                 .or_else(|| pose.hold(settings)),
             Reason::Stale | Reason::TimeBackwards => pose.stamps(settings),
             Reason::CovarianceZero | Reason::CovarianceUnknown => self.refused.clone(),
-            Reason::FrameMismatch => self.refused.clone().or_else(|| {
-                self.gate
-                    .frame()
-                    .and_then(|frame| wrong_frame(frame, settings))
-            }),
+            Reason::FrameMismatch => self.unused(),
             Reason::PoseSetTooLarge => settings
                 .movement()
                 .map(|movement| format!("{} {movement}", words(reason, None))),
@@ -308,65 +298,59 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
     }
 
+    /// Returns why the last pose was not used.
+    fn unused(&self) -> Option<String> {
+        let wrong_frame = || wrong_frame(self.gate.frame()?, self.settings);
+        self.refused.clone().or_else(wrong_frame)
+    }
+
     /// Publishes the messages that are due. Failed publications are not repeated: silence denies.
     fn publish(&mut self, answer: &Answer, now: Instant, is_last: bool) {
         let has_changed = answer.is_open != self.was_open || is_last;
         self.was_open = answer.is_open;
+        let is_due = |last: Option<Instant>, period: Duration| {
+            let passed = last.map(|last| now.saturating_duration_since(last));
+            has_changed || passed.is_none_or(|passed| passed >= period)
+        };
         let ms = |ms: u32| Duration::from_millis(u64::from(ms));
-        let reports = self.has_report && is_due(self.sent.heartbeat, now, SHORTEST);
+        let (settings, cycle_ms) = (self.settings, self.settings.cycle_ms);
         // A cycle early rather than late.
-        let period = ms(self.settings.heartbeat_ms - self.settings.cycle_ms + 1);
-        if has_changed || reports || is_due(self.sent.heartbeat, now, period) {
+        let period = ms(settings.heartbeat_ms - cycle_ms + 1);
+        let period = match self.has_report {
+            true => period.min(SHORTEST),
+            false => period,
+        };
+        if is_due(self.sent.heartbeat, period) {
             self.has_report = false;
             self.sent.heartbeat = Some(now);
-            let report = self.gate.report();
-            let message = self.heartbeat.next(
-                answer,
-                self.settings,
-                self.gate.chosen(self.settings),
-                report,
-            );
+            let (report, task) = (self.gate.report(), self.gate.chosen(settings));
+            let message = self.heartbeat.next(answer, settings, task, report);
             let _ = self.graph.permission.publish(message);
         }
-        if has_changed
-            || is_due(
-                self.sent.permit,
-                now,
-                PERMIT_PERIOD - ms(self.settings.cycle_ms.min(99)),
-            )
-        {
+        if is_due(self.sent.permit, PERMIT_PERIOD - ms(cycle_ms.min(99))) {
             self.sent.permit = Some(now);
             let _ = self.graph.permit.publish(answer.is_open);
         }
-        if has_changed || is_due(self.sent.slow, now, SLOW_PERIOD) {
+        if is_due(self.sent.slow, SLOW_PERIOD) {
             self.sent.slow = Some(now);
-            let frame = self.gate.frame();
-            let refused = self.refused.clone();
-            let refused =
-                refused.or_else(|| frame.and_then(|frame| wrong_frame(frame, self.settings)));
-            let topics = &self.graph;
-            let odometry = topics
-                .odom
-                .as_ref()
-                .map(|topic| ("odometry", &topic.received));
-            let camera_info = topics
-                .camera_info
-                .as_ref()
-                .map(|topic| ("camera info", &topic.received));
+            let received = |name, received: &Received| received.status(name, answer.now, None);
+            let odometry = self.graph.odom.as_ref();
+            let odometry = odometry.map(|topic| received("odometry", &topic.received));
+            let camera_info = self.graph.camera_info.as_ref();
+            let camera_info = camera_info.map(|topic| received("camera info", &topic.received));
             let others = odometry.into_iter().chain(camera_info);
-            let others = others.map(|(name, received)| received.status(name, answer.now, None));
             let more = others.chain(self.gate.diagnostics(answer.now)).collect();
             let message = diagnostics(
                 answer,
-                self.settings,
-                self.gate.chosen(self.settings),
+                settings,
+                self.gate.chosen(settings),
                 self.hint(answer).as_deref(),
-                (&self.graph.input.received, refused),
+                (&self.graph.input.received, self.unused()),
                 self.clock_steps,
                 more,
             );
             let _ = self.graph.diagnostics.publish(message);
-            if let Some(markers) = self.gate.markers(answer).filter(|_| self.settings.markers) {
+            if let Some(markers) = self.gate.markers(answer).filter(|_| settings.markers) {
                 let _ = self.graph.markers.publish(markers);
             }
         }

@@ -18,7 +18,7 @@ mod given;
 mod reader;
 
 /// The quality of service of a subscription.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delivery {
     /// `true` for reliable, `false` for best effort.
     pub reliable: bool,

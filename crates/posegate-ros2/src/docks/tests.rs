@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Arguments;
+use crate::fixtures::{arguments, at, origin};
 use crate::permission::Heartbeat;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
@@ -16,7 +16,6 @@ const TABLES: [(&str, &[u8]); 2] = [
         include_bytes!("../../../../examples/tables/see-t7.posegate"),
     ),
 ];
-const START: i128 = 1_800_000_000_000_000_000;
 
 /// Makes the folder of a built site, as a merge writes it.
 fn built(name: &str) -> PathBuf {
@@ -46,17 +45,12 @@ fn read_with(folder: &Path, more: &str) -> Result<Vec<Dock>, DocksError> {
         "{} {more} -p stands_still:=true -p cross_terms:=filled",
         folder.display()
     );
-    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
-    read(&arguments)
-}
-
-fn at(ms: u32) -> Now {
-    Now::from_ns(START + i128::from(ms) * 1_000_000)
+    read(&arguments(&line))
 }
 
 /// Gives good poses at the dock for 1.5 s. Returns the heartbeats.
 fn drive(gate: &mut DockGate<'_>, docks: &[Dock], ms: &mut u32) -> Vec<(bool, String, String)> {
-    let (given, mut heartbeat) = (&docks[0].settings, Heartbeat::new());
+    let (given, mut heartbeat) = (&docks[0].settings, Heartbeat::start());
     let mut all = Vec::new();
     for _ in 0..15 {
         *ms += 100;
@@ -75,11 +69,7 @@ fn drive(gate: &mut DockGate<'_>, docks: &[Dock], ms: &mut u32) -> Vec<(bool, St
             frame: "map".into(),
             pose: Ok(belief),
         };
-        let origin = Origin {
-            publisher: [1; 16],
-            number: i64::from(*ms / 100),
-        };
-        let answer = gate.pose(at(*ms), &report, origin);
+        let answer = gate.pose(at(*ms), &report, origin(i64::from(*ms / 100)));
         let message = heartbeat.next(&answer, given, gate.chosen(given), Vec::new());
         let status = &message.status[0];
         let value = |key| status.value(key).unwrap_or_default().to_owned();

@@ -1,69 +1,28 @@
 use super::*;
-use crate::arguments::Arguments;
-use crate::message::{Header, Pose as RosPose, PoseWithCovarianceStamped, TwistWithCovariance};
+use crate::fixtures::{self, ODOMETRY, TABLE, at, header, odometry, origin, with_variances};
+use crate::message::Header;
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-const START: i128 = 1_800_000_000_000_000_000;
 const STILL: &str = "-p stands_still:=true -p cross_terms:=filled";
-const ODOMETRY: &str = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p odometry_rad_per_sqrt_rad:=0.001 \
-    -p odometry_rad_per_sqrt_m:=0.001 -p odometry_slip:=0.01";
+const VARIANCES: [f64; 3] = [1e-4, 1e-4, 1e-5];
 
 fn settings(line: &str) -> NodeSettings {
-    let line = format!("dock.posegate --ros-args {line}");
-    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
-    NodeSettings::new(&arguments, TABLE).unwrap()
-}
-
-/// A moment, milliseconds after the start.
-fn at(ms: u32) -> Now {
-    Now::from_ns(START + i128::from(ms) * 1_000_000)
-}
-
-fn origin(number: i64) -> Origin {
-    Origin {
-        publisher: [1; 16],
-        number,
-    }
-}
-
-fn message_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
-    let mut covariance = [0.0; 36];
-    (covariance[0], covariance[7], covariance[35]) = (1e-4, 1e-4, 1e-5);
-    PoseWithCovarianceStamped {
-        header: Header {
-            stamp: at(ms).time(),
-            frame_id: frame.into(),
-        },
-        pose: PoseWithCovariance {
-            pose: RosPose {
-                position: [x, 0.0, 0.0],
-                orientation: [0.0, 0.0, 0.0, 1.0],
-            },
-            covariance,
-        },
-    }
+    fixtures::settings(TABLE, &format!("--ros-args {line}"))
 }
 
 fn pose_at(ms: u32, x: f64, frame: &str) -> PoseReport {
-    let message = message_at(ms, x, frame);
     PoseReport {
-        stamp: message.header.stamp,
-        frame: message.header.frame_id,
-        pose: Ok(estimate(&message.pose)),
+        stamp: at(ms).time(),
+        frame: frame.into(),
+        pose: Ok(estimate(&with_variances(x, VARIANCES))),
     }
 }
 
 fn odometry_at(ms: u32, x: f64) -> Odometry {
-    let pose = message_at(ms, x, "odom");
-    Odometry {
-        header: pose.header,
-        child_frame_id: "base_link".into(),
-        pose: pose.pose,
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
-    }
+    odometry(
+        header(at(ms), "odom"),
+        "base_link",
+        with_variances(x, VARIANCES),
+    )
 }
 
 /// The moment up to which valid poses have opened the gate, milliseconds after the start.

@@ -1,17 +1,11 @@
 use super::*;
-use crate::arguments::Arguments;
-use crate::message::{Header, Pose, PoseWithCovariance, TransformStamped, TwistWithCovariance};
-use crate::settings::NodeSettings;
+use crate::fixtures::{self, TABLE, pose, with_variances};
+use crate::message::{Header, TransformStamped};
 use posegate::set::Uncertainty;
 use std::fs;
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-
 fn poses(line: &str) -> Poses {
-    let line = format!("dock.posegate {line}");
-    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
-    let settings = NodeSettings::new(&arguments, TABLE).unwrap();
-    Poses::new(&settings.poses, "/pose")
+    Poses::new(&fixtures::settings(TABLE, line).poses, "/pose")
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";
@@ -23,30 +17,8 @@ fn header(frame: &str) -> Header {
     }
 }
 
-fn pose(x: f64) -> Pose {
-    Pose {
-        position: [x, 0.0, 0.0],
-        orientation: [0.0, 0.0, 0.0, 1.0],
-    }
-}
-
 fn odometry(child: &str, x: f64, variance: f64) -> Odometry {
-    let mut covariance = [0.0; 36];
-    for at in [0, 7, 35] {
-        covariance[at] = variance;
-    }
-    Odometry {
-        header: header("map"),
-        child_frame_id: child.into(),
-        pose: PoseWithCovariance {
-            pose: pose(x),
-            covariance,
-        },
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
-    }
+    fixtures::odometry(header("map"), child, with_variances(x, [variance; 3]))
 }
 
 /// The site of the table, with the place of an antenna and an origin.

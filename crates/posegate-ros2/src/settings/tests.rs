@@ -1,13 +1,9 @@
 use super::*;
-use crate::arguments::Arguments;
+use crate::fixtures::{TABLE, arguments};
 use posegate::set::{CrossTerms, Inflation};
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-
 fn settings(line: &str) -> Result<NodeSettings, SettingsError> {
-    let words = format!("dock.posegate {line}");
-    let arguments = Arguments::read(words.split_whitespace().map(str::to_owned)).unwrap();
-    NodeSettings::new(&arguments, TABLE)
+    NodeSettings::new(&arguments(&format!("dock.posegate {line}")), TABLE)
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";
@@ -220,8 +216,7 @@ fn invalid_parameters_have_their_own_errors() {
 
 #[test]
 fn invalid_table_bytes_are_refused() {
-    let arguments = Arguments::read(["x".to_owned()]).unwrap();
-    let refused = NodeSettings::new(&arguments, &TABLE[..100]);
+    let refused = NodeSettings::new(&arguments("x"), &TABLE[..100]);
     assert!(matches!(refused, Err(SettingsError::Table(_))));
 }
 

@@ -1,11 +1,7 @@
 use super::*;
-use crate::arguments::Arguments;
-use crate::clock::Now;
-use crate::message::{
-    AprilTagDetection, Header, Odometry, Pose, PoseWithCovariance, RegionOfInterest,
-    TwistWithCovariance,
-};
-use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::fixtures::{self, ODOMETRY, at, odometry, origin, with_variances};
+use crate::message::{AprilTagDetection, Header, Odometry, RegionOfInterest};
+use crate::permit_gate::{Answer, PermitGate};
 use crate::settings::NodeSettings;
 use posegate::bake::BakeInput;
 use posegate::gate::{Gate, Reason};
@@ -13,7 +9,6 @@ use posegate::report::{FrameId, Report};
 use posegate_site::Site;
 
 const SITE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/tags.toml");
-const START: i128 = 1_800_000_000_000_000_000;
 /// The goal, and the place from which tag 7 looks almost the same: mirrored about its normal.
 const GOAL: [f64; 3] = [0.0, 0.0, 0.0];
 const MIRRORED_DEG: f64 = 40.0;
@@ -33,24 +28,11 @@ fn table() -> Vec<u8> {
 }
 
 fn settings(table: &[u8], line: &str) -> NodeSettings {
-    let line = format!("dock.posegate --site {SITE} --ros-args {line}");
-    let arguments = Arguments::read(line.split_whitespace().map(str::to_owned)).unwrap();
-    NodeSettings::new(&arguments, table).unwrap()
+    fixtures::settings(table, &format!("--site {SITE} --ros-args {line}"))
 }
 
 fn topics() -> [String; 2] {
     ["/detections".into(), "/camera_info".into()]
-}
-
-fn at(ms: u32) -> Now {
-    Now::from_ns(START + i128::from(ms) * 1_000_000)
-}
-
-fn origin(number: i64) -> Origin {
-    Origin {
-        publisher: [1; 16],
-        number,
-    }
 }
 
 fn mirrored() -> [f64; 3] {
@@ -94,28 +76,11 @@ fn detection(id: i32, pose: [f64; 3]) -> AprilTagDetection {
 }
 
 fn header(ms: u32) -> Header {
-    Header {
-        stamp: at(ms).time(),
-        frame_id: "front".into(),
-    }
+    fixtures::header(at(ms), "front")
 }
 
 fn at_rest(ms: u32) -> Odometry {
-    Odometry {
-        header: header(ms),
-        child_frame_id: "base_link".into(),
-        pose: PoseWithCovariance {
-            pose: Pose {
-                position: [0.0; 3],
-                orientation: [0.0, 0.0, 0.0, 1.0],
-            },
-            covariance: [0.0; 36],
-        },
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
-    }
+    odometry(header(ms), "base_link", with_variances(0.0, [0.0; 3]))
 }
 
 fn image(ms: u32, detections: Vec<AprilTagDetection>) -> AprilTagDetectionArray {
@@ -389,9 +354,8 @@ fn unknown_tags_are_ignored_and_contradictions_close_immediately() {
 /// With odometry, one pose is carried. Two poses are not carried, and are evaluated with the inflation.
 #[test]
 fn two_poses_are_not_carried_along_odometry() {
-    let odometry = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p odometry_rad_per_sqrt_rad:=0.001 \
-        -p odometry_rad_per_sqrt_m:=0.001 -p odometry_slip:=0.01 -p odometry_maximum_gap_ms:=200";
-    with_node(&format!("{LINE} {odometry}"), |mut node| {
+    let line = format!("{LINE} {ODOMETRY} -p odometry_maximum_gap_ms:=200");
+    with_node(&line, |mut node| {
         let mut number = 0;
         let mut step = |node: &mut Node<'_>, found: Option<i32>| {
             let ms = node.ms + 100;
