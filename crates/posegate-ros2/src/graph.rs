@@ -42,29 +42,24 @@ impl Environment {
     /// [`GraphError::Environment`]
     pub fn read(variable: impl Fn(&str) -> Option<String>) -> Result<Self, GraphError> {
         let given = |name: &'static str| variable(name).filter(|value| !value.is_empty());
-        let domain = match given("ROS_DOMAIN_ID") {
-            None => 0,
-            Some(text) => match text.parse::<u16>() {
-                Ok(domain) if domain <= 232 => domain,
-                _ => {
-                    return Err(GraphError::Environment {
-                        name: "ROS_DOMAIN_ID",
-                        given: text,
-                        expected: "a whole number from 0 to 232",
-                    });
-                }
-            },
+        let refused = |name, given, expected| GraphError::Environment {
+            name,
+            given,
+            expected,
         };
-        let range = given("ROS_AUTOMATIC_DISCOVERY_RANGE").unwrap_or_else(|| "SUBNET".into());
+        let text = given("ROS_DOMAIN_ID").unwrap_or_else(|| "0".into());
+        let domain = text.parse().ok().filter(|domain| *domain <= 232);
+        let expected = "a whole number from 0 to 232";
+        let domain = domain.ok_or_else(|| refused("ROS_DOMAIN_ID", text, expected))?;
+        let name = "ROS_AUTOMATIC_DISCOVERY_RANGE";
+        let range = given(name).unwrap_or_else(|| "SUBNET".into());
         let is_near = match range.as_str() {
             "LOCALHOST" => true,
             "SUBNET" | "SYSTEM_DEFAULT" => false,
             _ => {
-                return Err(GraphError::Environment {
-                    name: "ROS_AUTOMATIC_DISCOVERY_RANGE",
-                    given: range,
-                    expected: "LOCALHOST, SUBNET or SYSTEM_DEFAULT; this node cannot do without discovery",
-                });
+                let expected =
+                    "LOCALHOST, SUBNET or SYSTEM_DEFAULT; this node cannot do without discovery";
+                return Err(refused(name, range, expected));
             }
         };
         let is_cyclone =
@@ -164,37 +159,30 @@ impl Graph {
             poll: Poll::new()?,
         };
         let input = input(&mut entities, names, settings)?;
-        let camera_info = match settings.detector {
-            Some(_) => Some(entities.topic(
+        let camera_info = settings.detector.as_ref().map(|_| {
+            entities.topic(
                 &names.camera_info,
                 ["sensor_msgs", "CameraInfo"],
                 settings.camera_info_delivery,
                 "camera_info_reliability to best_effort",
                 |message| message,
-            )?),
-            None => None,
-        };
-        let odom = match settings.tracker {
-            Some(_) => Some(entities.topic(
+            )
+        });
+        let odom = settings.tracker.map(|_| {
+            entities.topic(
                 &names.odom,
                 ODOMETRY,
                 settings.odom_delivery,
                 "odom_reliability to best_effort, or odom_durability to volatile",
                 |message| message,
-            )?),
-            None => None,
-        };
+            )
+        });
         let latched = Delivery {
             reliable: true,
             transient_local: true,
         };
-        let task = match takes_tasks {
-            true => {
-                let of = ["std_msgs", "String"];
-                Some(entities.topic(&names.task, of, latched, "", |message| message)?)
-            }
-            false => None,
-        };
+        let text = ["std_msgs", "String"];
+        let task = takes_tasks.then(|| entities.topic(&names.task, text, latched, "", |name| name));
         let latched = reliable().durability(Durability::TransientLocal);
         let several = reliable().history(History::KeepLast { depth: 10 });
         let of_markers = ["visualization_msgs", "MarkerArray"];
@@ -202,9 +190,9 @@ impl Graph {
         Ok(Self {
             events,
             input,
-            camera_info,
-            odom,
-            task,
+            camera_info: camera_info.transpose()?,
+            odom: odom.transpose()?,
+            task: task.transpose()?,
             permission: entities.publisher(
                 &names.permission,
                 DIAGNOSTICS,

@@ -147,21 +147,6 @@ pub struct AprilTagDetectionArray {
     pub detections: Vec<AprilTagDetection>,
 }
 
-/// `sensor_msgs/msg/RegionOfInterest`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RegionOfInterest {
-    /// First column of the whole image.
-    pub x_offset: u32,
-    /// First row of the whole image.
-    pub y_offset: u32,
-    /// Rows; 0 for all.
-    pub height: u32,
-    /// Columns; 0 for all.
-    pub width: u32,
-    /// Unused.
-    pub do_rectify: bool,
-}
-
 /// `sensor_msgs/msg/CameraInfo`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CameraInfo {
@@ -181,12 +166,10 @@ pub struct CameraInfo {
     pub r: [f64; 9],
     /// The projection matrix of the rectified image, by rows.
     pub p: [f64; 12],
-    /// Columns that are combined into one; 0 for 1.
-    pub binning_x: u32,
-    /// Rows that are combined into one; 0 for 1.
-    pub binning_y: u32,
-    /// The part of the image that is published.
-    pub roi: RegionOfInterest,
+    /// Columns and rows that are combined into one; 0 for 1.
+    pub binning: [u32; 2],
+    /// The part of the image that is published: first column, first row, rows, columns; 0 for all. The last one is unused.
+    pub roi: ([u32; 4], bool),
 }
 
 impl CameraInfo {
@@ -200,7 +183,8 @@ impl CameraInfo {
         let rest = |info: &Self| {
             (
                 info.header.frame_id.clone(),
-                [info.height, info.width, info.binning_x, info.binning_y],
+                [info.height, info.width],
+                info.binning,
                 info.distortion_model.clone(),
                 info.roi,
                 info.d.len(),

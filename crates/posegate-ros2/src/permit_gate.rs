@@ -70,25 +70,13 @@ pub struct LastReport {
     pub step: Result<(), Reason>,
 }
 
-/// What the gate says about a message.
-struct Evaluated {
-    estimate: PoseEstimate,
-    step: Step,
-    verdict: Verdict,
-}
+/// What was evaluated of a message, and what the gate says of it.
+type Evaluated = (PoseEstimate, Step, Verdict);
 
-impl Evaluated {
-    /// Returns a denial of the message, whatever the step's reason.
-    fn denied(estimate: PoseEstimate, step: Step, reason: Reason) -> Self {
-        Self {
-            estimate,
-            step: Step {
-                verdict: Err(reason),
-                ..step
-            },
-            verdict: Verdict::deny(reason),
-        }
-    }
+/// Returns a denial of a message, whatever the step's reason.
+fn denied(estimate: PoseEstimate, step: Step, reason: Reason) -> Evaluated {
+    let verdict = Err(reason);
+    (estimate, Step { verdict, ..step }, Verdict::deny(reason))
 }
 
 /// A gate for ROS messages.
@@ -213,11 +201,18 @@ impl<'a> PermitGate<'a> {
                     _ => self.take_several(now_ms, report, poses),
                 };
                 // One of the poses is outside, whichever the gate names.
-                match evaluated.step.verdict {
-                    Err(reason) if is_ambiguous && !remembers(reason) => Evaluated {
-                        estimate: evaluated.estimate,
-                        ..self.inhibited(now_ms, Reason::TagPosesAmbiguous)
-                    },
+                match evaluated {
+                    (
+                        estimate,
+                        Step {
+                            verdict: Err(reason),
+                            ..
+                        },
+                        _,
+                    ) if is_ambiguous && !remembers(reason) => {
+                        let reason = Reason::TagPosesAmbiguous;
+                        denied(estimate, self.gate.inhibit(now_ms, reason), reason)
+                    }
                     _ => evaluated,
                 }
             }
@@ -251,11 +246,7 @@ impl<'a> PermitGate<'a> {
         let step = self.gate.step_on(now_ms, &evidence);
         let (number, verdict) = self.gate.examine_on(&evidence);
         let about = poses.get(usize::from(number)).copied();
-        Evaluated {
-            estimate: about.unwrap_or(report.belief),
-            step,
-            verdict,
-        }
+        (about.unwrap_or(report.belief), step, verdict)
     }
 
     /// Processes a pose. One that is refused ends every permit with the reason of the refusal.
@@ -291,12 +282,12 @@ impl<'a> PermitGate<'a> {
 
     /// Keeps what was evaluated as the last report, and returns the answer.
     fn answer(&mut self, now: Now, stamp: Time, frame: &str, evaluated: Evaluated) -> Answer {
-        let step = evaluated.step;
+        let (estimate, step, verdict) = evaluated;
         self.last = Some(LastReport {
             stamp,
             frame: frame.to_owned(),
-            estimate: evaluated.estimate,
-            verdict: evaluated.verdict,
+            estimate,
+            verdict,
             step: step.verdict,
         });
         answer(now, step)
@@ -307,13 +298,7 @@ impl<'a> PermitGate<'a> {
     fn refuse(&mut self, now_ms: u32, reason: Reason) -> Evaluated {
         self.poses.leave_out();
         self.drop_fix();
-        self.inhibited(now_ms, reason)
-    }
-
-    /// Ends a permit, and denies a message for a reason.
-    fn inhibited(&mut self, now_ms: u32, reason: Reason) -> Evaluated {
-        let step = self.gate.inhibit(now_ms, reason);
-        Evaluated::denied(NO_POSE, step, reason)
+        denied(NO_POSE, self.gate.inhibit(now_ms, reason), reason)
     }
 
     /// From now on no earlier pose is carried.
@@ -342,30 +327,23 @@ impl<'a> PermitGate<'a> {
             self.drop_fix();
         }
         let Some(carried) = self.carried.as_mut().filter(|_| has_time) else {
-            return Evaluated {
-                estimate,
-                step: self.gate.step(now_ms, report),
-                verdict: self.gate.examine(report),
-            };
+            let step = self.gate.step(now_ms, report);
+            return (estimate, step, self.gate.examine(report));
         };
         if let Err(reason) = carried.tracker.fix(report) {
             // The carried pose is unchanged.
-            return Evaluated::denied(estimate, self.gate.tick(now_ms), reason);
+            return denied(estimate, self.gate.tick(now_ms), reason);
         }
         match carried.tracker.tracked(now_ms) {
             Ok(tracked) => {
                 let evidence = tracked.evidence();
-                Evaluated {
-                    estimate,
-                    step: self.gate.step_on(now_ms, &evidence),
-                    verdict: self.gate.examine_on(&evidence).1,
-                }
+                let step = self.gate.step_on(now_ms, &evidence);
+                (estimate, step, self.gate.examine_on(&evidence).1)
             }
-            Err(reason) => Evaluated {
-                estimate,
-                step: self.gate.inhibit(now_ms, reason),
-                verdict: Verdict::deny(reason),
-            },
+            Err(reason) => {
+                let step = self.gate.inhibit(now_ms, reason);
+                (estimate, step, Verdict::deny(reason))
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::fixtures::{self, ODOMETRY, at, odometry, origin, with_variances};
-use crate::message::{AprilTagDetection, Header, Odometry, RegionOfInterest};
+use crate::message::{AprilTagDetection, Header, Odometry};
 use crate::permit_gate::{Answer, PermitGate};
 use crate::settings::NodeSettings;
 use posegate::bake::BakeInput;
@@ -253,16 +253,11 @@ fn detections_without_camera_info_give_no_pose_and_a_reason() {
         assert!(fresh.gate.last().is_none());
         // A camera info that is not the site's, or cannot be decoded, also removes the earlier one.
         let half = CameraInfo {
-            binning_x: 2,
-            binning_y: 2,
+            binning: [2, 2],
             ..info()
         };
         let part = CameraInfo {
-            roi: RegionOfInterest {
-                width: 640,
-                height: 480,
-                ..RegionOfInterest::default()
-            },
+            roi: ([0, 0, 480, 640], false),
             ..info()
         };
         for (wrong, words) in [
