@@ -243,7 +243,7 @@ impl<'a> DockGate<'a> {
     /// Returns the gate of a task, closed.
     fn changed(&self, now: Now, at: usize) -> Option<Result<PermitGate<'a>, InvalidParameter>> {
         let (dock, gate) = (self.docks.get(at)?, self.gates.get(at)?);
-        let gate = PermitGate::after(self.is_sound, &dock.table, &dock.settings, gate, now);
+        let gate = PermitGate::new(self.is_sound, &dock.table, &dock.settings, gate, now);
         Some(gate.map(|gate| {
             let mut gate = gate.with_tags(self.topics.clone());
             if let Some(info) = &self.camera_info {

@@ -64,11 +64,7 @@ impl Parameters {
             return Ok(());
         }
         let place = format!("-p {assignment}");
-        let value: Value = serde_norway::from_str(text).map_err(|error| ParameterError::Yaml {
-            place: place.clone(),
-            error: error.to_string(),
-        })?;
-        self.set(name, &value, &place)
+        self.set(name, &yaml(text, &place)?, &place)
     }
 
     /// Adds a parameter file. Sections of other nodes are ignored; a file without a section for this node is refused.
@@ -76,10 +72,7 @@ impl Parameters {
     /// # Errors
     /// [`ParameterError`]
     pub fn read(&mut self, text: &str, place: &str, names: &Names) -> Result<(), ParameterError> {
-        let yaml: Value = serde_norway::from_str(text).map_err(|error| ParameterError::Yaml {
-            place: place.into(),
-            error: error.to_string(),
-        })?;
+        let yaml = yaml(text, place)?;
         let before = self.values.len();
         if !self.sections(&yaml, "", place, names)? && before == self.values.len() {
             return Err(ParameterError::NotForThisNode {
@@ -172,6 +165,13 @@ impl Parameters {
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.values.keys().map(String::as_str)
     }
+}
+
+fn yaml(text: &str, place: &str) -> Result<Value, ParameterError> {
+    serde_norway::from_str(text).map_err(|error| ParameterError::Yaml {
+        place: place.into(),
+        error: error.to_string(),
+    })
 }
 
 /// Returns `true` if the name of a node in a parameter file or an assignment is this node's name or a wildcard.

@@ -8,9 +8,7 @@ use crate::message::{AprilTagDetectionArray, CameraInfo, Odometry, PoseWithCovar
 use crate::poses::PoseReport;
 use crate::settings::NodeSettings;
 use crate::tags::{Look, Tags};
-use posegate::gate::{
-    Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict, self_test,
-};
+use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::pose::Pose;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
 use posegate::set::{Growth, Inflation, Uncertainty};
@@ -91,25 +89,12 @@ pub struct PermitGate<'a> {
 }
 
 impl<'a> PermitGate<'a> {
-    /// Returns a closed gate. `gate` are the settings that [`NodeSettings::gate`] returns.
+    /// Returns a closed gate. `is_sound` is the result of the self-test ([`posegate::gate::self_test`]), or what another gate says at a change of the
+    /// table: a fault that it has latched ([`Gate::is_sound`]) stays latched. `gate` are the settings that [`NodeSettings::gate`] returns.
     ///
     /// # Errors
     /// [`InvalidParameter`] if a setting would disable a check.
     pub fn new(
-        table: &'a [u8],
-        settings: &'a NodeSettings,
-        gate: &'a Settings<'a>,
-        now: Now,
-    ) -> Result<Self, InvalidParameter> {
-        Self::after(self_test(), table, settings, gate, now)
-    }
-
-    /// Returns a closed gate without the self-test, whose result is given: for a change of the table. A fault that
-    /// another gate has latched ([`Gate::is_sound`]) stays latched.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn after(
         is_sound: Result<(), Reason>,
         table: &'a [u8],
         settings: &'a NodeSettings,
@@ -179,16 +164,8 @@ impl<'a> PermitGate<'a> {
             return self.tick(now);
         };
         let look = tags.look(message);
-        let (now_ms, settings) = (now.ms(), self.settings);
-        let sequence = self.sequence(now_ms, origin);
-        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
-        let report = |belief| Report {
-            source: 0,
-            frame: FrameId::of(&settings.frame),
-            sequence,
-            stamp_ms,
-            belief,
-        };
+        let (now_ms, stamp, frame) = (now.ms(), message.header.stamp, &self.settings.frame);
+        let (report, has_time) = self.report(now, stamp, frame, origin);
         let evaluated = match look {
             Look::Nothing => {
                 self.poses.leave_out();
@@ -197,34 +174,31 @@ impl<'a> PermitGate<'a> {
             Look::Contradiction(reason) => self.refuse(now_ms, reason),
             Look::Poses(poses, is_ambiguous) => {
                 let evaluated = match poses.as_slice() {
-                    [pose] => self.take_report(now_ms, &report(*pose), has_time),
+                    [pose] => {
+                        let belief = *pose;
+                        self.take_report(now_ms, &Report { belief, ..report }, has_time)
+                    }
                     _ => self.take_several(now_ms, report, poses),
                 };
+                let (estimate, Step { verdict, .. }, _) = evaluated;
                 // One of the poses is outside, whichever the gate names.
-                match evaluated {
-                    (
-                        estimate,
-                        Step {
-                            verdict: Err(reason),
-                            ..
-                        },
-                        _,
-                    ) if is_ambiguous && !remembers(reason) => {
+                match verdict.is_err_and(|reason| is_ambiguous && !remembers(reason)) {
+                    true => {
                         let reason = Reason::TagPosesAmbiguous;
                         denied(estimate, self.gate.inhibit(now_ms, reason), reason)
                     }
-                    _ => evaluated,
+                    false => evaluated,
                 }
             }
         };
-        self.answer(now, message.header.stamp, &settings.frame, evaluated)
+        self.answer(now, stamp, frame, evaluated)
     }
 
     /// Gives the gate the poses of which any may be the robot's: it permits only if all are inside.
     fn take_several(
         &mut self,
         now_ms: u32,
-        report: impl Fn(PoseEstimate) -> Report,
+        mut report: Report,
         mut poses: Vec<PoseEstimate>,
     ) -> Evaluated {
         // A single pose can be carried, not one of several.
@@ -235,7 +209,7 @@ impl<'a> PermitGate<'a> {
                 *pose = inflated(pose, self.settings.trust.inflation);
             }
         }
-        let report = report(poses.first().copied().unwrap_or(NO_POSE));
+        report.belief = poses.first().copied().unwrap_or(NO_POSE);
         let evidence = Evidence {
             report: &report,
             others: poses.get(1..).unwrap_or_default(),
@@ -252,32 +226,35 @@ impl<'a> PermitGate<'a> {
     /// Processes a pose. One that is refused ends every permit with the reason of the refusal.
     pub fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
         let now_ms = now.ms();
-        let sequence = self.sequence(now_ms, origin);
+        let (report, has_time) = self.report(now, message.stamp, &message.frame, origin);
         let evaluated = match &message.pose {
             Ok(belief) => {
-                let (stamp_ms, has_time) = self.stamp(now, message.stamp);
-                let report = Report {
-                    source: 0,
-                    frame: FrameId::of(&message.frame),
-                    sequence,
-                    stamp_ms,
-                    belief: *belief,
-                };
-                self.take_report(now_ms, &report, has_time)
+                let belief = *belief;
+                self.take_report(now_ms, &Report { belief, ..report }, has_time)
             }
             Err(refused) => self.refuse(now_ms, refused.reason()),
         };
         self.answer(now, message.stamp, &message.frame, evaluated)
     }
 
-    /// Returns the sequence number of a message.
-    fn sequence(&mut self, now_ms: u32, origin: Origin) -> u32 {
+    /// Returns the report of a message, without its pose, and `true` if its stamp is a time. A stamp that is not on the
+    /// gate's clock counts as older than every permitted one.
+    fn report(&mut self, now: Now, stamp: Time, frame: &str, origin: Origin) -> (Report, bool) {
         let (sequence, has_changed) = self.poses.next(origin);
         if has_changed {
             // Two alternating publishers end every permit of each other.
-            let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
+            let _ = self.gate.inhibit(now.ms(), Reason::SourceChanged);
         }
-        sequence
+        let known = now.stamp_ms(stamp);
+        let stale = self.settings.gate().maximum_age_ms.wrapping_add(1);
+        let report = Report {
+            source: 0,
+            frame: FrameId::of(frame),
+            sequence,
+            stamp_ms: known.unwrap_or(now.ms().wrapping_sub(stale)),
+            belief: NO_POSE,
+        };
+        (report, known.is_some())
     }
 
     /// Keeps what was evaluated as the last report, and returns the answer.
@@ -306,17 +283,6 @@ impl<'a> PermitGate<'a> {
         if let Some(carried) = &mut self.carried {
             carried.tracker.drop_fix();
         }
-    }
-
-    /// Returns a stamp on the gate's clock, and `true` if it is a time. A stamp that is not on that clock counts as
-    /// older than every permitted one.
-    fn stamp(&self, now: Now, stamp: Time) -> (u32, bool) {
-        let known = now.stamp_ms(stamp);
-        let stale = self.settings.gate().maximum_age_ms.wrapping_add(1);
-        (
-            known.unwrap_or(now.ms().wrapping_sub(stale)),
-            known.is_some(),
-        )
     }
 
     fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> Evaluated {

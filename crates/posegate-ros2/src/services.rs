@@ -1,11 +1,10 @@
 //! The services of the node's parameters, and of the lifecycle of a managed node.
 
 use crate::entities::{Entities, GraphError};
-use crate::lifecycle::{Labelled, State};
+use crate::lifecycle::State;
 use crate::message::Single;
 use crate::parameter_services::{ReportedParameters, refused};
 use ros2_client::parameters::raw::Parameter;
-use ros2_client::rcl_interfaces::ListParametersRequest;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -29,20 +28,20 @@ struct Services<'e> {
 }
 
 impl Services<'_> {
-    /// Offers a service whose request and response have one field each, or are `Q` and `R` themselves. Responses that
-    /// cannot be sent are not repeated: the caller asks again.
+    /// Offers a service whose request and response have one field each, or are `Q` and `R` themselves. Its type is its
+    /// name in capitals, such as `GetState` of `get_state`. Responses that cannot be sent are not repeated: the caller asks again.
     fn add<Q, R>(
         &mut self,
         name: &str,
-        kind: &str,
         response: impl Fn(&mut Served<'_>, Q) -> R + 'static,
     ) -> Result<(), GraphError>
     where
         Q: Serialize + DeserializeOwned + Clone + 'static,
         R: Serialize + DeserializeOwned + 'static,
     {
-        let name = format!("{}/{name}", self.node);
-        let kind = [self.package, kind];
+        let capital = |word: &str| word[..1].to_uppercase() + &word[1..];
+        let kind: String = name.split('_').map(capital).collect();
+        let (name, kind) = (format!("{}/{name}", self.node), [self.package, &kind]);
         let server = self.entities.server::<Single<Q>, Single<R>>(&name, kind)?;
         self.all.push(Box::new(move |served| {
             while let Ok(Some((id, Single(request)))) = server.receive_request() {
@@ -64,59 +63,44 @@ pub fn offer(
     is_managed: bool,
 ) -> Result<Vec<Service>, GraphError> {
     type Names = Vec<String>;
+    type Wanted = Vec<Parameter>;
     let mut services = Services {
         entities,
         node,
         package: "rcl_interfaces",
         all: Vec::new(),
     };
-    services.add("get_parameters", "GetParameters", |served, names: Names| {
-        served.parameters.values(&names)
+    services.add("get_parameters", |of, names: Names| {
+        of.parameters.values(&names)
     })?;
-    services.add(
-        "get_parameter_types",
-        "GetParameterTypes",
-        |served, names: Names| served.parameters.types(&names),
-    )?;
-    services.add(
-        "describe_parameters",
-        "DescribeParameters",
-        |served, names: Names| served.parameters.descriptors(&names),
-    )?;
-    services.add(
-        "set_parameters",
-        "SetParameters",
-        |_, wanted: Vec<Parameter>| wanted.chunks(1).map(refused).collect::<Vec<_>>(),
-    )?;
-    services.add(
-        "set_parameters_atomically",
-        "SetParametersAtomically",
-        |_, wanted: Vec<Parameter>| refused(&wanted),
-    )?;
-    services.add(
-        "list_parameters",
-        "ListParameters",
-        |served, request: ListParametersRequest| served.parameters.list(&request),
-    )?;
+    services.add("get_parameter_types", |of, names: Names| {
+        of.parameters.types(&names)
+    })?;
+    services.add("describe_parameters", |of, names: Names| {
+        of.parameters.descriptors(&names)
+    })?;
+    services.add("list_parameters", |of, request| {
+        of.parameters.list(&request)
+    })?;
+    services.add("set_parameters_atomically", |_, wanted: Wanted| {
+        refused(&wanted)
+    })?;
+    services.add("set_parameters", |_, wanted: Wanted| -> Vec<_> {
+        wanted.chunks(1).map(refused).collect()
+    })?;
     if !is_managed {
         return Ok(services.all);
     }
     // An empty request has one byte.
     services.package = "lifecycle_msgs";
-    services.add("get_state", "GetState", |served, _: u8| {
-        served.state.labelled()
+    services.add("get_state", |of, _: u8| of.state.labelled())?;
+    services.add("get_available_states", |_, _: u8| State::all())?;
+    services.add("get_available_transitions", |of, _: u8| {
+        of.state.available()
     })?;
-    services.add("get_available_states", "GetAvailableStates", |_, _: u8| {
-        State::all()
-    })?;
-    services.add(
-        "get_available_transitions",
-        "GetAvailableTransitions",
-        |served, _: u8| served.state.available(),
-    )?;
-    services.add("change_state", "ChangeState", |served, wanted: Labelled| {
-        let next = served.state.after(&wanted);
-        served.state = next.unwrap_or(served.state);
+    services.add("change_state", |of, wanted| {
+        let next = of.state.after(&wanted);
+        of.state = next.unwrap_or(of.state);
         next.is_some()
     })?;
     Ok(services.all)

@@ -2,6 +2,7 @@
 //! of the same bytes and the plain definition of the success set contradict.
 
 use damage::{Random, damage};
+use posegate::gate::self_test;
 use posegate_ros2::arguments::Arguments;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{
@@ -113,7 +114,7 @@ fn damaged_payloads_never_permit_wrongly() {
             continue;
         };
         parsed += 1;
-        let mut node = PermitGate::new(TABLE, &settings, &gate, now(-10)).unwrap();
+        let mut node = PermitGate::new(self_test(), TABLE, &settings, &gate, now(-10)).unwrap();
         let origin = Origin {
             publisher: [1; 16],
             number: 1,

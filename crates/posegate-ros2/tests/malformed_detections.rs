@@ -3,6 +3,7 @@
 
 use damage::{Random, damage};
 use posegate::bake::BakeInput;
+use posegate::gate::self_test;
 use posegate::report::Heading;
 use posegate_ros2::arguments::Arguments;
 use posegate_ros2::clock::Now;
@@ -241,7 +242,7 @@ fn count(
         };
         counts[0] += 1;
         let topics = ["/detections".into(), "/camera_info".into()];
-        let node = PermitGate::new(&table, &settings, &gate, now(-10)).unwrap();
+        let node = PermitGate::new(self_test(), &table, &settings, &gate, now(-10)).unwrap();
         let mut node = node.with_tags(topics);
         node.camera_info(Some(&info));
         if node.detections(now(0), &detections, ORIGIN).is_open {

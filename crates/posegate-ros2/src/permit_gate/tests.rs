@@ -1,6 +1,7 @@
 use super::*;
 use crate::fixtures::{self, ODOMETRY, TABLE, at, header, odometry, origin, with_variances};
 use crate::message::Header;
+use posegate::gate::self_test;
 
 const STILL: &str = "-p stands_still:=true -p cross_terms:=filled";
 const VARIANCES: [f64; 3] = [1e-4, 1e-4, 1e-5];
@@ -29,7 +30,7 @@ fn odometry_at(ms: u32, x: f64) -> Odometry {
 const OPENED: u32 = 1_000;
 
 fn opened<'a>(settings: &'a NodeSettings, gate: &'a Settings<'a>) -> PermitGate<'a> {
-    let mut node = PermitGate::new(TABLE, settings, gate, at(0)).unwrap();
+    let mut node = PermitGate::new(self_test(), TABLE, settings, gate, at(0)).unwrap();
     for ms in (0..=OPENED).step_by(20) {
         let _ = node.odometry(at(ms), &odometry_at(ms, 0.0), origin(i64::from(ms / 20)));
         if ms % 100 == 0 {
@@ -119,7 +120,7 @@ fn invalid_reports_close_the_gate() {
 fn two_publishers_never_open_the_gate() {
     let settings = settings("-p stands_still:=true -p permits_in_a_row:=1");
     let gate = settings.gate();
-    let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+    let mut node = PermitGate::new(self_test(), TABLE, &settings, &gate, at(0)).unwrap();
     for k in 0..200u32 {
         let ms = k * 50;
         let origin = Origin {
@@ -136,7 +137,7 @@ fn motion_bounds_enlarge_the_set() {
     let moving = settings("-p max_speed:=0.02 -p max_yaw_rate_deg:=1.0 -p cross_terms:=filled");
     let margins = [&still, &moving].map(|settings| {
         let gate = settings.gate();
-        let mut node = PermitGate::new(TABLE, settings, &gate, at(0)).unwrap();
+        let mut node = PermitGate::new(self_test(), TABLE, settings, &gate, at(0)).unwrap();
         let _ = node.pose(at(10), &pose_at(0, 0.0, "map"), origin(0));
         match node.last().unwrap().verdict {
             Verdict::Permit { margin } => margin,
@@ -270,7 +271,7 @@ fn poses_of_amcl_open_with_the_default_hold() {
     for (more, opens) in [("", true), ("-p permit_hold_ms:=500", false)] {
         let settings = settings(&format!("{STILL} {more}"));
         let gate = settings.gate();
-        let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+        let mut node = PermitGate::new(self_test(), TABLE, &settings, &gate, at(0)).unwrap();
         let mut opened = false;
         for ms in (100..10_000).step_by(20) {
             if (ms - 100) % 600 == 0 {

@@ -4,6 +4,7 @@ use crate::message::{AprilTagDetection, Header, Odometry};
 use crate::permit_gate::{Answer, PermitGate};
 use crate::settings::NodeSettings;
 use posegate::bake::BakeInput;
+use posegate::gate::self_test;
 use posegate::gate::{Gate, Reason};
 use posegate::report::{FrameId, Report};
 use posegate_site::Site;
@@ -142,7 +143,7 @@ fn with_node(line: &str, test: impl FnOnce(Node<'_>)) {
     let table = table();
     let settings = settings(&table, line);
     let gate = settings.gate();
-    let node = PermitGate::new(&table, &settings, &gate, at(0)).unwrap();
+    let node = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
     let mut gate = node.with_tags(topics());
     gate.camera_info(Some(&info()));
     test(Node {
@@ -235,7 +236,7 @@ fn detections_without_camera_info_give_no_pose_and_a_reason() {
         let table = table();
         let settings = settings(&table, LINE);
         let gate = settings.gate();
-        let fresh = PermitGate::new(&table, &settings, &gate, at(0)).unwrap();
+        let fresh = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
         let mut fresh = Node {
             gate: fresh.with_tags(topics()),
             ms: 0,
