@@ -179,7 +179,6 @@ enum Asked<'a> {
 pub struct DockGate<'a> {
     docks: &'a [Dock],
     gates: &'a [Settings<'a>],
-    topics: [String; 2],
     asked: Asked<'a>,
     /// What the self-test or the last gate says: a latched fault outlives a change of the task.
     is_sound: Result<(), Reason>,
@@ -188,14 +187,12 @@ pub struct DockGate<'a> {
 }
 
 impl<'a> DockGate<'a> {
-    /// Returns a gate without a task. `gates` are the settings of the docks, in their order; `topics` are those of
-    /// [`PermitGate::with_tags`].
+    /// Returns a gate without a task. `gates` are the settings of the docks, in their order.
     #[must_use]
-    pub fn new(docks: &'a [Dock], gates: &'a [Settings<'a>], topics: [String; 2]) -> Self {
+    pub fn new(docks: &'a [Dock], gates: &'a [Settings<'a>]) -> Self {
         Self {
             docks,
             gates,
-            topics,
             asked: Asked::Nothing,
             is_sound: self_test(),
             camera_info: None,
@@ -210,10 +207,9 @@ impl<'a> DockGate<'a> {
     pub fn alone(
         docks: &'a [Dock],
         gates: &'a [Settings<'a>],
-        topics: [String; 2],
         now: Now,
     ) -> Result<Self, InvalidParameter> {
-        let mut gate = Self::new(docks, gates, topics);
+        let mut gate = Self::new(docks, gates);
         if let Some(first) = gate.changed(now, 0) {
             gate.asked = Asked::Task(0, Box::new(first?));
             gate.takes_tasks = false;
@@ -244,8 +240,7 @@ impl<'a> DockGate<'a> {
     fn changed(&self, now: Now, at: usize) -> Option<Result<PermitGate<'a>, InvalidParameter>> {
         let (dock, gate) = (self.docks.get(at)?, self.gates.get(at)?);
         let gate = PermitGate::new(self.is_sound, &dock.table, &dock.settings, gate, now);
-        Some(gate.map(|gate| {
-            let mut gate = gate.with_tags(self.topics.clone());
+        Some(gate.map(|mut gate| {
             if let Some(info) = &self.camera_info {
                 gate.camera_info(Some(info));
             }

@@ -46,11 +46,10 @@ fn start() -> Result<(), Box<dyn Error>> {
     let settings = &docks.first().ok_or("the site has no table")?.settings;
     let names = &arguments.names;
     let (node, task, poses) = (names.full_node(), settings.task(), source(names, settings));
-    let topics = [names.detections.clone(), names.camera_info.clone()];
     let (decider, what): (Box<dyn Decider>, String) = if is_site {
         let (tasks, asked) = (docks.len(), &names.task);
         let what = format!("has {tasks} tasks, decides by {poses} on the one that {asked} names");
-        (Box::new(DockGate::new(&docks, &gates, topics)), what)
+        (Box::new(DockGate::new(&docks, &gates)), what)
     } else if let Some(serial) = &settings.serial {
         let device = serial.path.display();
         let what = format!(
@@ -58,7 +57,7 @@ fn start() -> Result<(), Box<dyn Error>> {
         );
         (Box::new(Bridge::open(serial)?), what)
     } else {
-        let gate = DockGate::alone(&docks, &gates, topics, Now::read())?;
+        let gate = DockGate::alone(&docks, &gates, Now::read())?;
         (
             Box::new(gate),
             format!("decides on the task `{task}` by {poses}"),

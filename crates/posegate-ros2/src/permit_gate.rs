@@ -105,7 +105,10 @@ impl<'a> PermitGate<'a> {
             gate: Gate::after(is_sound, table, gate, now.ms())?,
             settings,
             poses: Order::default(),
-            tags: None,
+            tags: settings
+                .detector
+                .clone()
+                .map(|detector| Box::new(Tags::new(detector, settings.detection_topics.clone()))),
             carried: settings.tracker.and_then(Carried::new).map(Box::new),
             last: None,
         })
@@ -121,14 +124,6 @@ impl<'a> PermitGate<'a> {
     #[must_use]
     pub const fn last(&self) -> Option<&LastReport> {
         self.last.as_ref()
-    }
-
-    /// Uses detections, with the tags of the settings. `topics` are the names for messages: detections, camera info.
-    #[must_use]
-    pub fn with_tags(mut self, topics: [String; 2]) -> Self {
-        let detector = self.settings.detector.clone();
-        self.tags = detector.map(|detector| Box::new(Tags::new(detector, topics)));
-        self
     }
 
     /// Returns the state of the tags, if detections are used.

@@ -70,6 +70,8 @@ pub struct NodeSettings {
     pub odom_delivery: Delivery,
     /// The tags and the camera, if detections are used instead of poses.
     pub detector: Option<Detector>,
+    /// The topics of the detections and of the camera info, for messages.
+    pub detection_topics: [String; 2],
     /// The quality of service of the detections.
     pub detections_delivery: Delivery,
     /// The quality of service of the camera info.
@@ -217,6 +219,7 @@ impl NodeSettings {
     /// # Errors
     /// [`SettingsError`]. No accepted value disables a check.
     pub fn new(arguments: &Arguments, table: &[u8]) -> Result<Self, SettingsError> {
+        let names = &arguments.names;
         let given = Given::new(&arguments.parameters)?;
         if given.bool("use_sim_time", false) {
             return Err(SettingsError::SimulatedTime);
@@ -281,7 +284,7 @@ impl NodeSettings {
                 look_at: given.optional_whole("look_at"),
             },
             table_digest: table.digest(),
-            robot: given.text("robot", &arguments.names.full_node()),
+            robot: given.text("robot", &names.full_node()),
             site_is_checked: site_is_checked || site.is_some(),
             sources: [source],
             poses: given.poses(site.as_ref(), &frame, trust, &table)?,
@@ -293,6 +296,7 @@ impl NodeSettings {
             valid_ms,
             pose_delivery: given.delivery("pose_reliability", "pose_durability"),
             odom_delivery: given.delivery("odom_reliability", "odom_durability"),
+            detection_topics: [names.detections.clone(), names.camera_info.clone()],
             detections_delivery: given.delivery("detections_reliability", "detections_durability"),
             camera_info_delivery: given.best_effort("camera_info_reliability"),
             detector,

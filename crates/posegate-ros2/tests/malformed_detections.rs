@@ -241,9 +241,7 @@ fn count(
             continue;
         };
         counts[0] += 1;
-        let topics = ["/detections".into(), "/camera_info".into()];
-        let node = PermitGate::new(self_test(), &table, &settings, &gate, now(-10)).unwrap();
-        let mut node = node.with_tags(topics);
+        let mut node = PermitGate::new(self_test(), &table, &settings, &gate, now(-10)).unwrap();
         node.camera_info(Some(&info));
         if node.detections(now(0), &detections, ORIGIN).is_open {
             counts[1] += 1;

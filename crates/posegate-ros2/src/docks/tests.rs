@@ -84,7 +84,7 @@ fn task_is_asked_for_by_name_and_a_change_closes_first() {
     let docks = read_with(&folder, "--ros-args").unwrap();
     fs::remove_dir_all(&folder).unwrap();
     let gates: Vec<Settings<'_>> = docks.iter().map(|dock| dock.settings.gate()).collect();
-    let mut gate = DockGate::new(&docks, &gates, Default::default());
+    let mut gate = DockGate::new(&docks, &gates);
     let mut ms = 0;
     // None at first.
     let none = drive(&mut gate, &docks, &mut ms);
@@ -145,7 +145,7 @@ fn latched_fault_outlives_a_change_of_the_task() {
     let docks = read_with(&folder, "--ros-args -p restart:=on_reset").unwrap();
     fs::remove_dir_all(&folder).unwrap();
     let gates: Vec<Settings<'_>> = docks.iter().map(|dock| dock.settings.gate()).collect();
-    let mut gate = DockGate::new(&docks, &gates, Default::default());
+    let mut gate = DockGate::new(&docks, &gates);
     let mut ms = 0;
     gate.ask(at(ms), "dock");
     assert!(drive(&mut gate, &docks, &mut ms).last().unwrap().0);

@@ -32,10 +32,6 @@ fn settings(table: &[u8], line: &str) -> NodeSettings {
     fixtures::settings(table, &format!("--site {SITE} --ros-args {line}"))
 }
 
-fn topics() -> [String; 2] {
-    ["/detections".into(), "/camera_info".into()]
-}
-
 fn mirrored() -> [f64; 3] {
     let turn = (180.0 + MIRRORED_DEG).to_radians();
     let yaw = MIRRORED_DEG.to_radians();
@@ -143,8 +139,7 @@ fn with_node(line: &str, test: impl FnOnce(Node<'_>)) {
     let table = table();
     let settings = settings(&table, line);
     let gate = settings.gate();
-    let node = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
-    let mut gate = node.with_tags(topics());
+    let mut gate = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
     gate.camera_info(Some(&info()));
     test(Node {
         gate,
@@ -238,7 +233,7 @@ fn detections_without_camera_info_give_no_pose_and_a_reason() {
         let gate = settings.gate();
         let fresh = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
         let mut fresh = Node {
-            gate: fresh.with_tags(topics()),
+            gate: fresh,
             ms: 0,
             number: 0,
         };
