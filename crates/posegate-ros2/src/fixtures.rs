@@ -2,7 +2,7 @@
 
 use crate::arguments::Arguments;
 use crate::clock::Now;
-use crate::message::{Header, Odometry, Pose, PoseWithCovariance, TwistWithCovariance};
+use crate::message::{Header, Odometry, Pose, PoseWithCovariance};
 use crate::permit_gate::Origin;
 use crate::settings::NodeSettings;
 
@@ -68,9 +68,6 @@ pub fn odometry(header: Header, child: &str, pose: PoseWithCovariance) -> Odomet
         header,
         child_frame_id: child.into(),
         pose,
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
+        twist: Default::default(),
     }
 }

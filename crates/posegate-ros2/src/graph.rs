@@ -2,8 +2,8 @@
 
 use crate::entities::{Entities, GraphError, Topic, reliable};
 use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticArray, Marker, Odometry, PoseStamped,
-    PoseWithCovarianceStamped, Single, TransformStamped, TriggerResponse,
+    AprilTagDetectionArray, CameraInfo, DiagnosticArray, Header, Marker, Odometry, Pose,
+    PoseStamped, PoseWithCovarianceStamped, Single, TransformStamped, TriggerResponse,
 };
 use crate::names::Names;
 use crate::poses::PoseType;
@@ -79,12 +79,8 @@ impl Environment {
 /// A message with poses, or with what they are computed from.
 #[expect(clippy::large_enum_variant, reason = "one at a time, and never kept")]
 pub enum Input {
-    /// A pose with covariance.
-    WithCovariance(PoseWithCovarianceStamped),
-    /// A pose of odometry's type.
-    Odometry(Odometry),
-    /// A pose without covariance.
-    Plain(PoseStamped),
+    /// A pose of a frame on the robot, if the message names it, with its covariance, if it has one.
+    Pose(Header, Option<String>, Pose, Option<[f64; 36]>),
     /// Transforms.
     Transforms(Vec<TransformStamped>),
     /// Detections of tags.
@@ -254,12 +250,21 @@ fn input(
     match kind {
         PoseType::WithCovariance => {
             let of = ["geometry_msgs", "PoseWithCovarianceStamped"];
-            entities.topic(name, of, delivery, words, Input::WithCovariance)
+            entities.topic(name, of, delivery, words, |message| {
+                let PoseWithCovarianceStamped { header, pose } = message;
+                Input::Pose(header, None, pose.pose, Some(pose.covariance))
+            })
         }
-        PoseType::Odometry => entities.topic(name, ODOMETRY, delivery, words, Input::Odometry),
+        PoseType::Odometry => entities.topic(name, ODOMETRY, delivery, words, |message| {
+            let Odometry { header, pose, .. } = message;
+            let child = Some(message.child_frame_id);
+            Input::Pose(header, child, pose.pose, Some(pose.covariance))
+        }),
         PoseType::Pose => {
             let of = ["geometry_msgs", "PoseStamped"];
-            entities.topic(name, of, delivery, words, Input::Plain)
+            entities.topic(name, of, delivery, words, |PoseStamped { header, pose }| {
+                Input::Pose(header, None, pose, None)
+            })
         }
         PoseType::Transforms => {
             let of = ["tf2_msgs", "TFMessage"];

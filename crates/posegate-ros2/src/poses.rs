@@ -3,7 +3,7 @@
 //! [`Poses`] takes the types of the parameter `pose_type`. The place of the pose on the robot and the site's origin
 //! are applied by the function of `posegate replay` ([`posegate_replay::recording::LivePoses`]).
 
-use crate::message::{Header, Odometry, Pose, Time, TransformStamped};
+use crate::message::{Header, Pose, Time, TransformStamped};
 use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
 use posegate_files::printable::toml_key;
@@ -196,17 +196,6 @@ impl Poses {
         }
     }
 
-    /// Converts a pose of odometry, or of a filter that publishes this type.
-    pub fn odometry(&mut self, message: Odometry) -> PoseReport {
-        let (child, pose) = (message.child_frame_id, message.pose);
-        self.pose(
-            message.header,
-            Some(child),
-            &pose.pose,
-            Some(pose.covariance),
-        )
-    }
-
     /// Converts transforms; `None` if they give no newer pose. A transform that another publisher sent before is
     /// refused: it may be that of another robot.
     pub fn transforms(
@@ -214,8 +203,7 @@ impl Poses {
         message: &[TransformStamped],
         publisher: [u8; 16],
     ) -> Option<PoseReport> {
-        if let Some(edge) = self.foreign(message, publisher) {
-            let (parent, child) = edge;
+        if let Some((parent, child)) = self.foreign(message, publisher) {
             return Some(PoseReport {
                 stamp: message.first()?.header.stamp,
                 frame: self.frame.clone(),

@@ -8,7 +8,7 @@ use crate::diagnostics::{diagnostics, words, wrong_frame};
 use crate::entities::GraphError;
 use crate::graph::{Environment, Graph, Input};
 use crate::lifecycle::State;
-use crate::message::{PoseStamped, PoseWithCovarianceStamped, TriggerResponse};
+use crate::message::TriggerResponse;
 use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
@@ -234,12 +234,8 @@ impl<'a> Runner<'a> {
                 return;
             }
             let report = match message {
-                Input::WithCovariance(PoseWithCovarianceStamped { header, pose }) => self
-                    .poses
-                    .pose(header, None, &pose.pose, Some(pose.covariance)),
-                Input::Odometry(message) => self.poses.odometry(message),
-                Input::Plain(PoseStamped { header, pose }) => {
-                    self.poses.pose(header, None, &pose, None)
+                Input::Pose(header, child, pose, covariance) => {
+                    self.poses.pose(header, child, &pose, covariance)
                 }
                 Input::Transforms(message) => {
                     let Some(report) = self.poses.transforms(&message, origin.publisher) else {

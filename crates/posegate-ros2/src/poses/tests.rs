@@ -1,6 +1,6 @@
 use super::*;
 use crate::fixtures::{self, TABLE, pose, with_variances};
-use crate::message::{Header, TransformStamped};
+use crate::message::{Header, Odometry, PoseWithCovariance, TransformStamped};
 use posegate::set::Uncertainty;
 use std::fs;
 
@@ -19,6 +19,18 @@ fn header(frame: &str) -> Header {
 
 fn odometry(child: &str, x: f64, variance: f64) -> Odometry {
     fixtures::odometry(header("map"), child, with_variances(x, [variance; 3]))
+}
+
+impl Poses {
+    fn odometry(&mut self, message: Odometry) -> PoseReport {
+        let PoseWithCovariance { pose, covariance } = message.pose;
+        self.pose(
+            message.header,
+            Some(message.child_frame_id),
+            &pose,
+            Some(covariance),
+        )
+    }
 }
 
 /// The site of the table, with the place of an antenna and an origin.
