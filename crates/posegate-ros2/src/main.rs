@@ -24,7 +24,9 @@ fn main() -> ExitCode {
             {
                 asked.exit();
             }
-            eprintln!("posegate-node: {error}");
+            let words = error.to_string();
+            let words = words.trim_start_matches("error: ").trim_end();
+            eprintln!("posegate-node: {words}");
             ExitCode::from(2)
         }
     }
