@@ -2,23 +2,42 @@
 
 use crate::names::{NameError, Names};
 use crate::parameters::{ParameterError, Parameters};
+use clap::Parser;
 use std::path::PathBuf;
 
-/// The text that `--help` prints.
-pub const USAGE: &str = "\
-Decide whether a robot is localized well enough for a task, as a ROS 2 node
+/// Decide whether a robot is localized well enough for a task, as a ROS 2 node
+#[derive(Debug, Parser)]
+#[command(name = "posegate-node", version, override_usage = USAGE, after_help = EXAMPLES)]
+pub struct Arguments {
+    /// The table of the task, made by `posegate table build`; or the folder of a built site (`posegate site merge`): the task is asked for by
+    /// name on the topic posegate_task
+    #[arg(value_name = "TABLE|FOLDER")]
+    pub table: PathBuf,
+    /// The task digest that the table must have (`posegate table info` prints it); also as --site-digest, its older name
+    #[arg(long, value_name = "HEX", alias = "site-digest")]
+    pub task_digest: Option<String>,
+    /// The site file; the table must be of its task: its tags and cameras, for the parameter use_detections
+    #[arg(long, value_name = "FILE")]
+    pub site: Option<PathBuf>,
+    /// The serial line of a controller whose gate decides: poses are passed to it, and the permit is the controller's; TABLE is the table in its
+    /// flash
+    #[arg(long, value_name = "DEV")]
+    pub serial: Option<PathBuf>,
+    /// The speed of that line, bits per second
+    #[arg(long, value_name = "N", default_value_t = 115_200, requires = "serial")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1_200..=4_000_000))]
+    pub baud: u32,
+    /// The ROS parameters for this node.
+    #[arg(skip)]
+    pub parameters: Parameters,
+    /// The name of the node and of its topics.
+    #[arg(skip)]
+    pub names: Names,
+}
 
-Usage: posegate-node TABLE|FOLDER [--task-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]
+const USAGE: &str = "posegate-node TABLE|FOLDER [--task-digest HEX] [--site FILE] [--serial DEV [--baud N]] [--ros-args [-p NAME:=VALUE] [--params-file FILE] [-r FROM:=TO] ...]";
 
-  TABLE                the table of the task, made by `posegate table build`
-  FOLDER               a built site (`posegate site merge`): the task is asked for by name on the topic posegate_task
-  --task-digest HEX    the task digest that the table must have (`posegate table info` prints it); also as --site-digest, its older name
-  --site FILE          the site file; the table must be of its task: its tags and cameras, for the parameter use_detections
-  --serial DEV         the serial line of a controller whose gate decides: poses are passed to it, and the permit is the controller's;
-                       TABLE is the table in its flash
-  --baud N             the speed of that line, bits per second [default: 115200]
-  --help, --version
-
+const EXAMPLES: &str = "\
 Examples:
   posegate-node dock.posegate --ros-args -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0 -r pose:=/amcl_pose
   posegate-node dock.posegate --site site.toml --ros-args -p use_detections:=true -p max_speed:=0.3 -p max_yaw_rate_deg:=30.0
@@ -27,64 +46,18 @@ Examples:
 
 The parameters, the topics and what a consumer of the permit must do: docs/for-ros.md.";
 
-/// A parsed command line.
-#[derive(Debug)]
-pub enum Command {
-    /// Run the node.
-    Run(Box<Arguments>),
-    /// Print the usage.
-    Help,
-    /// Print the version.
-    Version,
-}
-
-/// The arguments of a run.
-#[derive(Debug)]
-pub struct Arguments {
-    /// The file of the table, or the folder of a built site.
-    pub table: PathBuf,
-    /// The task digest, as given.
-    pub task_digest: Option<String>,
-    /// The site file, for its tags and cameras.
-    pub site: Option<PathBuf>,
-    /// The serial line of a controller, and its speed in bits per second.
-    pub serial: Option<(PathBuf, u32)>,
-    /// The ROS parameters for this node.
-    pub parameters: Parameters,
-    /// The name of the node and of its topics.
-    pub names: Names,
-}
-
 /// The reason why a command line is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ArgumentError {
-    /// No table is given.
-    #[error(
-        "no table is given: write `posegate-node TABLE`, with a table of `posegate table build`"
-    )]
-    NoTable,
-    /// More than one file is given.
-    #[error(
-        "two tables are given, `{0}` and `{1}`: give one, or the folder of a built site (`posegate site merge`)"
-    )]
-    TwoTables(String, String),
-    /// The option does not exist.
-    #[error(
-        "`{0}` is not an option of posegate-node: expected a table, --task-digest, --site, --serial, --baud or --ros-args; see --help"
-    )]
-    Unknown(String),
+    /// The part before `--ros-args` is refused, or asks for help or the version.
+    #[error(transparent)]
+    Line(#[from] clap::Error),
     /// The ROS argument does not exist.
     #[error(
         "`{0}` is not an argument of ROS: expected -p NAME:=VALUE, --params-file FILE, -r FROM:=TO, --log-level LEVEL or `--`"
     )]
     UnknownRos(String),
-    /// The value is not a speed.
-    #[error("--baud is `{0}`: expected bits per second, a whole number from 1200 to 4000000")]
-    Baud(String),
-    /// A speed is given without a line.
-    #[error("--baud is given without --serial: write --serial DEV --baud N")]
-    BaudAlone,
-    /// An option has no value.
+    /// An argument of ROS has no value.
     #[error("{0} needs a value: write {0} {1}")]
     NoValue(&'static str, &'static str),
     /// A parameter file cannot be read.
@@ -98,88 +71,34 @@ pub enum ArgumentError {
     Name(#[from] NameError),
 }
 
-impl Command {
+impl Arguments {
     /// Reads the arguments after the program's name.
     ///
     /// # Errors
     /// [`ArgumentError`]. Parameter files are read, so a missing file is also an error.
-    pub fn parse(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
+    pub fn read(given: impl IntoIterator<Item = String>) -> Result<Self, ArgumentError> {
         let mut words = given.into_iter();
-        let (mut table, mut task_digest, mut serial, mut baud) = (None, None, None, None);
-        let mut site = None;
+        let mut line = vec!["posegate-node".to_owned()];
         let mut ros = Ros::default();
         while let Some(word) = words.next() {
             match word.as_str() {
-                "--help" | "-h" => return Ok(Self::Help),
-                "--version" | "-V" => return Ok(Self::Version),
-                "--task-digest" | "--site-digest" => {
-                    let digest = words.next();
-                    task_digest =
-                        Some(digest.ok_or(ArgumentError::NoValue("--task-digest", "HEX"))?);
-                }
-                "--site" => {
-                    site = Some(
-                        words
-                            .next()
-                            .ok_or(ArgumentError::NoValue("--site", "FILE"))?,
-                    );
-                }
-                "--serial" => {
-                    serial = Some(
-                        words
-                            .next()
-                            .ok_or(ArgumentError::NoValue("--serial", "DEV"))?,
-                    );
-                }
-                "--baud" => {
-                    let given = words.next().ok_or(ArgumentError::NoValue("--baud", "N"))?;
-                    let known = given
-                        .parse()
-                        .ok()
-                        .filter(|baud| (1_200..=4_000_000).contains(baud));
-                    baud = Some(known.ok_or(ArgumentError::Baud(given))?);
-                }
                 "--ros-args" => ros.parse(&mut words)?,
-                option
-                    if option.starts_with("--task-digest=")
-                        || option.starts_with("--site-digest=") =>
-                {
-                    task_digest = option.split_once('=').map(|(_, digest)| digest.to_owned());
-                }
-                option if option.starts_with('-') => return Err(ArgumentError::Unknown(word)),
-                _ => match table.replace(word) {
-                    None => {}
-                    Some(first) => {
-                        return Err(ArgumentError::TwoTables(first, table.unwrap_or_default()));
-                    }
-                },
+                _ => line.push(word),
             }
         }
-        let table = PathBuf::from(table.ok_or(ArgumentError::NoTable)?);
-        let serial = match (serial, baud) {
-            (None, Some(_)) => return Err(ArgumentError::BaudAlone),
-            (serial, baud) => serial.map(|path| (PathBuf::from(path), baud.unwrap_or(115_200))),
-        };
+        let mut arguments = Self::try_parse_from(line)?;
         let names = Names::new(&ros.remaps)?;
-        let mut parameters = Parameters::default();
         for source in &ros.parameters {
             match source {
-                Source::One(assignment) => parameters.assign(assignment, &names)?,
+                Source::One(assignment) => arguments.parameters.assign(assignment, &names)?,
                 Source::File(path) => {
                     let text = std::fs::read_to_string(path)
                         .map_err(|error| ArgumentError::File(path.clone(), error))?;
-                    parameters.read(&text, path, &names)?;
+                    arguments.parameters.read(&text, path, &names)?;
                 }
             }
         }
-        Ok(Self::Run(Box::new(Arguments {
-            table,
-            task_digest,
-            site: site.map(PathBuf::from),
-            serial,
-            parameters,
-            names,
-        })))
+        Ok(Self { names, ..arguments })
     }
 }
 
@@ -235,32 +154,21 @@ fn is_log_switch(word: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn parse(line: &str) -> Result<Command, ArgumentError> {
-        Command::parse(line.split_whitespace().map(str::to_owned))
-    }
-
-    fn refused(line: &str) -> String {
-        match parse(line) {
-            Err(error) => error.to_string(),
-            Ok(command) => panic!("{line}: {command:?}"),
-        }
+    fn read(line: &str) -> Result<Arguments, ArgumentError> {
+        Arguments::read(line.split_whitespace().map(str::to_owned))
     }
 
     #[test]
     fn run_has_table_parameters_and_names() {
         let line = "dock.posegate --task-digest abc --ros-args -p inflation:=2.0 -r pose:=/filter/pose --log-level info -- ";
-        let Ok(Command::Run(arguments)) = parse(line) else {
-            panic!("{line}");
-        };
+        let arguments = read(line).unwrap();
         assert_eq!(arguments.table, PathBuf::from("dock.posegate"));
         assert_eq!(arguments.task_digest.as_deref(), Some("abc"));
         for older in [
             "a.posegate --site-digest abc",
             "a.posegate --site-digest=abc",
         ] {
-            let Ok(Command::Run(arguments)) = parse(older) else {
-                panic!("{older}");
-            };
+            let arguments = read(older).unwrap();
             assert_eq!(arguments.task_digest.as_deref(), Some("abc"));
         }
         assert_eq!(arguments.names.pose, "/filter/pose");
@@ -270,14 +178,17 @@ mod tests {
     #[test]
     fn invalid_command_lines_have_their_own_errors() {
         for (line, words) in [
-            ("", "no table is given"),
-            ("a.posegate b.posegate", "two tables"),
-            ("a.posegate --speed 3", "`--speed` is not an option"),
-            ("a.posegate --task-digest", "needs a value"),
-            ("a.posegate --serial", "needs a value"),
-            ("a.posegate --site", "needs a value"),
-            ("a.posegate --baud 9600", "without --serial"),
-            ("a.posegate --serial /dev/ttyS0 --baud 1", "--baud is `1`"),
+            ("", "<TABLE|FOLDER>"),
+            ("a.posegate b.posegate", "unexpected argument 'b.posegate'"),
+            ("a.posegate --speed 3", "unexpected argument '--speed'"),
+            ("a.posegate --task-digest", "a value is required"),
+            ("a.posegate --serial", "a value is required"),
+            ("a.posegate --site", "a value is required"),
+            ("a.posegate --baud 9600", "--serial <DEV>"),
+            (
+                "a.posegate --serial /dev/ttyS0 --baud 1",
+                "1 is not in 1200..=4000000",
+            ),
             ("a.posegate --ros-args -p", "needs a value"),
             ("a.posegate --ros-args -x", "not an argument of ROS"),
             ("a.posegate --ros-args -p inflation=2", ":="),
@@ -286,7 +197,7 @@ mod tests {
                 "cannot read the parameter file",
             ),
         ] {
-            let message = refused(line);
+            let message = read(line).unwrap_err().to_string();
             assert!(message.contains(words), "{line}: {message}");
         }
     }

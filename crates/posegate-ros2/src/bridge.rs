@@ -5,10 +5,7 @@ use crate::clock::Now;
 use crate::decider::Decider;
 use crate::diagnostics::explanation;
 use crate::link::{Link, SOURCE};
-use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, ERROR, KeyValue, MarkerArray, OK,
-    Odometry, Time,
-};
+use crate::message::{DiagnosticStatus, ERROR, KeyValue, OK, Time};
 use crate::permission::{DENY, PERMIT};
 use crate::permit_gate::{Answer, Order, Origin};
 use crate::poses::PoseReport;
@@ -56,7 +53,7 @@ impl Bridge {
         let first = std::hash::RandomState::new().build_hasher().finish() as u32;
         Ok(Self {
             port: Port::open(&serial.path, serial.baud)?,
-            link: Link::new(),
+            link: Link::default(),
             limit: Duration::from_millis(u64::from(serial.link_timeout_ms)),
             order: Order::default(),
             first,
@@ -196,20 +193,6 @@ impl Decider for Bridge {
         self.answer(now)
     }
 
-    fn detections(&mut self, now: Now, _: &AprilTagDetectionArray, _: Origin) -> Answer {
-        self.answer(now)
-    }
-
-    fn camera_info(&mut self, _: Option<&CameraInfo>) {}
-
-    fn odometry(&mut self, now: Now, _: &Odometry, _: Origin) -> Answer {
-        self.answer(now)
-    }
-
-    fn odometry_lost(&mut self, now: Now) -> Answer {
-        self.answer(now)
-    }
-
     fn tick(&mut self, now: Now) -> Answer {
         self.listen();
         self.answer(now)
@@ -310,11 +293,7 @@ impl Decider for Bridge {
         }
     }
 
-    fn markers(&self, _: &Answer) -> Option<MarkerArray> {
-        None
-    }
-
-    fn patience(&self) -> Option<Duration> {
-        Some(READ_PERIOD)
+    fn patience(&self) -> Duration {
+        READ_PERIOD
     }
 }

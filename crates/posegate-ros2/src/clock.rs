@@ -34,22 +34,13 @@ impl Now {
     /// Returns the gate's clock: wrapping milliseconds, rounded up, so that no estimate appears younger than it is.
     #[must_use]
     pub const fn ms(self) -> u32 {
-        self.ns
-            .div_euclid(1_000_000)
-            .wrapping_add(if self.ns.rem_euclid(1_000_000) == 0 {
-                0
-            } else {
-                1
-            }) as u32
+        (-(-self.ns).div_euclid(1_000_000)) as u32
     }
 
     /// Returns the moment as the stamp of a message.
     #[must_use]
     pub const fn time(self) -> Time {
-        Time {
-            sec: self.ns.div_euclid(1_000_000_000) as i32,
-            nanosec: self.ns.rem_euclid(1_000_000_000) as u32,
-        }
+        Time::from_ns(self.ns as i64)
     }
 
     /// Returns the stamp of a message on the gate's clock, rounded down. `None` if it is not a time, or is farther
@@ -59,7 +50,7 @@ impl Now {
         if !(stamp.nanosec < 1_000_000_000) {
             return None;
         }
-        let ns = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
+        let ns = i128::from(stamp.ns());
         let is_near = (self.ns - ns).abs() < (1 << 31) * 1_000_000;
         is_near.then_some(ns.div_euclid(1_000_000) as u32)
     }
@@ -67,7 +58,7 @@ impl Now {
     /// Returns the age of a stamp, nanoseconds; negative for a stamp in the future.
     #[must_use]
     pub const fn age_ns(self, stamp: Time) -> i128 {
-        self.ns - (stamp.sec as i128 * 1_000_000_000 + stamp.nanosec as i128)
+        self.ns - stamp.ns() as i128
     }
 
     /// Returns the age of a stamp, seconds; negative for a stamp in the future.
@@ -81,18 +72,12 @@ impl Now {
 ///
 /// A gate detects that its clock goes backwards between two steps. It cannot detect a clock that is set forward, or
 /// back by less than a cycle; then stamps from before and after are not of one clock.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ClockWatch {
     last: Option<(Now, [Instant; 2])>,
 }
 
 impl ClockWatch {
-    /// Returns a watch without a reading.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { last: None }
-    }
-
     /// Reads both clocks. Returns `true` if the system's clock was set since the last time.
     pub fn check(&mut self) -> bool {
         let before = Instant::now();
@@ -112,12 +97,6 @@ impl ClockWatch {
         let passed = now.ns - last.ns;
         let most = STEP_MS * 1_000_000;
         !(passed >= shortest - most && passed <= longest + most)
-    }
-}
-
-impl Default for ClockWatch {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -175,7 +154,7 @@ mod tests {
     #[test]
     fn setting_the_clock_is_detected() {
         let start = Instant::now();
-        let mut watch = ClockWatch::new();
+        let mut watch = ClockWatch::default();
         let mut was_set = |system_ms: i128, monotonic_ms: u64, late_ms: u64| {
             let at = |ms| start + Duration::from_millis(ms);
             let monotonic = [at(monotonic_ms), at(monotonic_ms + late_ms)];

@@ -1,35 +1,37 @@
 //! The interface of a decider: the gate in this process, or the controller on a serial line.
 
 use crate::clock::Now;
-use crate::diagnostics::explanation;
-use crate::markers::markers;
 use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, MarkerArray, Odometry,
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, Marker, Odometry,
 };
-use crate::permission::report_values;
-use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::permit_gate::{Answer, Origin};
 use crate::poses::PoseReport;
 use crate::settings::NodeSettings;
-use crate::tags::Tags;
 use posegate::gate::Reason;
 use std::time::Duration;
 
-/// Decides from ROS messages.
+/// Decides from ROS messages. By default it has one task, and neither odometry nor a camera.
 pub trait Decider {
     /// Processes a pose.
     fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer;
 
     /// Processes the detections of an image.
-    fn detections(&mut self, now: Now, message: &AprilTagDetectionArray, origin: Origin) -> Answer;
+    fn detections(&mut self, now: Now, _: &AprilTagDetectionArray, _: Origin) -> Answer {
+        self.tick(now)
+    }
 
     /// Processes a camera info; `None` if it could not be decoded.
-    fn camera_info(&mut self, message: Option<&CameraInfo>);
+    fn camera_info(&mut self, _: Option<&CameraInfo>) {}
 
     /// Processes a pose of the odometry.
-    fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer;
+    fn odometry(&mut self, now: Now, _: &Odometry, _: Origin) -> Answer {
+        self.tick(now)
+    }
 
     /// Reports that a message of the odometry could not be decoded.
-    fn odometry_lost(&mut self, now: Now) -> Answer;
+    fn odometry_lost(&mut self, now: Now) -> Answer {
+        self.tick(now)
+    }
 
     /// Advances the time. Called in every control cycle.
     fn tick(&mut self, now: Now) -> Answer;
@@ -56,10 +58,14 @@ pub trait Decider {
     fn explain(&self, answer: &Answer, hint: Option<&str>) -> String;
 
     /// Returns the markers of the last report.
-    fn markers(&self, answer: &Answer) -> Option<MarkerArray>;
+    fn markers(&self, _: &Answer) -> Option<Vec<Marker>> {
+        None
+    }
 
-    /// Returns the longest time to wait for a message, if it is shorter than a control cycle.
-    fn patience(&self) -> Option<Duration>;
+    /// Returns the longest time to wait for a message, if that is shorter than a control cycle.
+    fn patience(&self) -> Duration {
+        Duration::MAX
+    }
 
     /// Returns `true` if the task is asked for by name.
     fn takes_tasks(&self) -> bool {
@@ -76,78 +82,6 @@ pub trait Decider {
 
     /// Returns why there is no task to decide on.
     fn problem(&self) -> Option<String> {
-        None
-    }
-}
-
-impl Decider for PermitGate<'_> {
-    fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
-        Self::pose(self, now, message, origin)
-    }
-
-    fn detections(&mut self, now: Now, message: &AprilTagDetectionArray, origin: Origin) -> Answer {
-        Self::detections(self, now, message, origin)
-    }
-
-    fn camera_info(&mut self, message: Option<&CameraInfo>) {
-        Self::camera_info(self, message);
-    }
-
-    fn odometry(&mut self, now: Now, message: &Odometry, origin: Origin) -> Answer {
-        Self::odometry(self, now, message, origin)
-    }
-
-    fn odometry_lost(&mut self, now: Now) -> Answer {
-        Self::odometry_lost(self, now)
-    }
-
-    fn tick(&mut self, now: Now) -> Answer {
-        self.scrub();
-        Self::tick(self, now)
-    }
-
-    fn inhibit(&mut self, now: Now, reason: Reason) -> Answer {
-        Self::inhibit(self, now, reason)
-    }
-
-    fn reset(&mut self, now: Now) -> Result<String, String> {
-        match Self::reset(self, now) {
-            Ok(()) => Ok("the gate was reset: it is closed, and qualifies again".into()),
-            Err(error) => Err(error.to_string()),
-        }
-    }
-
-    fn report(&self) -> Vec<KeyValue> {
-        self.last()
-            .map(report_values)
-            .into_iter()
-            .flatten()
-            .collect()
-    }
-
-    fn frame(&self) -> Option<&str> {
-        self.last().map(|last| last.frame.as_str())
-    }
-
-    fn diagnostics(&self, _: Now) -> Vec<DiagnosticStatus> {
-        self.tags().map(Tags::status).into_iter().collect()
-    }
-
-    fn explain(&self, answer: &Answer, hint: Option<&str>) -> String {
-        let last = self.last().and_then(|last| last.step.err());
-        let words = explanation(answer, last, hint);
-        match self.tags().and_then(Tags::problem) {
-            Some(problem) if !answer.is_open => format!("{words} Detections: {problem}."),
-            _ => words,
-        }
-    }
-
-    fn markers(&self, answer: &Answer) -> Option<MarkerArray> {
-        let table = self.gate().table().ok()?;
-        Some(markers(answer, self.last()?, table))
-    }
-
-    fn patience(&self) -> Option<Duration> {
         None
     }
 }

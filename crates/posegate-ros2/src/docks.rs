@@ -6,17 +6,21 @@
 use crate::arguments::Arguments;
 use crate::clock::Now;
 use crate::decider::Decider;
+use crate::diagnostics::explanation;
+use crate::markers::markers;
 use crate::message::{
-    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, MarkerArray, Odometry,
+    AprilTagDetectionArray, CameraInfo, DiagnosticStatus, KeyValue, Marker, Odometry,
 };
+use crate::permission::report_values;
 use crate::permit_gate::{Answer, Origin, PermitGate};
 use crate::poses::PoseReport;
 use crate::settings::{NodeSettings, SettingsError};
+use crate::tags::Tags;
 use posegate::gate::{InvalidParameter, Reason, Settings, State, self_test};
 use posegate::table::Table;
 use serde::Deserialize;
+use std::error::Error;
 use std::path::Path;
-use std::time::Duration;
 
 /// The list of a built site's files.
 const MANIFEST: &str = "manifest.json";
@@ -64,6 +68,21 @@ pub enum DocksError {
         /// The error.
         error: Box<SettingsError>,
     },
+}
+
+impl Dock {
+    /// Reads a table that is given alone.
+    ///
+    /// # Errors
+    /// The file cannot be read, or [`SettingsError`].
+    pub fn read(arguments: &Arguments) -> Result<Self, Box<dyn Error>> {
+        let table = std::fs::read(&arguments.table).map_err(|error| {
+            let path = arguments.table.display();
+            format!("cannot read the table {path}: {error}")
+        })?;
+        let settings = NodeSettings::new(arguments, &table)?;
+        Ok(Self { table, settings })
+    }
 }
 
 #[derive(Deserialize)]
@@ -160,26 +179,42 @@ enum Asked<'a> {
 pub struct DockGate<'a> {
     docks: &'a [Dock],
     gates: &'a [Settings<'a>],
-    topics: [String; 2],
     asked: Asked<'a>,
     /// What the self-test or the last gate says: a latched fault outlives a change of the task.
     is_sound: Result<(), Reason>,
     camera_info: Option<CameraInfo>,
+    takes_tasks: bool,
 }
 
 impl<'a> DockGate<'a> {
-    /// Returns a gate without a task. `gates` are the settings of the docks, in their order; `topics` are those of
-    /// [`PermitGate::with_tags`].
+    /// Returns a gate without a task. `gates` are the settings of the docks, in their order.
     #[must_use]
-    pub fn new(docks: &'a [Dock], gates: &'a [Settings<'a>], topics: [String; 2]) -> Self {
+    pub fn new(docks: &'a [Dock], gates: &'a [Settings<'a>]) -> Self {
         Self {
             docks,
             gates,
-            topics,
             asked: Asked::Nothing,
             is_sound: self_test(),
             camera_info: None,
+            takes_tasks: true,
         }
+    }
+
+    /// Returns a gate that decides on the first task alone.
+    ///
+    /// # Errors
+    /// [`InvalidParameter`] if a setting would disable a check.
+    pub fn alone(
+        docks: &'a [Dock],
+        gates: &'a [Settings<'a>],
+        now: Now,
+    ) -> Result<Self, InvalidParameter> {
+        let mut gate = Self::new(docks, gates);
+        if let Some(first) = gate.changed(now, 0) {
+            gate.asked = Asked::Task(0, Box::new(first?));
+            gate.takes_tasks = false;
+        }
+        Ok(gate)
     }
 
     fn gate(&self) -> Option<&PermitGate<'a>> {
@@ -204,9 +239,8 @@ impl<'a> DockGate<'a> {
     /// Returns the gate of a task, closed.
     fn changed(&self, now: Now, at: usize) -> Option<Result<PermitGate<'a>, InvalidParameter>> {
         let (dock, gate) = (self.docks.get(at)?, self.gates.get(at)?);
-        let gate = PermitGate::after(self.is_sound, &dock.table, &dock.settings, gate, now);
-        Some(gate.map(|gate| {
-            let mut gate = gate.with_tags(self.topics.clone());
+        let gate = PermitGate::new(self.is_sound, &dock.table, &dock.settings, gate, now);
+        Some(gate.map(|mut gate| {
             if let Some(info) = &self.camera_info {
                 gate.camera_info(Some(info));
             }
@@ -240,7 +274,10 @@ impl Decider for DockGate<'_> {
     }
 
     fn tick(&mut self, now: Now) -> Answer {
-        self.with(now, |gate| Decider::tick(gate, now))
+        self.with(now, |gate| {
+            gate.scrub();
+            gate.tick(now)
+        })
     }
 
     fn inhibit(&mut self, now: Now, reason: Reason) -> Answer {
@@ -248,48 +285,45 @@ impl Decider for DockGate<'_> {
     }
 
     fn reset(&mut self, now: Now) -> Result<String, String> {
-        match &mut self.asked {
-            Asked::Task(_, gate) => Decider::reset(gate.as_mut(), now),
-            _ => {
-                self.is_sound = self_test();
-                Ok(
-                    "no task is asked for: the next gate starts without a fault of earlier ones"
-                        .into(),
-                )
-            }
+        if let Asked::Task(_, gate) = &mut self.asked {
+            gate.reset(now).map_err(|error| error.to_string())?;
+            return Ok("the gate was reset: it is closed, and qualifies again".into());
         }
+        self.is_sound = self_test();
+        Ok("no task is asked for: the next gate starts without a fault of earlier ones".into())
     }
 
     fn report(&self) -> Vec<KeyValue> {
-        self.gate().map(Decider::report).unwrap_or_default()
+        let last = self.gate().and_then(PermitGate::last);
+        last.map(report_values).into_iter().flatten().collect()
     }
 
     fn frame(&self) -> Option<&str> {
-        self.gate().and_then(Decider::frame)
+        Some(&self.gate()?.last()?.frame)
     }
 
-    fn diagnostics(&self, now: Now) -> Vec<DiagnosticStatus> {
-        let of = |gate| Decider::diagnostics(gate, now);
-        self.gate().map(of).unwrap_or_default()
+    fn diagnostics(&self, _: Now) -> Vec<DiagnosticStatus> {
+        let tags = self.gate().and_then(PermitGate::tags);
+        tags.map(Tags::status).into_iter().collect()
     }
 
     fn explain(&self, answer: &Answer, hint: Option<&str>) -> String {
-        match self.gate() {
-            Some(gate) => gate.explain(answer, hint),
-            None => crate::diagnostics::explanation(answer, None, hint),
+        let gate = self.gate();
+        let last = gate.and_then(PermitGate::last);
+        let words = explanation(answer, last.and_then(|last| last.step.err()), hint);
+        match gate.and_then(PermitGate::tags).and_then(Tags::problem) {
+            Some(problem) if !answer.is_open => format!("{words} Detections: {problem}."),
+            _ => words,
         }
     }
 
-    fn markers(&self, answer: &Answer) -> Option<MarkerArray> {
-        self.gate()?.markers(answer)
-    }
-
-    fn patience(&self) -> Option<Duration> {
-        None
+    fn markers(&self, answer: &Answer) -> Option<Vec<Marker>> {
+        let gate = self.gate()?;
+        Some(markers(answer, gate.last()?, gate.gate().table().ok()?))
     }
 
     fn takes_tasks(&self) -> bool {
-        true
+        self.takes_tasks
     }
 
     fn ask(&mut self, now: Now, name: &str) {

@@ -1,30 +1,23 @@
 //! The node in the ROS graph: its subscriptions, publishers and services on DDS.
 
+use crate::entities::{Entities, GraphError, Topic, reliable};
 use crate::message::{
-    AprilTagDetectionArray, Bool, CameraInfo, DiagnosticArray, MarkerArray, Odometry, PoseStamped,
-    PoseWithCovarianceStamped, Text, TfMessage, TriggerRequest, TriggerResponse,
+    AprilTagDetectionArray, CameraInfo, DiagnosticArray, Header, Marker, Odometry, Pose,
+    PoseStamped, PoseWithCovarianceStamped, Single, TransformStamped, TriggerResponse,
 };
 use crate::names::Names;
-use crate::peers::Peers;
 use crate::poses::PoseType;
 use crate::received::Received;
-use crate::services::{LifecycleServers, ParameterServers};
+use crate::services::{self, Service};
 use crate::settings::{Delivery, NodeSettings};
 use ros2_client::error::CreateError;
-use ros2_client::qos::{Durability, History, Liveliness, WhenFull};
-use ros2_client::{
-    Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, QosProfile,
-    Server, ServiceMapping, ServiceTypeName, Subscription,
-};
-use rustdds::mio1::{Interest, Poll, Token};
+use ros2_client::qos::{Durability, History, Liveliness};
+use ros2_client::{Context, NodeName, NodeOptions, Publisher, QosProfile, Server, ServiceMapping};
+use rustdds::mio1::Poll;
 use rustdds::{DomainParticipantBuilder, DomainParticipantStatusListener, StatusEvented};
-use serde::Serialize;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// Messages that wait for the node: those of one cycle at 1,000 per second, and a reserve.
-const DEPTH: usize = 64;
 
 /// The time from joining the graph to the first topic. Two nodes that start together may announce their topics out of order. RustDDS puts no source
 /// timestamp on an announcement, and Fast DDS then loses some of them for good. After this time the others are known, and announcements arrive in
@@ -42,33 +35,6 @@ pub struct Environment {
     pub services: ServiceMapping,
 }
 
-/// The reason why the graph cannot be joined.
-#[derive(Debug, thiserror::Error)]
-pub enum GraphError {
-    /// A variable of the environment is invalid.
-    #[error("{name} is `{given}`: expected {expected}")]
-    Environment {
-        /// The variable.
-        name: &'static str,
-        /// The variable's value.
-        given: String,
-        /// The expected value.
-        expected: &'static str,
-    },
-    /// DDS reports an error.
-    #[error("cannot join the ROS graph: {0}; check ROS_DOMAIN_ID and the network")]
-    Dds(String),
-    /// The operating system cannot wait for messages.
-    #[error("cannot wait for messages: {0}")]
-    Poll(#[from] std::io::Error),
-}
-
-impl From<CreateError> for GraphError {
-    fn from(error: CreateError) -> Self {
-        Self::Dds(error.to_string())
-    }
-}
-
 impl Environment {
     /// Reads the variables that ROS programs read, through a function such as `std::env::var(..).ok()`.
     ///
@@ -76,29 +42,24 @@ impl Environment {
     /// [`GraphError::Environment`]
     pub fn read(variable: impl Fn(&str) -> Option<String>) -> Result<Self, GraphError> {
         let given = |name: &'static str| variable(name).filter(|value| !value.is_empty());
-        let domain = match given("ROS_DOMAIN_ID") {
-            None => 0,
-            Some(text) => match text.parse::<u16>() {
-                Ok(domain) if domain <= 232 => domain,
-                _ => {
-                    return Err(GraphError::Environment {
-                        name: "ROS_DOMAIN_ID",
-                        given: text,
-                        expected: "a whole number from 0 to 232",
-                    });
-                }
-            },
+        let refused = |name, given, expected| GraphError::Environment {
+            name,
+            given,
+            expected,
         };
-        let range = given("ROS_AUTOMATIC_DISCOVERY_RANGE").unwrap_or_else(|| "SUBNET".into());
+        let text = given("ROS_DOMAIN_ID").unwrap_or_else(|| "0".into());
+        let domain = text.parse().ok().filter(|domain| *domain <= 232);
+        let expected = "a whole number from 0 to 232";
+        let domain = domain.ok_or_else(|| refused("ROS_DOMAIN_ID", text, expected))?;
+        let name = "ROS_AUTOMATIC_DISCOVERY_RANGE";
+        let range = given(name).unwrap_or_else(|| "SUBNET".into());
         let is_near = match range.as_str() {
             "LOCALHOST" => true,
             "SUBNET" | "SYSTEM_DEFAULT" => false,
             _ => {
-                return Err(GraphError::Environment {
-                    name: "ROS_AUTOMATIC_DISCOVERY_RANGE",
-                    given: range,
-                    expected: "LOCALHOST, SUBNET or SYSTEM_DEFAULT; this node cannot do without discovery",
-                });
+                let expected =
+                    "LOCALHOST, SUBNET or SYSTEM_DEFAULT; this node cannot do without discovery";
+                return Err(refused(name, range, expected));
             }
         };
         let is_cyclone =
@@ -115,68 +76,50 @@ impl Environment {
     }
 }
 
-/// The source of poses.
+/// A message with poses, or with what they are computed from.
+#[expect(clippy::large_enum_variant, reason = "one at a time, and never kept")]
 pub enum Input {
-    /// Poses with covariance.
-    Poses(Subscription<PoseWithCovarianceStamped>),
-    /// Poses of odometry's type.
-    Odometry(Subscription<Odometry>),
-    /// Poses without covariance.
-    Plain(Subscription<PoseStamped>),
+    /// A pose of a frame on the robot, if the message names it, with its covariance, if it has one.
+    Pose(Header, Option<String>, Pose, Option<[f64; 36]>),
     /// Transforms.
-    Transforms(Subscription<TfMessage>),
-    /// Detections, and the camera info.
-    Detections(
-        Subscription<AprilTagDetectionArray>,
-        Box<Subscription<CameraInfo>>,
-    ),
+    Transforms(Vec<TransformStamped>),
+    /// Detections of tags.
+    Detections(AprilTagDetectionArray),
 }
 
 const ODOMETRY: [&str; 2] = ["nav_msgs", "Odometry"];
-const DETECTIONS: [&str; 2] = ["apriltag_msgs", "AprilTagDetectionArray"];
-const CAMERA_INFO: [&str; 2] = ["sensor_msgs", "CameraInfo"];
-
-/// Returns the package and the name of a type of poses.
-const fn type_of(kind: PoseType) -> [&'static str; 2] {
-    match kind {
-        PoseType::WithCovariance => ["geometry_msgs", "PoseWithCovarianceStamped"],
-        PoseType::Odometry => ODOMETRY,
-        PoseType::Pose => ["geometry_msgs", "PoseStamped"],
-        PoseType::Transforms => ["tf2_msgs", "TFMessage"],
-    }
-}
+const DIAGNOSTICS: [&str; 2] = ["diagnostic_msgs", "DiagnosticArray"];
+const TRIGGER: [&str; 2] = ["std_srvs", "Trigger"];
 
 /// The node in the graph.
 pub struct Graph {
-    /// Waits for messages.
-    pub poll: Poll,
     /// Events of discovery.
     pub events: DomainParticipantStatusListener,
     /// The poses, or the detections from which they are computed.
-    pub input: Input,
+    pub input: Topic<Input>,
+    /// The camera info, if detections are used.
+    pub camera_info: Option<Topic<CameraInfo>>,
     /// The odometry, if it is used.
-    pub odom: Option<Subscription<Odometry>>,
+    pub odom: Option<Topic<Odometry>>,
     /// The name of the task, if it is asked for.
-    pub task: Option<Subscription<Text>>,
+    pub task: Option<Topic<String>>,
     /// The fail-safe permit.
     pub permission: Publisher<DiagnosticArray>,
     /// The permit for display only.
-    pub permit: Publisher<Bool>,
+    pub permit: Publisher<bool>,
     /// The diagnostics.
     pub diagnostics: Publisher<DiagnosticArray>,
     /// The markers.
-    pub markers: Publisher<MarkerArray>,
+    pub markers: Publisher<Vec<Marker>>,
     /// The service that resets the gate.
-    pub reset: Server<TriggerRequest, TriggerResponse>,
+    pub reset: Server<Single<u8>, TriggerResponse>,
     /// The service that returns the reason why the gate is closed.
-    pub explain: Server<TriggerRequest, TriggerResponse>,
-    /// The services of the parameters.
-    pub parameters: ParameterServers,
-    /// The services of the lifecycle, of a managed node alone.
-    pub lifecycle: Option<LifecycleServers>,
+    pub explain: Server<Single<u8>, TriggerResponse>,
+    /// The services of the parameters, and of the lifecycle of a managed node.
+    pub services: Vec<Service>,
     threads: DdsThreads,
-    // Fields are dropped in their order: the node is the last one.
-    _node: Node,
+    // Fields are dropped in their order: the node is in the last one.
+    entities: Entities,
 }
 
 impl Graph {
@@ -196,7 +139,7 @@ impl Graph {
             participant = participant.with_only_networks([IpAddr::V4(Ipv4Addr::LOCALHOST)]);
         }
         let participant = participant.build().map_err(CreateError::from)?;
-        let events = participant.status_listener();
+        let mut events = participant.status_listener();
         std::thread::sleep(SETTLE);
         let context = Context::from_domain_participant(participant)?;
         let node_name = NodeName::new(&names.namespace, &names.node);
@@ -206,142 +149,65 @@ impl Graph {
             .enable_rosout(false)
             .start_parameter_services(false);
         let node = context.new_node(node_name, options);
-        let mut builder = Builder {
+        let mut entities = Entities {
             node: node.map_err(|error| GraphError::Dds(error.to_string()))?,
             services: environment.services,
+            poll: Poll::new()?,
         };
-        let mut input = match settings.detector {
-            None => {
-                let kind = settings.poses.kind;
-                let (name, delivery) = (names.of_poses(kind), settings.pose_delivery);
-                let of = type_of(kind);
-                match kind {
-                    PoseType::WithCovariance => {
-                        Input::Poses(builder.subscription(name, of, delivery)?)
-                    }
-                    PoseType::Odometry => {
-                        Input::Odometry(builder.subscription(name, of, delivery)?)
-                    }
-                    PoseType::Pose => Input::Plain(builder.subscription(name, of, delivery)?),
-                    PoseType::Transforms => {
-                        Input::Transforms(builder.subscription(name, of, delivery)?)
-                    }
-                }
-            }
-            Some(_) => Input::Detections(
-                builder.subscription(
-                    &names.detections,
-                    DETECTIONS,
-                    settings.detections_delivery,
-                )?,
-                Box::new(builder.subscription(
-                    &names.camera_info,
-                    CAMERA_INFO,
-                    settings.camera_info_delivery,
-                )?),
-            ),
-        };
-        let mut odom = match settings.tracker {
-            Some(_) => Some(builder.subscription(&names.odom, ODOMETRY, settings.odom_delivery)?),
-            None => None,
-        };
+        let input = input(&mut entities, names, settings)?;
+        let camera_info = settings.detector.as_ref().map(|_| {
+            entities.topic(
+                &names.camera_info,
+                ["sensor_msgs", "CameraInfo"],
+                settings.camera_info_delivery,
+                "camera_info_reliability to best_effort",
+                |message| message,
+            )
+        });
+        let odom = settings.tracker.map(|_| {
+            entities.topic(
+                &names.odom,
+                ODOMETRY,
+                settings.odom_delivery,
+                "odom_reliability to best_effort, or odom_durability to volatile",
+                |message| message,
+            )
+        });
         let latched = Delivery {
             reliable: true,
             transient_local: true,
         };
-        let mut task = match takes_tasks {
-            true => Some(builder.subscription(&names.task, ["std_msgs", "String"], latched)?),
-            false => None,
-        };
-        let diagnostic = ["diagnostic_msgs", "DiagnosticArray"];
-        let permission =
-            builder.publisher(&names.permission, diagnostic, heartbeat_qos(settings))?;
+        let text = ["std_msgs", "String"];
+        let task = takes_tasks.then(|| entities.topic(&names.task, text, latched, "", |name| name));
         let latched = reliable().durability(Durability::TransientLocal);
-        let permit = builder.publisher(&names.permit, ["std_msgs", "Bool"], latched)?;
         let several = reliable().history(History::KeepLast { depth: 10 });
-        let diagnostics = builder.publisher(&names.diagnostics, diagnostic, several)?;
-        let markers = builder.publisher(
-            &names.markers,
-            ["visualization_msgs", "MarkerArray"],
-            reliable(),
-        )?;
-        let trigger = ["std_srvs", "Trigger"];
-        let mut reset = builder.server(&names.reset, trigger)?;
-        let mut explain = builder.server(&names.explain, trigger)?;
-        let own = |name: &str| format!("{}/{name}", names.full_node());
-        let of_parameters = |kind| ["rcl_interfaces", kind];
-        let parameters = ParameterServers {
-            get: builder.server(&own("get_parameters"), of_parameters("GetParameters"))?,
-            types: builder.server(
-                &own("get_parameter_types"),
-                of_parameters("GetParameterTypes"),
-            )?,
-            set: builder.server(&own("set_parameters"), of_parameters("SetParameters"))?,
-            set_at_once: builder.server(
-                &own("set_parameters_atomically"),
-                of_parameters("SetParametersAtomically"),
-            )?,
-            list: builder.server(&own("list_parameters"), of_parameters("ListParameters"))?,
-            describe: builder.server(
-                &own("describe_parameters"),
-                of_parameters("DescribeParameters"),
-            )?,
-        };
-        let of_lifecycle = |kind| ["lifecycle_msgs", kind];
-        let lifecycle = match settings.is_managed {
-            true => Some(LifecycleServers {
-                change: builder.server(&own("change_state"), of_lifecycle("ChangeState"))?,
-                current: builder.server(&own("get_state"), of_lifecycle("GetState"))?,
-                states: builder.server(
-                    &own("get_available_states"),
-                    of_lifecycle("GetAvailableStates"),
-                )?,
-                transitions: builder.server(
-                    &own("get_available_transitions"),
-                    of_lifecycle("GetAvailableTransitions"),
-                )?,
-            }),
-            false => None,
-        };
-        let mut events = events;
-        let poll = Poll::new()?;
-        let registry = poll.registry();
-        match &mut input {
-            Input::Poses(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
-            Input::Odometry(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
-            Input::Plain(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
-            Input::Transforms(pose) => registry.register(pose, Token(0), Interest::READABLE)?,
-            Input::Detections(detections, camera_info) => {
-                registry.register(detections, Token(0), Interest::READABLE)?;
-                registry.register(camera_info.as_mut(), Token(5), Interest::READABLE)?;
-            }
-        }
-        registry.register(&mut reset, Token(1), Interest::READABLE)?;
-        registry.register(&mut explain, Token(2), Interest::READABLE)?;
-        registry.register(events.as_status_source_mio1(), Token(3), Interest::READABLE)?;
-        if let Some(odom) = &mut odom {
-            registry.register(odom, Token(4), Interest::READABLE)?;
-        }
-        if let Some(task) = &mut task {
-            registry.register(task, Token(6), Interest::READABLE)?;
-        }
+        let of_markers = ["visualization_msgs", "MarkerArray"];
+        entities.wake_at(events.as_status_source_mio1())?;
         Ok(Self {
-            poll,
             events,
             input,
-            odom,
-            task,
-            permission,
-            permit,
-            diagnostics,
-            markers,
-            reset,
-            explain,
-            parameters,
-            lifecycle,
+            camera_info: camera_info.transpose()?,
+            odom: odom.transpose()?,
+            task: task.transpose()?,
+            permission: entities.publisher(
+                &names.permission,
+                DIAGNOSTICS,
+                heartbeat_qos(settings),
+            )?,
+            permit: entities.publisher(&names.permit, ["std_msgs", "Bool"], latched)?,
+            diagnostics: entities.publisher(&names.diagnostics, DIAGNOSTICS, several)?,
+            markers: entities.publisher(&names.markers, of_markers, reliable())?,
+            reset: entities.server(&names.reset, TRIGGER)?,
+            explain: entities.server(&names.explain, TRIGGER)?,
+            services: services::offer(&mut entities, names.full_node(), settings.is_managed)?,
             threads: DdsThreads::now().without(&before),
-            _node: builder.node,
+            entities,
         })
+    }
+
+    /// Waits for messages.
+    pub fn poll(&mut self) -> &mut Poll {
+        &mut self.entities.poll
     }
 
     /// Returns `true` if the threads of DDS run.
@@ -353,66 +219,60 @@ impl Graph {
         self.threads.run()
     }
 
-    /// Returns the counts of a new subscription to poses or detections.
-    #[must_use]
-    pub fn received_poses(&self, names: &Names, settings: &NodeSettings) -> Received {
-        let guid = match &self.input {
-            Input::Poses(pose) => pose.guid(),
-            Input::Odometry(pose) => pose.guid(),
-            Input::Plain(pose) => pose.guid(),
-            Input::Transforms(pose) => pose.guid(),
-            Input::Detections(detections, _) => {
-                return Received::new(
-                    names.detections.clone(),
-                    "detections_reliability to best_effort, or detections_durability to volatile",
-                    settings.detections_delivery,
-                    Peers::new(&names.detections, DETECTIONS, detections.guid()),
-                );
-            }
-        };
-        let kind = settings.poses.kind;
-        let topic = names.of_poses(kind);
-        let peers = Peers::new(topic, type_of(kind), guid);
-        let peers = match kind {
-            PoseType::Transforms => peers.shared(),
-            _ => peers,
-        };
-        let parameters = "pose_reliability to best_effort, or pose_durability to volatile";
-        Received::new(topic.into(), parameters, settings.pose_delivery, peers)
-    }
-
-    /// Returns the counts of a new subscription to the camera info; `None` if it is not used.
-    #[must_use]
-    pub fn received_camera_info(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
-        let Input::Detections(_, camera_info) = &self.input else {
-            return None;
-        };
-        Some(Received::new(
-            names.camera_info.clone(),
-            "camera_info_reliability to best_effort",
-            settings.camera_info_delivery,
-            Peers::new(&names.camera_info, CAMERA_INFO, camera_info.guid()),
-        ))
-    }
-
-    /// Returns the counts of a new subscription to the odometry; `None` if it is not used.
-    #[must_use]
-    pub fn received_odometry(&self, names: &Names, settings: &NodeSettings) -> Option<Received> {
-        let guid = self.odom.as_ref()?.guid();
-        let peers = Peers::new(&names.odom, ODOMETRY, guid);
-        let parameters = "odom_reliability to best_effort, or odom_durability to volatile";
-        Some(Received::new(
-            names.odom.clone(),
-            parameters,
-            settings.odom_delivery,
-            peers,
-        ))
+    /// Returns the counts of all topics with poses, and with what they are computed from.
+    pub fn received(&mut self) -> impl Iterator<Item = &mut Received> {
+        let odom = self.odom.as_mut().map(|topic| &mut topic.received);
+        let camera_info = self.camera_info.as_mut().map(|topic| &mut topic.received);
+        std::iter::once(&mut self.input.received)
+            .chain(odom)
+            .chain(camera_info)
     }
 }
 
-/// The quality of service of the node's publishers: reliable, and a publication never waits for a slow subscriber.
-const fn reliable() -> QosProfile {
-    QosProfile::publisher_default().reliability_reliable(WhenFull::Fail)
+/// Subscribes to the poses, or to the detections from which they are computed.
+fn input(
+    entities: &mut Entities,
+    names: &Names,
+    settings: &NodeSettings,
+) -> Result<Topic<Input>, GraphError> {
+    if settings.detector.is_some() {
+        return entities.topic(
+            &names.detections,
+            ["apriltag_msgs", "AprilTagDetectionArray"],
+            settings.detections_delivery,
+            "detections_reliability to best_effort, or detections_durability to volatile",
+            Input::Detections,
+        );
+    }
+    let kind = settings.poses.kind;
+    let (name, delivery) = (names.of_poses(kind), settings.pose_delivery);
+    let words = "pose_reliability to best_effort, or pose_durability to volatile";
+    match kind {
+        PoseType::WithCovariance => {
+            let of = ["geometry_msgs", "PoseWithCovarianceStamped"];
+            entities.topic(name, of, delivery, words, |message| {
+                let PoseWithCovarianceStamped { header, pose } = message;
+                Input::Pose(header, None, pose.pose, Some(pose.covariance))
+            })
+        }
+        PoseType::Odometry => entities.topic(name, ODOMETRY, delivery, words, |message| {
+            let Odometry { header, pose, .. } = message;
+            let child = Some(message.child_frame_id);
+            Input::Pose(header, child, pose.pose, Some(pose.covariance))
+        }),
+        PoseType::Pose => {
+            let of = ["geometry_msgs", "PoseStamped"];
+            entities.topic(name, of, delivery, words, |PoseStamped { header, pose }| {
+                Input::Pose(header, None, pose, None)
+            })
+        }
+        PoseType::Transforms => {
+            let of = ["tf2_msgs", "TFMessage"];
+            let mut topic = entities.topic(name, of, delivery, words, Input::Transforms)?;
+            topic.received.peers.is_shared = true;
+            Ok(topic)
+        }
+    }
 }
 
 /// The quality of service of the heartbeat: a stated period, and a liveliness that only a publication asserts.
@@ -450,62 +310,6 @@ impl DdsThreads {
     fn run(&self) -> bool {
         self.0.iter().all(|path| path.exists())
     }
-}
-
-struct Builder {
-    node: Node,
-    services: ServiceMapping,
-}
-
-impl Builder {
-    fn subscription<M: 'static>(
-        &mut self,
-        name: &str,
-        [package, kind]: [&str; 2],
-        delivery: Delivery,
-    ) -> Result<Subscription<M>, GraphError> {
-        let mut qos =
-            QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH });
-        if delivery.reliable {
-            qos = qos.reliability_reliable(WhenFull::Fail);
-        }
-        if delivery.transient_local {
-            qos = qos.durability(Durability::TransientLocal);
-        }
-        let topic =
-            self.node
-                .create_topic(&parsed(name)?, MessageTypeName::new(package, kind), &qos)?;
-        Ok(self.node.create_subscription(&topic, Some(qos))?)
-    }
-
-    fn publisher<M: Serialize>(
-        &mut self,
-        name: &str,
-        [package, kind]: [&str; 2],
-        qos: QosProfile,
-    ) -> Result<Publisher<M>, GraphError> {
-        let topic =
-            self.node
-                .create_topic(&parsed(name)?, MessageTypeName::new(package, kind), &qos)?;
-        Ok(self.node.create_publisher(&topic, Some(qos))?)
-    }
-
-    fn server<Q: Message + Clone + 'static, R: Message + 'static>(
-        &mut self,
-        name: &str,
-        [package, kind]: [&str; 2],
-    ) -> Result<Server<Q, R>, GraphError> {
-        let qos = reliable().history(History::KeepLast { depth: 10 });
-        let kind = ServiceTypeName::new(package, kind);
-        let server =
-            self.node
-                .create_server(self.services, &parsed(name)?, &kind, qos.clone(), qos);
-        Ok(server?)
-    }
-}
-
-fn parsed(name: &str) -> Result<Name, GraphError> {
-    Name::parse(name).map_err(|error| GraphError::Dds(format!("the name {name}: {error:?}")))
 }
 
 #[cfg(test)]

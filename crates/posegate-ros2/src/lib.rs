@@ -2,7 +2,7 @@
 //!
 //! [`poses::Poses`] converts messages with a pose, and [`tags::Tags`] computes poses from detections of tags. [`permit_gate::PermitGate`] is the gate of the core behind
 //! ROS messages, without DDS. [`bridge::Bridge`] passes them to a gate on a controller instead. [`run::Runner`] is
-//! the node; with several tables it decides by a [`docks::DockGate`]. The program `posegate-node` parses a command line ([`arguments::Command`]) and runs it.
+//! the node; with several tables it decides by a [`docks::DockGate`]. The program `posegate-node` parses a command line ([`arguments::Arguments`]) and runs it.
 //! `docs/for-ros.md` describes the topics, and what a consumer of the permit must do.
 
 pub mod arguments;
@@ -11,6 +11,9 @@ pub mod clock;
 pub mod decider;
 pub mod diagnostics;
 pub mod docks;
+pub mod entities;
+#[cfg(test)]
+mod fixtures;
 pub mod graph;
 pub mod lifecycle;
 pub mod link;

@@ -14,34 +14,6 @@ pub struct Labelled {
     pub label: String,
 }
 
-/// The request of `lifecycle_msgs/srv/ChangeState`. A transition of number 0 is looked up by its name.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ChangeState {
-    /// The transition.
-    pub transition: Labelled,
-}
-
-/// The response of `lifecycle_msgs/srv/ChangeState`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Changed {
-    /// `true` if the transition was made.
-    pub success: bool,
-}
-
-/// The response of `lifecycle_msgs/srv/GetState`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CurrentState {
-    /// The state.
-    pub current_state: Labelled,
-}
-
-/// The response of `lifecycle_msgs/srv/GetAvailableStates`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct AvailableStates {
-    /// All states.
-    pub available_states: Vec<Labelled>,
-}
-
 /// `lifecycle_msgs/msg/TransitionDescription`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TransitionDescription {
@@ -52,19 +24,6 @@ pub struct TransitionDescription {
     /// The state after.
     pub goal_state: Labelled,
 }
-
-/// The response of `lifecycle_msgs/srv/GetAvailableTransitions`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct AvailableTransitions {
-    /// The transitions from the current state.
-    pub available_transitions: Vec<TransitionDescription>,
-}
-
-impl ros2_client::Message for ChangeState {}
-impl ros2_client::Message for Changed {}
-impl ros2_client::Message for CurrentState {}
-impl ros2_client::Message for AvailableStates {}
-impl ros2_client::Message for AvailableTransitions {}
 
 /// A state of a managed node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +71,7 @@ impl State {
         labelled(self as u8, label)
     }
 
-    /// Returns the state after a transition; `None` if the node cannot make it from this state.
+    /// Returns the state after a transition, of which one of number 0 is looked up by its name; `None` if the node cannot make it from this state.
     #[must_use]
     pub fn after(self, wanted: &Labelled) -> Option<Self> {
         let mut possible = self.transitions();
@@ -125,23 +84,19 @@ impl State {
 
     /// Returns all states.
     #[must_use]
-    pub fn all() -> AvailableStates {
-        AvailableStates {
-            available_states: Self::ALL.map(Self::labelled).into(),
-        }
+    pub fn all() -> Vec<Labelled> {
+        Self::ALL.map(Self::labelled).into()
     }
 
     /// Returns the transitions from this state.
     #[must_use]
-    pub fn available(self) -> AvailableTransitions {
+    pub fn available(self) -> Vec<TransitionDescription> {
         let described = |(id, label, from, to): Transition| TransitionDescription {
             transition: labelled(id, label),
             start_state: from.labelled(),
             goal_state: to.labelled(),
         };
-        AvailableTransitions {
-            available_transitions: self.transitions().map(described).collect(),
-        }
+        self.transitions().map(described).collect()
     }
 
     fn transitions(self) -> impl Iterator<Item = Transition> {
@@ -175,7 +130,7 @@ mod tests {
             state = state.after(&labelled(id, "")).unwrap();
             assert_eq!(state, next);
         }
-        assert_eq!(state.available().available_transitions, []);
+        assert_eq!(state.available(), []);
     }
 
     /// No other transition reaches the state in which the gate decides.

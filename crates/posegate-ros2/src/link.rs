@@ -9,7 +9,7 @@
 //! new. If the clock is faster than assumed, a state looks younger by at most what the clock gains in [`LIFE`].
 
 use posegate::gate::State;
-use posegate::wire::{LinkCounters, Receiver, Telemetry};
+use posegate::wire::{Receiver, Telemetry};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -42,42 +42,25 @@ pub struct Counts {
     pub restarts: u64,
 }
 
-/// The line to a controller.
-#[derive(Debug)]
+/// The line to a controller, without any telemetry at first.
+#[derive(Debug, Default)]
 pub struct Link {
     receiver: Receiver,
-    last: Option<Heard>,
+    /// The last telemetry, and when it arrived.
+    last: Option<(Telemetry, Instant)>,
     /// A time of the controller's clock, and a time of this machine that was certainly before it.
     anchor: Option<(u32, Instant)>,
     sent: VecDeque<(u32, Instant)>,
     counts: Counts,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Heard {
-    telemetry: Telemetry,
-    at: Instant,
-}
-
 impl Link {
-    /// Returns a line without any telemetry.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            receiver: Receiver::new(),
-            last: None,
-            anchor: None,
-            sent: VecDeque::new(),
-            counts: Counts::default(),
-        }
-    }
-
     /// Forgets all telemetry: the line was closed.
     pub fn close(&mut self) {
         let counts = self.counts;
         *self = Self {
             counts,
-            ..Self::new()
+            ..Self::default()
         };
     }
 
@@ -96,10 +79,10 @@ impl Link {
     }
 
     fn hear(&mut self, telemetry: Telemetry, at: Instant) {
-        if let Some(last) = &self.last {
-            let steps = telemetry.number.wrapping_sub(last.telemetry.number);
-            let passed = telemetry.now_ms.wrapping_sub(last.telemetry.now_ms);
-            if telemetry == last.telemetry {
+        if let Some((last, _)) = &self.last {
+            let steps = telemetry.number.wrapping_sub(last.number);
+            let passed = telemetry.now_ms.wrapping_sub(last.now_ms);
+            if telemetry == *last {
                 self.counts.repeated += 1;
                 return;
             }
@@ -110,7 +93,7 @@ impl Link {
             }
         }
         self.counts.telemetry += 1;
-        self.last = Some(Heard { telemetry, at });
+        self.last = Some((telemetry, at));
         if let Some(report) = telemetry.weighed.filter(|report| report.source == SOURCE) {
             let sent = self
                 .sent
@@ -163,20 +146,20 @@ impl Link {
     /// Returns the last telemetry.
     #[must_use]
     pub fn last(&self) -> Option<&Telemetry> {
-        self.last.as_ref().map(|heard| &heard.telemetry)
+        self.last.as_ref().map(|(telemetry, _)| telemetry)
     }
 
     /// Returns the time since the last telemetry arrived.
     #[must_use]
     pub fn silence(&self, now: Instant) -> Option<Duration> {
-        let last = self.last?;
-        Some(now.saturating_duration_since(last.at))
+        let (_, at) = self.last?;
+        Some(now.saturating_duration_since(at))
     }
 
     /// Returns an upper bound of the age of the last telemetry. `None` without a round trip: it can have any age.
     #[must_use]
     pub fn age(&self, now: Instant) -> Option<Duration> {
-        let bound = self.made_after(self.last?.telemetry.now_ms)?;
+        let bound = self.made_after(self.last?.0.now_ms)?;
         Some(now.saturating_duration_since(bound))
     }
 
@@ -184,9 +167,9 @@ impl Link {
     /// added.
     #[must_use]
     pub fn clock_ms(&self, now: Instant) -> Option<u32> {
-        let last = self.last?;
-        let since = now.saturating_duration_since(last.at).as_millis();
-        Some(last.telemetry.now_ms.wrapping_add(since as u32))
+        let (last, at) = self.last?;
+        let since = now.saturating_duration_since(at).as_millis();
+        Some(last.now_ms.wrapping_add(since as u32))
     }
 
     /// Returns `true` if the controller permits: its state is certainly younger than `limit`, its output is high, and
@@ -207,19 +190,6 @@ impl Link {
     #[must_use]
     pub const fn counts(&self) -> Counts {
         self.counts
-    }
-
-    /// Returns the counts of the controller's end.
-    #[must_use]
-    pub fn controller_counts(&self) -> LinkCounters {
-        self.last()
-            .map_or_else(LinkCounters::default, |said| said.line)
-    }
-}
-
-impl Default for Link {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

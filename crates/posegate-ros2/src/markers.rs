@@ -1,11 +1,12 @@
 //! Markers for a viewer: the pose-set of the robot, and the section of the success set at its heading. For display
 //! only.
 
-use crate::message::{Color, Header, Marker, MarkerArray, Pose};
+use crate::message::{Header, Marker, Pose};
 use crate::permit_gate::{Answer, LastReport};
 use posegate::contain::{Decision, decide};
 use posegate::set::{Estimate, PoseSet, Uncertainty};
 use posegate::table::Table;
+use posegate_replay::coordinates;
 
 /// Lines of an ellipse.
 const SIDES: u32 = 48;
@@ -20,18 +21,17 @@ const TRIANGLE_LIST: i32 = 11;
 
 /// Returns the markers of the last report.
 #[must_use]
-pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerArray {
+pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> Vec<Marker> {
     let mut markers = Vec::new();
-    let rgb = match (answer.is_open, last.verdict.is_permit()) {
+    let [r, g, b] = match (answer.is_open, last.verdict.is_permit()) {
         (true, _) => [0.1, 0.8, 0.2],
         (false, true) => [0.9, 0.7, 0.1],
         (false, false) => [0.9, 0.2, 0.2],
     };
     let Ok(mean) = last.estimate.mean() else {
-        return MarkerArray { markers };
+        return markers;
     };
-    let (x, y) = (f64::from(mean.x_um) * 1e-6, f64::from(mean.y_um) * 1e-6);
-    let yaw = f64::from(mean.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
+    let [x, y, yaw] = coordinates(mean);
     let radius = libm::sqrt(f64::from(table.radius_squared().q16()) / 65_536.0);
     if let Some((axes, reach)) = spread(last.estimate.spread.as_ref(), radius) {
         let corners = (0..=SIDES).map(|k| {
@@ -39,39 +39,28 @@ pub fn markers(answer: &Answer, last: &LastReport, table: &Table<'_>) -> MarkerA
             let (s, c) = (libm::sin(angle), libm::cos(angle));
             [x + axes[0] * c, y + axes[1] * c + axes[2] * s, 0.02]
         });
-        markers.push(marker(
-            answer,
-            last,
-            0,
-            LINE_STRIP,
-            [0.01; 3],
-            rgb,
-            0.9,
-            corners.collect(),
-        ));
-        markers.push(marker(
-            answer,
-            last,
-            1,
-            TRIANGLE_LIST,
-            [1.0; 3],
-            rgb,
-            0.4,
-            fan([x, y, yaw], reach),
-        ));
+        let outline = Marker {
+            kind: LINE_STRIP,
+            scale: [0.01; 3],
+            color: [r, g, b, 0.9],
+            ..marker(answer, last, 0, corners.collect())
+        };
+        let headings = Marker {
+            kind: TRIANGLE_LIST,
+            scale: [1.0; 3],
+            color: [r, g, b, 0.4],
+            ..marker(answer, last, 1, fan([x, y, yaw], reach))
+        };
+        markers.extend([outline, headings]);
     }
     let (points, step) = section(table, yaw);
-    markers.push(marker(
-        answer,
-        last,
-        2,
-        CUBE_LIST,
-        [step, step, 0.005],
-        [0.2, 0.5, 0.9],
-        0.4,
-        points,
-    ));
-    MarkerArray { markers }
+    markers.push(Marker {
+        kind: CUBE_LIST,
+        scale: [step, step, 0.005],
+        color: [0.2, 0.5, 0.9, 0.4],
+        ..marker(answer, last, 2, points)
+    });
+    markers
 }
 
 /// Returns the lower triangular root of the plane's covariance times the radius, and the extent in heading.
@@ -142,17 +131,7 @@ fn section(table: &Table<'_>, yaw: f64) -> (Vec<[f64; 3]>, f64) {
     (points, f64::from(step) * 1e-6)
 }
 
-#[expect(clippy::too_many_arguments, reason = "a marker has so many fields")]
-fn marker(
-    answer: &Answer,
-    last: &LastReport,
-    id: i32,
-    kind: i32,
-    scale: [f64; 3],
-    [r, g, b]: [f32; 3],
-    opacity: f32,
-    points: Vec<[f64; 3]>,
-) -> Marker {
+fn marker(answer: &Answer, last: &LastReport, id: i32, points: Vec<[f64; 3]>) -> Marker {
     Marker {
         header: Header {
             stamp: answer.now.time(),
@@ -160,28 +139,15 @@ fn marker(
         },
         ns: "posegate".into(),
         id,
-        kind,
         // Viewers refuse an empty list: delete the earlier markers.
         action: if points.is_empty() { 2 } else { 0 },
         pose: Pose {
             position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
         },
-        scale,
-        color: Color {
-            rgba: [r, g, b, opacity],
-        },
         // Markers of a node that has ended disappear.
         lifetime: (3, 0),
-        frame_locked: false,
         points,
-        colors: Vec::new(),
-        texture_resource: String::new(),
-        texture: (Header::default(), String::new(), Vec::new()),
-        uv_coordinates: Vec::new(),
-        text: String::new(),
-        mesh_resource: String::new(),
-        mesh_file: (String::new(), Vec::new()),
-        mesh_use_embedded_materials: false,
+        ..Marker::default()
     }
 }

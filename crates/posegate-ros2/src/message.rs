@@ -1,8 +1,10 @@
 //! The ROS 2 messages of the node, field by field in the order of their definitions.
 //!
 //! CDR has no field names: the order is the format. Structs of equal numbers (`Point`, `Quaternion`) are arrays here,
-//! because CDR encodes both in the same way.
+//! because CDR encodes both in the same way. A message with one field is that field: `std_msgs/msg/Bool` is `bool`,
+//! `tf2_msgs/msg/TFMessage` is `Vec<TransformStamped>`.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
@@ -42,7 +44,7 @@ pub struct Header {
 }
 
 /// `geometry_msgs/msg/Pose`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// x, y, z, metres.
     pub position: [f64; 3],
@@ -91,30 +93,6 @@ pub struct TransformStamped {
     pub rotation: [f64; 4],
 }
 
-/// `tf2_msgs/msg/TFMessage`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TfMessage {
-    /// The transforms.
-    pub transforms: Vec<TransformStamped>,
-}
-
-/// `std_msgs/msg/String`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Text {
-    /// The text.
-    pub data: String,
-}
-
-/// `geometry_msgs/msg/TwistWithCovariance`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TwistWithCovariance {
-    /// Linear x, y, z (m/s), angular x, y, z (rad/s).
-    pub twist: [f64; 6],
-    /// 6 x 6 by rows.
-    #[serde(with = "BigArray")]
-    pub covariance: [f64; 36],
-}
-
 /// `nav_msgs/msg/Odometry`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Odometry {
@@ -124,8 +102,8 @@ pub struct Odometry {
     pub child_frame_id: String,
     /// The pose in the frame of the header.
     pub pose: PoseWithCovariance,
-    /// The speed in the frame of the robot.
-    pub twist: TwistWithCovariance,
+    /// Unused: the speed in the frame of the robot, and its covariance by rows.
+    pub twist: ([f64; 6], [[f64; 6]; 6]),
 }
 
 /// `apriltag_msgs/msg/AprilTagDetection`.
@@ -159,21 +137,6 @@ pub struct AprilTagDetectionArray {
     pub detections: Vec<AprilTagDetection>,
 }
 
-/// `sensor_msgs/msg/RegionOfInterest`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RegionOfInterest {
-    /// First column of the whole image.
-    pub x_offset: u32,
-    /// First row of the whole image.
-    pub y_offset: u32,
-    /// Rows; 0 for all.
-    pub height: u32,
-    /// Columns; 0 for all.
-    pub width: u32,
-    /// Unused.
-    pub do_rectify: bool,
-}
-
 /// `sensor_msgs/msg/CameraInfo`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CameraInfo {
@@ -193,40 +156,20 @@ pub struct CameraInfo {
     pub r: [f64; 9],
     /// The projection matrix of the rectified image, by rows.
     pub p: [f64; 12],
-    /// Columns that are combined into one; 0 for 1.
-    pub binning_x: u32,
-    /// Rows that are combined into one; 0 for 1.
-    pub binning_y: u32,
-    /// The part of the image that is published.
-    pub roi: RegionOfInterest,
+    /// Columns and rows that are combined into one; 0 for 1.
+    pub binning: [u32; 2],
+    /// The part of the image that is published: first column, first row, rows, columns; 0 for all. The last one is unused.
+    pub roi: ([u32; 4], bool),
 }
 
 impl CameraInfo {
-    /// Returns `true` if frame and calibration are equal, bit for bit: all but the stamp.
+    /// Returns `true` if frame and calibration are equal: all but the stamp.
     #[must_use]
     pub fn is_same_calibration(&self, other: &Self) -> bool {
-        let bits = |info: &Self| {
-            let all = info.d.iter().chain(&info.k).chain(&info.r).chain(&info.p);
-            all.map(|number| number.to_bits()).collect::<Vec<u64>>()
-        };
-        let rest = |info: &Self| {
-            (
-                info.header.frame_id.clone(),
-                [info.height, info.width, info.binning_x, info.binning_y],
-                info.distortion_model.clone(),
-                info.roi,
-                info.d.len(),
-            )
-        };
-        rest(self) == rest(other) && bits(self) == bits(other)
+        let mut other = other.clone();
+        other.header.stamp = self.header.stamp;
+        *self == other
     }
-}
-
-/// `std_msgs/msg/Bool`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Bool {
-    /// The value.
-    pub data: bool,
 }
 
 /// `diagnostic_msgs/msg/KeyValue`.
@@ -289,15 +232,8 @@ pub struct DiagnosticArray {
     pub status: Vec<DiagnosticStatus>,
 }
 
-/// `std_msgs/msg/ColorRGBA`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Color {
-    /// Red, green, blue and opacity, from 0 to 1.
-    pub rgba: [f32; 4],
-}
-
 /// `visualization_msgs/msg/Marker`, with `sensor_msgs/msg/CompressedImage` and `MeshFile` written out.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
     /// Time and frame.
     pub header: Header,
@@ -313,8 +249,8 @@ pub struct Marker {
     pub pose: Pose,
     /// The size, metres.
     pub scale: [f64; 3],
-    /// The colour.
-    pub color: Color,
+    /// Red, green, blue and opacity, from 0 to 1.
+    pub color: [f32; 4],
     /// The lifetime: seconds and nanoseconds; zero for no limit.
     pub lifetime: (i32, u32),
     /// `true` if the marker moves with its frame.
@@ -322,7 +258,7 @@ pub struct Marker {
     /// Points of lines and polygons.
     pub points: Vec<[f64; 3]>,
     /// A colour per point.
-    pub colors: Vec<Color>,
+    pub colors: Vec<[f32; 4]>,
     /// Unused.
     pub texture_resource: String,
     /// Unused: header, format, bytes.
@@ -339,20 +275,6 @@ pub struct Marker {
     pub mesh_use_embedded_materials: bool,
 }
 
-/// `visualization_msgs/msg/MarkerArray`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MarkerArray {
-    /// The markers.
-    pub markers: Vec<Marker>,
-}
-
-/// The request of `std_srvs/srv/Trigger`. An empty message has one byte.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TriggerRequest {
-    /// Unused.
-    pub structure_needs_at_least_one_member: u8,
-}
-
 /// The response of `std_srvs/srv/Trigger`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TriggerResponse {
@@ -362,5 +284,11 @@ pub struct TriggerResponse {
     pub message: String,
 }
 
-impl ros2_client::Message for TriggerRequest {}
 impl ros2_client::Message for TriggerResponse {}
+
+/// The request or the response of a service with one field. (CDR encodes an empty one as one byte.)
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Single<T>(pub T);
+
+impl<T: Serialize + DeserializeOwned> ros2_client::Message for Single<T> {}

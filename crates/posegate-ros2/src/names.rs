@@ -7,7 +7,7 @@ const NODE: &str = "posegate";
 
 /// The names in use, each absolute. Names are relative by default: `__ns:=/robot1` moves them all but `/diagnostics`
 /// and `/tf`, which are absolute by convention.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// The namespace, `/` or `/robot1`.
     pub namespace: String,
@@ -87,32 +87,16 @@ impl Names {
             let rule = split.iter().find(is_first);
             rule.map_or(default.to_owned(), |(.., to, _)| (*to).to_owned())
         };
-        let mut names = Self {
-            namespace: first(["__ns"; 2], "/"),
-            node: first(["__node", "__name"], NODE),
-            pose: "amcl_pose".into(),
-            tf: "/tf".into(),
-            odom: "odom".into(),
-            detections: "detections".into(),
-            camera_info: "camera_info".into(),
-            task: "posegate_task".into(),
-            permission: "posegate/permission".into(),
-            permit: "posegate/permit".into(),
-            diagnostics: "/diagnostics".into(),
-            markers: "posegate/markers".into(),
-            reset: "posegate/reset".into(),
-            explain: "posegate/explain".into(),
-        };
-        if !(names.namespace == "/" || is_path(&names.namespace)) {
-            return Err(NameError::Invalid(names.namespace));
+        let (namespace, node) = (first(["__ns"; 2], "/"), first(["__node", "__name"], NODE));
+        if !(namespace == "/" || is_path(&namespace)) {
+            return Err(NameError::Invalid(namespace));
         }
-        if !is_token(&names.node) {
-            return Err(NameError::Invalid(names.node));
+        if !is_token(&node) {
+            return Err(NameError::Invalid(node));
         }
-        let (full_node, node) = (names.full_node(), names.node.clone());
-        let base = names.namespace.trim_end_matches('/').to_owned();
+        let base = namespace.trim_end_matches('/');
         let absolute = |name: &str| match name.strip_prefix("~/") {
-            Some(rest) => format!("{full_node}/{rest}"),
+            Some(rest) => format!("{base}/{node}/{rest}"),
             None if name.starts_with('/') => name.to_owned(),
             None => format!("{base}/{name}"),
         };
@@ -123,8 +107,8 @@ impl Names {
         });
         let mut unused = vec![true; split.len()];
         let mut defaults = Vec::new();
-        for name in names.all() {
-            let default = absolute(name);
+        let mut name = |default: &str| {
+            let default = absolute(default);
             let short = match default.rsplit_once('/') {
                 Some((_, "amcl_pose")) => absolute("pose"),
                 Some((_, short)) => absolute(short),
@@ -137,12 +121,29 @@ impl Names {
                     found = found.or(Some(*to));
                 }
             }
-            *name = found.map_or(default.clone(), absolute);
-            if !is_path(name) {
-                return Err(NameError::Invalid(name.clone()));
-            }
+            let name = found.map_or(default.clone(), absolute);
             defaults.push(default);
-        }
+            match is_path(&name) {
+                true => Ok(name),
+                false => Err(NameError::Invalid(name)),
+            }
+        };
+        let names = Self {
+            pose: name("amcl_pose")?,
+            tf: name("/tf")?,
+            odom: name("odom")?,
+            detections: name("detections")?,
+            camera_info: name("camera_info")?,
+            task: name("posegate_task")?,
+            permission: name("posegate/permission")?,
+            permit: name("posegate/permit")?,
+            diagnostics: name("/diagnostics")?,
+            markers: name("posegate/markers")?,
+            reset: name("posegate/reset")?,
+            explain: name("posegate/explain")?,
+            namespace: namespace.clone(),
+            node: node.clone(),
+        };
         match split.iter().zip(unused).find(|(_, unused)| *unused) {
             None => Ok(names),
             Some(((.., rule), _)) => Err(NameError::NoSuchName {
@@ -150,24 +151,6 @@ impl Names {
                 names: defaults.join(", "),
             }),
         }
-    }
-
-    /// Returns the names of all topics and services.
-    fn all(&mut self) -> [&mut String; 12] {
-        [
-            &mut self.pose,
-            &mut self.tf,
-            &mut self.odom,
-            &mut self.detections,
-            &mut self.camera_info,
-            &mut self.task,
-            &mut self.permission,
-            &mut self.permit,
-            &mut self.diagnostics,
-            &mut self.markers,
-            &mut self.reset,
-            &mut self.explain,
-        ]
     }
 
     /// Returns the topic of poses of a type.
@@ -228,13 +211,22 @@ mod tests {
             ("/amcl_pose", "/odom")
         );
         assert_eq!(plain.permission, "/posegate/permission");
-        let mut moved = names(&["__ns:=/robot1"]).unwrap();
+        let moved = names(&["__ns:=/robot1"]).unwrap();
         assert_eq!(moved.full_node(), "/robot1/posegate");
-        for name in moved.all() {
-            assert!(
-                name.starts_with("/robot1/") || ["/diagnostics", "/tf"].contains(&name.as_str()),
-                "{name}"
-            );
+        assert_eq!([&moved.diagnostics, &moved.tf], ["/diagnostics", "/tf"]);
+        for name in [
+            &moved.pose,
+            &moved.odom,
+            &moved.detections,
+            &moved.camera_info,
+            &moved.task,
+            &moved.permission,
+            &moved.permit,
+            &moved.markers,
+            &moved.reset,
+            &moved.explain,
+        ] {
+            assert!(name.starts_with("/robot1/"), "{name}");
         }
     }
 

@@ -1,11 +1,9 @@
 //! The parameters of the node as the services of `rcl_interfaces` report them. None of them can be set while the node runs: they are settings
 //! of the gate, which checks that its settings do not change.
 
-use crate::parameters::Value;
-use ros2_client::parameters::raw::{
-    Parameter, ParameterDescriptor, ParameterType, ParameterValue, SetParametersResult,
-};
+use ros2_client::parameters::{ParameterDescriptor, ParameterValue, raw};
 use ros2_client::rcl_interfaces::{ListParametersRequest, ListParametersResult};
+use serde_norway::Value;
 use std::collections::BTreeMap;
 
 /// The parameters that a node reports, by name, with their values as given or by default.
@@ -20,32 +18,42 @@ impl ReportedParameters {
 
     /// Returns the value of each name; "not set" for an unknown one.
     #[must_use]
-    pub fn values(&self, names: &[String]) -> Vec<ParameterValue> {
-        let value = |name: &String| raw(self.0.get(name.as_str()));
-        names.iter().map(value).collect()
+    pub fn values(&self, names: &[String]) -> Vec<raw::ParameterValue> {
+        let values = names.iter().map(|name| self.value(name).into());
+        values.collect()
     }
 
-    /// Returns the type of each name, as [`ParameterType`] numbers them.
+    /// Returns the type of each name, as [`raw::ParameterType`] numbers them.
     #[must_use]
     pub fn types(&self, names: &[String]) -> Vec<u8> {
-        let values = self.values(names);
-        values.into_iter().map(|value| value.ptype).collect()
+        let types = names
+            .iter()
+            .map(|name| self.value(name).to_parameter_type() as u8);
+        types.collect()
     }
 
     /// Returns the description of each name.
     #[must_use]
-    pub fn descriptors(&self, names: &[String]) -> Vec<ParameterDescriptor> {
-        let describe = |(name, ptype): (&String, u8)| ParameterDescriptor {
-            name: name.clone(),
-            r#type: ptype,
+    pub fn descriptors(&self, names: &[String]) -> Vec<raw::ParameterDescriptor> {
+        let describe = |name: &String| ParameterDescriptor {
+            param_type: self.value(name).to_parameter_type(),
             description: "docs/for-ros.md has its meaning".into(),
-            additional_constraints: String::new(),
-            read_only: true,
-            dynamic_typing: false,
-            floating_point_range: Vec::new(),
-            integer_range: Vec::new(),
+            // It is read only.
+            ..ParameterDescriptor::unknown(name)
         };
-        names.iter().zip(self.types(names)).map(describe).collect()
+        names.iter().map(|name| describe(name).into()).collect()
+    }
+
+    fn value(&self, name: &str) -> ParameterValue {
+        match self.0.get(name) {
+            Some(Value::Bool(value)) => ParameterValue::Boolean(*value),
+            Some(Value::String(text)) => ParameterValue::String(text.clone()),
+            Some(Value::Number(number)) => match number.as_i64() {
+                Some(whole) => ParameterValue::Integer(whole),
+                None => ParameterValue::Double(number.as_f64().unwrap_or_default()),
+            },
+            _ => ParameterValue::NotSet,
+        }
     }
 
     /// Returns the names below the requested prefixes. (Names of this node have no separator, so each depth has them all.)
@@ -64,50 +72,13 @@ impl ReportedParameters {
 
 /// Returns the refusal of new values.
 #[must_use]
-pub fn refused(wanted: &[Parameter]) -> SetParametersResult {
+pub fn refused(wanted: &[raw::Parameter]) -> raw::SetParametersResult {
     let names: Vec<&str> = wanted.iter().map(|given| given.name.as_str()).collect();
-    SetParametersResult {
-        successful: false,
-        reason: format!(
-            "{} cannot change while the node runs: start it again with the new value",
-            names.join(", ")
-        ),
-    }
-}
-
-fn raw(value: Option<&Value>) -> ParameterValue {
-    let mut raw = ParameterValue {
-        ptype: ParameterType::NOT_SET,
-        boolean_value: false,
-        int_value: 0,
-        double_value: 0.0,
-        string_value: String::new(),
-        byte_array: Vec::new(),
-        bool_array: Vec::new(),
-        int_array: Vec::new(),
-        double_array: Vec::new(),
-        string_array: Vec::new(),
-    };
-    match value {
-        None => {}
-        Some(Value::Bool(value)) => {
-            raw.ptype = ParameterType::BOOL;
-            raw.boolean_value = *value;
-        }
-        Some(Value::Integer(value)) => {
-            raw.ptype = ParameterType::INTEGER;
-            raw.int_value = *value;
-        }
-        Some(Value::Double(value)) => {
-            raw.ptype = ParameterType::DOUBLE;
-            raw.double_value = *value;
-        }
-        Some(Value::Text(value)) => {
-            raw.ptype = ParameterType::STRING;
-            raw.string_value.clone_from(value);
-        }
-    }
-    raw
+    let names = names.join(", ");
+    Err(format!(
+        "{names} cannot change while the node runs: start it again with the new value"
+    ))
+    .into()
 }
 
 #[cfg(test)]
@@ -117,10 +88,10 @@ mod tests {
     #[test]
     fn parameters_are_listed_and_described_with_their_types() {
         let reported = ReportedParameters(BTreeMap::from([
-            ("frame_id", Value::Text("map".into())),
-            ("max_speed", Value::Double(0.3)),
-            ("cycle_ms", Value::Integer(20)),
-            ("markers", Value::Bool(true)),
+            ("frame_id", Value::from("map")),
+            ("max_speed", Value::from(0.3)),
+            ("cycle_ms", Value::from(20)),
+            ("markers", Value::from(true)),
         ]));
         let listed = reported.list(&ListParametersRequest {
             prefixes: Vec::new(),
@@ -142,9 +113,9 @@ mod tests {
                 .iter()
                 .all(|each| each.read_only)
         );
-        let wanted = Parameter {
+        let wanted = raw::Parameter {
             name: "max_speed".into(),
-            value: raw(Some(&Value::Double(0.1))),
+            value: ParameterValue::Double(0.1).into(),
         };
         assert!(!refused(&[wanted]).successful);
     }

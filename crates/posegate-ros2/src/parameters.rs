@@ -1,21 +1,8 @@
 //! ROS parameters: from `-p NAME:=VALUE` and from YAML files.
 
 use crate::names::Names;
-use serde_norway::Value as Yaml;
+use serde_norway::Value;
 use std::collections::BTreeMap;
-
-/// The value of a parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// `true` or `false`.
-    Bool(bool),
-    /// A whole number.
-    Integer(i64),
-    /// A number with a point.
-    Double(f64),
-    /// A text.
-    Text(String),
-}
 
 /// The given parameters, each with its source.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -77,11 +64,7 @@ impl Parameters {
             return Ok(());
         }
         let place = format!("-p {assignment}");
-        let value: Yaml = serde_norway::from_str(text).map_err(|error| ParameterError::Yaml {
-            place: place.clone(),
-            error: error.to_string(),
-        })?;
-        self.set(name, &value, &place)
+        self.set(name, &yaml(text, &place)?, &place)
     }
 
     /// Adds a parameter file. Sections of other nodes are ignored; a file without a section for this node is refused.
@@ -89,10 +72,7 @@ impl Parameters {
     /// # Errors
     /// [`ParameterError`]
     pub fn read(&mut self, text: &str, place: &str, names: &Names) -> Result<(), ParameterError> {
-        let yaml: Yaml = serde_norway::from_str(text).map_err(|error| ParameterError::Yaml {
-            place: place.into(),
-            error: error.to_string(),
-        })?;
+        let yaml = yaml(text, place)?;
         let before = self.values.len();
         if !self.sections(&yaml, "", place, names)? && before == self.values.len() {
             return Err(ParameterError::NotForThisNode {
@@ -107,12 +87,12 @@ impl Parameters {
     /// Searches `ros__parameters` below the names of nodes. Returns `true` if a section is for this node.
     fn sections(
         &mut self,
-        yaml: &Yaml,
+        yaml: &Value,
         path: &str,
         place: &str,
         names: &Names,
     ) -> Result<bool, ParameterError> {
-        let Yaml::Mapping(map) = yaml else {
+        let Value::Mapping(map) = yaml else {
             return Ok(false);
         };
         let mut found = false;
@@ -138,9 +118,9 @@ impl Parameters {
         Ok(found)
     }
 
-    fn section(&mut self, yaml: &Yaml, prefix: &str, place: &str) -> Result<(), ParameterError> {
+    fn section(&mut self, yaml: &Value, prefix: &str, place: &str) -> Result<(), ParameterError> {
         match yaml {
-            Yaml::Mapping(map) => {
+            Value::Mapping(map) => {
                 for (key, value) in map {
                     let key = key.as_str().unwrap_or_default();
                     let name = match prefix {
@@ -152,27 +132,20 @@ impl Parameters {
                 Ok(())
             }
             // `ros__parameters:` without parameters.
-            Yaml::Null if prefix.is_empty() => Ok(()),
+            Value::Null if prefix.is_empty() => Ok(()),
             _ => self.set(prefix, yaml, place),
         }
     }
 
-    fn set(&mut self, name: &str, yaml: &Yaml, place: &str) -> Result<(), ParameterError> {
-        let value = match yaml {
-            Yaml::Bool(value) => Some(Value::Bool(*value)),
-            Yaml::Number(number) => number
-                .as_i64()
-                .map(Value::Integer)
-                .or_else(|| number.as_f64().map(Value::Double)),
-            Yaml::String(text) => Some(Value::Text(text.clone())),
-            _ => None,
-        };
-        let value = value.ok_or_else(|| ParameterError::NotAScalar {
-            name: name.into(),
-            place: place.into(),
-        })?;
+    fn set(&mut self, name: &str, value: &Value, place: &str) -> Result<(), ParameterError> {
+        if !(value.is_bool() || value.is_number() || value.is_string()) {
+            return Err(ParameterError::NotAScalar {
+                name: name.into(),
+                place: place.into(),
+            });
+        }
         self.values
-            .insert(name.to_owned(), (value, place.to_owned()));
+            .insert(name.to_owned(), (value.clone(), place.to_owned()));
         Ok(())
     }
 
@@ -192,6 +165,13 @@ impl Parameters {
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.values.keys().map(String::as_str)
     }
+}
+
+fn yaml(text: &str, place: &str) -> Result<Value, ParameterError> {
+    serde_norway::from_str(text).map_err(|error| ParameterError::Yaml {
+        place: place.into(),
+        error: error.to_string(),
+    })
 }
 
 /// Returns `true` if the name of a node in a parameter file or an assignment is this node's name or a wildcard.
@@ -230,10 +210,10 @@ other:
         given.assign("use_odometry:=true", &names()).unwrap();
         given.assign("other:max_speed:=7.0", &names()).unwrap();
         given.assign("posegate:inflation:=3.5", &names()).unwrap();
-        assert_eq!(given.get("max_speed"), Some(&Value::Double(0.3)));
-        assert_eq!(given.get("inflation"), Some(&Value::Double(3.5)));
-        assert_eq!(given.get("frame_id"), Some(&Value::Text("world".into())));
-        assert_eq!(given.get("use_odometry"), Some(&Value::Bool(true)));
+        assert_eq!(given.get("max_speed"), Some(&Value::from(0.3)));
+        assert_eq!(given.get("inflation"), Some(&Value::from(3.5)));
+        assert_eq!(given.get("frame_id"), Some(&Value::from("world")));
+        assert_eq!(given.get("use_odometry"), Some(&Value::from(true)));
         assert_eq!(
             (given.place("max_speed"), given.names().count()),
             ("p.yaml", 4)

@@ -33,15 +33,6 @@ impl Peers {
         }
     }
 
-    /// Allows several publishers.
-    #[must_use]
-    pub fn shared(self) -> Self {
-        Self {
-            is_shared: true,
-            ..self
-        }
-    }
-
     /// Processes an event of discovery.
     pub fn note(&mut self, event: &Event) {
         match event {

@@ -11,6 +11,7 @@ use crate::permit_gate::{Answer, LastReport};
 use crate::settings::NodeSettings;
 use posegate::gate::{Reason, Verdict};
 use posegate::pose::Pose;
+use posegate_replay::coordinates;
 use std::hash::{BuildHasher, Hasher};
 
 /// The name of the status.
@@ -32,7 +33,7 @@ pub struct Heartbeat {
 impl Heartbeat {
     /// Starts the heartbeats of a run, with a random name by which consumers detect a restart.
     #[must_use]
-    pub fn new() -> Self {
+    pub fn start() -> Self {
         let random = std::hash::RandomState::new().build_hasher().finish();
         Self {
             run: format!("{random:016x}"),
@@ -76,12 +77,6 @@ impl Heartbeat {
             values,
         };
         array(answer.now, vec![status])
-    }
-}
-
-impl Default for Heartbeat {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -134,7 +129,5 @@ pub fn report_values(last: &LastReport) -> [KeyValue; 6] {
 
 /// Returns a pose as `x y yaw`, metres and radians.
 fn pose_text(pose: Pose) -> String {
-    let [x, y] = [pose.x_um, pose.y_um].map(|um| f64::from(um) / 1e6);
-    let yaw = f64::from(pose.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
-    format!("{x} {y} {yaw}")
+    coordinates(pose).map(|value| value.to_string()).join(" ")
 }

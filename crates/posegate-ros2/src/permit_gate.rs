@@ -8,15 +8,13 @@ use crate::message::{AprilTagDetectionArray, CameraInfo, Odometry, PoseWithCovar
 use crate::poses::PoseReport;
 use crate::settings::NodeSettings;
 use crate::tags::{Look, Tags};
-use posegate::gate::{
-    Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict, self_test,
-};
+use posegate::gate::{Evidence, Gate, InvalidParameter, Reason, Settings, State, Step, Verdict};
 use posegate::pose::Pose;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report, ros};
 use posegate::set::{Growth, Inflation, Uncertainty};
 use posegate::task::Risk;
 use posegate::track::{Increment, Tracker, TrackerSettings};
-use posegate_replay::remembers;
+use posegate_replay::{coordinates, remembers};
 
 /// The number of increments of the odometry that are kept for late fixes: 2.5 s at 50 Hz.
 const INCREMENTS: usize = 128;
@@ -70,6 +68,15 @@ pub struct LastReport {
     pub step: Result<(), Reason>,
 }
 
+/// What was evaluated of a message, and what the gate says of it.
+type Evaluated = (PoseEstimate, Step, Verdict);
+
+/// Returns a denial of a message, whatever the step's reason.
+fn denied(estimate: PoseEstimate, step: Step, reason: Reason) -> Evaluated {
+    let verdict = Err(reason);
+    (estimate, Step { verdict, ..step }, Verdict::deny(reason))
+}
+
 /// A gate for ROS messages.
 #[derive(Debug)]
 pub struct PermitGate<'a> {
@@ -82,25 +89,12 @@ pub struct PermitGate<'a> {
 }
 
 impl<'a> PermitGate<'a> {
-    /// Returns a closed gate. `gate` are the settings that [`NodeSettings::gate`] returns.
+    /// Returns a closed gate. `is_sound` is the result of the self-test ([`posegate::gate::self_test`]), or what another gate says at a change of the
+    /// table: a fault that it has latched ([`Gate::is_sound`]) stays latched. `gate` are the settings that [`NodeSettings::gate`] returns.
     ///
     /// # Errors
     /// [`InvalidParameter`] if a setting would disable a check.
     pub fn new(
-        table: &'a [u8],
-        settings: &'a NodeSettings,
-        gate: &'a Settings<'a>,
-        now: Now,
-    ) -> Result<Self, InvalidParameter> {
-        Self::after(self_test(), table, settings, gate, now)
-    }
-
-    /// Returns a closed gate without the self-test, whose result is given: for a change of the table. A fault that
-    /// another gate has latched ([`Gate::is_sound`]) stays latched.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn after(
         is_sound: Result<(), Reason>,
         table: &'a [u8],
         settings: &'a NodeSettings,
@@ -111,7 +105,10 @@ impl<'a> PermitGate<'a> {
             gate: Gate::after(is_sound, table, gate, now.ms())?,
             settings,
             poses: Order::default(),
-            tags: None,
+            tags: settings
+                .detector
+                .clone()
+                .map(|detector| Box::new(Tags::new(detector, settings.detection_topics.clone()))),
             carried: settings.tracker.and_then(Carried::new).map(Box::new),
             last: None,
         })
@@ -129,14 +126,6 @@ impl<'a> PermitGate<'a> {
         self.last.as_ref()
     }
 
-    /// Uses detections, with the tags of the settings. `topics` are the names for messages: detections, camera info.
-    #[must_use]
-    pub fn with_tags(mut self, topics: [String; 2]) -> Self {
-        let detector = self.settings.detector.clone();
-        self.tags = detector.map(|detector| Box::new(Tags::new(detector, topics)));
-        self
-    }
-
     /// Returns the state of the tags, if detections are used.
     #[must_use]
     pub fn tags(&self) -> Option<&Tags> {
@@ -151,10 +140,8 @@ impl<'a> PermitGate<'a> {
             (None, _) => return,
         }
         // Poses from a camera that is now in doubt are not carried on.
-        if self.tags.as_ref().is_some_and(|tags| !tags.has_camera())
-            && let Some(carried) = &mut self.carried
-        {
-            carried.tracker.drop_fix();
+        if self.tags.as_ref().is_some_and(|tags| !tags.has_camera()) {
+            self.drop_fix();
         }
     }
 
@@ -172,108 +159,106 @@ impl<'a> PermitGate<'a> {
             return self.tick(now);
         };
         let look = tags.look(message);
-        let now_ms = now.ms();
-        let (sequence, has_changed) = self.poses.next(origin);
-        if has_changed {
-            let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
-        }
-        let (mut poses, is_ambiguous) = match look {
-            Look::Poses(poses, is_ambiguous) => (poses, is_ambiguous),
+        let (now_ms, stamp, frame) = (now.ms(), message.header.stamp, &self.settings.frame);
+        let (report, has_time) = self.report(now, stamp, frame, origin);
+        let evaluated = match look {
             Look::Nothing => {
                 self.poses.leave_out();
                 return self.tick(now);
             }
-            Look::Contradiction(reason) => {
-                let (step, verdict) = self.refuse(now_ms, reason);
-                self.last = Some(LastReport {
-                    stamp: message.header.stamp,
-                    frame: self.settings.frame.clone(),
-                    estimate: NO_POSE,
-                    verdict,
-                    step: step.verdict,
-                });
-                return answer(now, step);
-            }
-        };
-        let (stamp_ms, has_time) = self.stamp(now, message.header.stamp);
-        let report = Report {
-            source: 0,
-            frame: FrameId::of(&self.settings.frame),
-            sequence,
-            stamp_ms,
-            belief: poses.first().copied().unwrap_or(NO_POSE),
-        };
-        let (estimate, mut step, mut verdict) = if poses.len() == 1 {
-            let (step, verdict) = self.take_report(now_ms, &report, has_time);
-            (report.belief, step, verdict)
-        } else {
-            // A single pose can be carried, not one of several.
-            if let Some(carried) = &mut self.carried {
-                carried.tracker.drop_fix();
-                // The gate's source has no inflation: the tracker applies it.
-                for pose in &mut poses {
-                    *pose = inflated(pose, self.settings.trust.inflation);
+            Look::Contradiction(reason) => self.refuse(now_ms, reason),
+            Look::Poses(poses, is_ambiguous) => {
+                let evaluated = match poses.as_slice() {
+                    [pose] => {
+                        let belief = *pose;
+                        self.take_report(now_ms, &Report { belief, ..report }, has_time)
+                    }
+                    _ => self.take_several(now_ms, report, poses),
+                };
+                let (estimate, Step { verdict, .. }, _) = evaluated;
+                // One of the poses is outside, whichever the gate names.
+                match verdict.is_err_and(|reason| is_ambiguous && !remembers(reason)) {
+                    true => {
+                        let reason = Reason::TagPosesAmbiguous;
+                        denied(estimate, self.gate.inhibit(now_ms, reason), reason)
+                    }
+                    false => evaluated,
                 }
             }
-            let report = Report {
-                belief: poses.first().copied().unwrap_or(NO_POSE),
-                ..report
-            };
-            let evidence = Evidence {
-                report: &report,
-                others: poses.get(1..).unwrap_or_default(),
-                beside: Growth::NONE,
-                elsewhere: Risk::NONE,
-                since_fix_ms: None,
-            };
-            let step = self.gate.step_on(now_ms, &evidence);
-            let (number, verdict) = self.gate.examine_on(&evidence);
-            let about = poses.get(usize::from(number)).copied();
-            (about.unwrap_or(report.belief), step, verdict)
         };
-        // One of the poses is outside, whichever the gate names.
-        if is_ambiguous && step.verdict.is_err_and(|reason| !remembers(reason)) {
-            let reason = Reason::TagPosesAmbiguous;
-            step = Step {
-                verdict: Err(reason),
-                ..self.gate.inhibit(now_ms, reason)
-            };
-            verdict = Verdict::deny(reason);
+        self.answer(now, stamp, frame, evaluated)
+    }
+
+    /// Gives the gate the poses of which any may be the robot's: it permits only if all are inside.
+    fn take_several(
+        &mut self,
+        now_ms: u32,
+        mut report: Report,
+        mut poses: Vec<PoseEstimate>,
+    ) -> Evaluated {
+        // A single pose can be carried, not one of several.
+        if let Some(carried) = &mut self.carried {
+            carried.tracker.drop_fix();
+            // The gate's source has no inflation: the tracker applies it.
+            for pose in &mut poses {
+                *pose = inflated(pose, self.settings.trust.inflation);
+            }
         }
-        self.last = Some(LastReport {
-            stamp: message.header.stamp,
-            frame: self.settings.frame.clone(),
-            estimate,
-            verdict,
-            step: step.verdict,
-        });
-        answer(now, step)
+        report.belief = poses.first().copied().unwrap_or(NO_POSE);
+        let evidence = Evidence {
+            report: &report,
+            others: poses.get(1..).unwrap_or_default(),
+            beside: Growth::NONE,
+            elsewhere: Risk::NONE,
+            since_fix_ms: None,
+        };
+        let step = self.gate.step_on(now_ms, &evidence);
+        let (number, verdict) = self.gate.examine_on(&evidence);
+        let about = poses.get(usize::from(number)).copied();
+        (about.unwrap_or(report.belief), step, verdict)
     }
 
     /// Processes a pose. One that is refused ends every permit with the reason of the refusal.
     pub fn pose(&mut self, now: Now, message: &PoseReport, origin: Origin) -> Answer {
         let now_ms = now.ms();
+        let (report, has_time) = self.report(now, message.stamp, &message.frame, origin);
+        let evaluated = match &message.pose {
+            Ok(belief) => {
+                let belief = *belief;
+                self.take_report(now_ms, &Report { belief, ..report }, has_time)
+            }
+            Err(refused) => self.refuse(now_ms, refused.reason()),
+        };
+        self.answer(now, message.stamp, &message.frame, evaluated)
+    }
+
+    /// Returns the report of a message, without its pose, and `true` if its stamp is a time. A stamp that is not on the
+    /// gate's clock counts as older than every permitted one.
+    fn report(&mut self, now: Now, stamp: Time, frame: &str, origin: Origin) -> (Report, bool) {
         let (sequence, has_changed) = self.poses.next(origin);
         if has_changed {
             // Two alternating publishers end every permit of each other.
-            let _ = self.gate.inhibit(now_ms, Reason::SourceChanged);
+            let _ = self.gate.inhibit(now.ms(), Reason::SourceChanged);
         }
-        let (stamp_ms, has_time) = self.stamp(now, message.stamp);
+        let known = now.stamp_ms(stamp);
+        let stale = self.settings.gate().maximum_age_ms.wrapping_add(1);
         let report = Report {
             source: 0,
-            frame: FrameId::of(&message.frame),
+            frame: FrameId::of(frame),
             sequence,
-            stamp_ms,
-            belief: message.pose.clone().unwrap_or(NO_POSE),
+            stamp_ms: known.unwrap_or(now.ms().wrapping_sub(stale)),
+            belief: NO_POSE,
         };
-        let (step, verdict) = match &message.pose {
-            Ok(_) => self.take_report(now_ms, &report, has_time),
-            Err(refused) => self.refuse(now_ms, refused.reason()),
-        };
+        (report, known.is_some())
+    }
+
+    /// Keeps what was evaluated as the last report, and returns the answer.
+    fn answer(&mut self, now: Now, stamp: Time, frame: &str, evaluated: Evaluated) -> Answer {
+        let (estimate, step, verdict) = evaluated;
         self.last = Some(LastReport {
-            stamp: message.stamp,
-            frame: message.frame.clone(),
-            estimate: report.belief,
+            stamp,
+            frame: frame.to_owned(),
+            estimate,
             verdict,
             step: step.verdict,
         });
@@ -282,55 +267,44 @@ impl<'a> PermitGate<'a> {
 
     /// Ends a permit because of a message without a usable pose. It is left out of the sequence, and no earlier pose is
     /// carried on.
-    fn refuse(&mut self, now_ms: u32, reason: Reason) -> (Step, Verdict) {
+    fn refuse(&mut self, now_ms: u32, reason: Reason) -> Evaluated {
         self.poses.leave_out();
+        self.drop_fix();
+        denied(NO_POSE, self.gate.inhibit(now_ms, reason), reason)
+    }
+
+    /// From now on no earlier pose is carried.
+    fn drop_fix(&mut self) {
         if let Some(carried) = &mut self.carried {
             carried.tracker.drop_fix();
         }
-        let step = Step {
-            verdict: Err(reason),
-            ..self.gate.inhibit(now_ms, reason)
-        };
-        (step, Verdict::deny(reason))
     }
 
-    /// Returns a stamp on the gate's clock, and `true` if it is a time. A stamp that is not on that clock counts as
-    /// older than every permitted one.
-    fn stamp(&self, now: Now, stamp: Time) -> (u32, bool) {
-        let known = now.stamp_ms(stamp);
-        let stale = self.gate_settings().maximum_age_ms.wrapping_add(1);
-        (
-            known.unwrap_or(now.ms().wrapping_sub(stale)),
-            known.is_some(),
-        )
-    }
-
-    fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> (Step, Verdict) {
+    fn take_report(&mut self, now_ms: u32, report: &Report, has_time: bool) -> Evaluated {
+        let estimate = report.belief;
         // A pose without a known time cannot be carried, because the odometry at that time is not known either. The
         // gate denies its stamp.
-        if let Some(carried) = self.carried.as_mut().filter(|_| !has_time) {
-            carried.tracker.drop_fix();
+        if !has_time {
+            self.drop_fix();
         }
         let Some(carried) = self.carried.as_mut().filter(|_| has_time) else {
             let step = self.gate.step(now_ms, report);
-            return (step, self.gate.examine(report));
+            return (estimate, step, self.gate.examine(report));
         };
         if let Err(reason) = carried.tracker.fix(report) {
             // The carried pose is unchanged.
-            let step = self.gate.tick(now_ms);
-            let step = Step {
-                verdict: Err(reason),
-                ..step
-            };
-            return (step, Verdict::deny(reason));
+            return denied(estimate, self.gate.tick(now_ms), reason);
         }
         match carried.tracker.tracked(now_ms) {
             Ok(tracked) => {
                 let evidence = tracked.evidence();
                 let step = self.gate.step_on(now_ms, &evidence);
-                (step, self.gate.examine_on(&evidence).1)
+                (estimate, step, self.gate.examine_on(&evidence).1)
             }
-            Err(reason) => (self.gate.inhibit(now_ms, reason), Verdict::deny(reason)),
+            Err(reason) => {
+                let step = self.gate.inhibit(now_ms, reason);
+                (estimate, step, Verdict::deny(reason))
+            }
         }
     }
 
@@ -399,10 +373,6 @@ impl<'a> PermitGate<'a> {
             carried.restart();
         }
         self.gate.reset(now.ms())
-    }
-
-    fn gate_settings(&self) -> Settings<'a> {
-        self.settings.gate()
     }
 }
 
@@ -543,9 +513,9 @@ impl Carried {
 
 /// Returns the movement between two poses, in the robot's axes at its start.
 fn increment(from: Pose, to: Pose, span_ms: [u32; 2]) -> Option<Increment> {
+    let [.., yaw] = coordinates(from);
     let um = |from: i32, to: i32| f64::from(to) - f64::from(from);
     let (dx, dy) = (um(from.x_um, to.x_um), um(from.y_um, to.y_um));
-    let yaw = f64::from(from.yaw.signed()) * (core::f64::consts::TAU / 4_294_967_296.0);
     let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
     // The unit of an increment; a length that is too large stays too large.
     let q8 = |um: f64| libm::round(um * 256.0) as i32;

@@ -3,9 +3,7 @@
 //! [`Poses`] takes the types of the parameter `pose_type`. The place of the pose on the robot and the site's origin
 //! are applied by the function of `posegate replay` ([`posegate_replay::recording::LivePoses`]).
 
-use crate::message::{
-    Odometry, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, TfMessage, Time,
-};
+use crate::message::{Header, Pose, Time, TransformStamped};
 use posegate::gate::Reason;
 use posegate::report::PoseEstimate;
 use posegate_files::printable::toml_key;
@@ -171,51 +169,48 @@ impl Poses {
         }
     }
 
-    /// Converts a pose with its covariance.
-    pub fn with_covariance(&mut self, message: &PoseWithCovarianceStamped) -> PoseReport {
-        PoseReport {
-            stamp: message.header.stamp,
-            frame: message.header.frame_id.clone(),
-            pose: self.checked(None, &message.pose),
-        }
-    }
-
-    /// Converts a pose of odometry, or of a filter that publishes this type.
-    pub fn odometry(&mut self, message: &Odometry) -> PoseReport {
-        PoseReport {
-            stamp: message.header.stamp,
-            frame: message.header.frame_id.clone(),
-            pose: self.checked(Some(message.child_frame_id.clone()), &message.pose),
-        }
-    }
-
-    /// Converts a pose without a covariance.
-    pub fn pose(&mut self, message: &PoseStamped) -> PoseReport {
-        let pose = self.live.pose(LivePose {
-            child: None,
-            position: message.pose.position,
-            orientation: message.pose.orientation,
-            covariance: None,
+    /// Converts a pose of the frame `child` on the robot, if the message names it, with its covariance, if it has one.
+    pub fn pose(
+        &mut self,
+        header: Header,
+        child: Option<String>,
+        pose: &Pose,
+        covariance: Option<[f64; 36]>,
+    ) -> PoseReport {
+        let checked = match covariance {
+            Some(covariance) if !self.has_bound => self.check_covariance(pose, &covariance),
+            _ => Ok(()),
+        };
+        let pose = checked.and_then(|()| {
+            Ok(self.live.pose(LivePose {
+                child,
+                position: pose.position,
+                orientation: pose.orientation,
+                covariance,
+            })?)
         });
         PoseReport {
-            stamp: message.header.stamp,
-            frame: message.header.frame_id.clone(),
-            pose: pose.map_err(RefusedPose::from),
+            stamp: header.stamp,
+            frame: header.frame_id,
+            pose,
         }
     }
 
     /// Converts transforms; `None` if they give no newer pose. A transform that another publisher sent before is
     /// refused: it may be that of another robot.
-    pub fn transforms(&mut self, message: &TfMessage, publisher: [u8; 16]) -> Option<PoseReport> {
-        if let Some(edge) = self.foreign(message, publisher) {
-            let (parent, child) = edge;
+    pub fn transforms(
+        &mut self,
+        message: &[TransformStamped],
+        publisher: [u8; 16],
+    ) -> Option<PoseReport> {
+        if let Some((parent, child)) = self.foreign(message, publisher) {
             return Some(PoseReport {
-                stamp: message.transforms.first()?.header.stamp,
+                stamp: message.first()?.header.stamp,
                 frame: self.frame.clone(),
                 pose: Err(RefusedPose::TwoPublishers { parent, child }),
             });
         }
-        let transforms = message.transforms.iter().map(|transform| LiveTransform {
+        let transforms = message.iter().map(|transform| LiveTransform {
             stamp_ns: transform.header.stamp.ns(),
             parent: transform.header.frame_id.clone(),
             child: transform.child_frame_id.clone(),
@@ -235,9 +230,13 @@ impl Poses {
     }
 
     /// Returns the first transform of the robot that had another publisher before.
-    fn foreign(&mut self, message: &TfMessage, publisher: [u8; 16]) -> Option<(String, String)> {
+    fn foreign(
+        &mut self,
+        message: &[TransformStamped],
+        publisher: [u8; 16],
+    ) -> Option<(String, String)> {
         let mut foreign = None;
-        for transform in &message.transforms {
+        for transform in message {
             let [parent, child] = [&transform.header.frame_id, &transform.child_frame_id]
                 .map(|name| name.trim_start_matches('/').to_owned());
             let is_ours = [&self.frame, &self.odometry]
@@ -257,25 +256,7 @@ impl Poses {
         foreign
     }
 
-    fn checked(
-        &mut self,
-        child: Option<String>,
-        message: &PoseWithCovariance,
-    ) -> Result<PoseEstimate, RefusedPose> {
-        let PoseWithCovariance { pose, covariance } = message;
-        if !self.has_bound {
-            self.check_covariance(message)?;
-        }
-        Ok(self.live.pose(LivePose {
-            child,
-            position: pose.position,
-            orientation: pose.orientation,
-            covariance: Some(*covariance),
-        })?)
-    }
-
-    fn check_covariance(&mut self, message: &PoseWithCovariance) -> Result<(), RefusedPose> {
-        let PoseWithCovariance { pose, covariance } = message;
+    fn check_covariance(&mut self, pose: &Pose, covariance: &[f64; 36]) -> Result<(), RefusedPose> {
         let covariance_bits = covariance.map(f64::to_bits);
         let [x, y, z] = pose.position.map(f64::to_bits);
         let [a, b, c, d] = pose.orientation.map(f64::to_bits);

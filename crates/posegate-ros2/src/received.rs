@@ -12,7 +12,7 @@ const INTERVALS: usize = 32;
 const SIMULATED_S: i32 = 100_000_000;
 
 /// The counts of a subscription.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Received {
     /// The name of the topic.
     pub topic: String,
@@ -35,21 +35,13 @@ pub struct Received {
 impl Received {
     /// Returns the counts of a new subscription.
     #[must_use]
-    pub const fn new(
-        topic: String,
-        parameters: &'static str,
-        delivery: Delivery,
-        peers: Peers,
-    ) -> Self {
+    pub fn new(topic: String, parameters: &'static str, delivery: Delivery, peers: Peers) -> Self {
         Self {
             topic,
             parameters,
             delivery,
             peers,
-            messages: 0,
-            unreadable: 0,
-            last: None,
-            intervals: VecDeque::new(),
+            ..Self::default()
         }
     }
 

@@ -5,20 +5,20 @@
 use crate::clock::{ClockWatch, Now};
 use crate::decider::Decider;
 use crate::diagnostics::{diagnostics, words, wrong_frame};
-use crate::graph::{Environment, Graph, GraphError, Input};
+use crate::entities::GraphError;
+use crate::graph::{Environment, Graph, Input};
 use crate::lifecycle::State;
-use crate::message::{Bool, TriggerResponse};
+use crate::message::TriggerResponse;
 use crate::names::Names;
 use crate::permission::Heartbeat;
 use crate::permit_gate::{Answer, Origin};
-use crate::poses::{PoseReport, Poses};
+use crate::poses::Poses;
 use crate::received::Received;
+use crate::services::Served;
 use crate::settings::NodeSettings;
 use posegate::gate::Reason;
-use ros2_client::{MessageInfo, Subscription};
 use rustdds::StatusEvented;
 use rustdds::mio1::Events;
-use serde::de::DeserializeOwned;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -36,23 +36,20 @@ const BATCH: usize = 64;
 const DETECTIONS: usize = 4;
 
 /// A running node.
-pub struct Runner<'a, D> {
+pub struct Runner<'a> {
     graph: Graph,
     environment: Environment,
     names: &'a Names,
-    gate: D,
+    gate: Box<dyn Decider + 'a>,
     settings: &'a NodeSettings,
     heartbeat: Heartbeat,
     watch: ClockWatch,
     clock_steps: u64,
-    pose: Received,
     poses: Poses,
     /// Why the last pose was not used.
     refused: Option<String>,
     /// The number of poses that transforms gave.
     composed: i64,
-    camera_info: Option<Received>,
-    odometry: Option<Received>,
     /// Active, unless a manager decides on it.
     lifecycle: State,
     was_open: bool,
@@ -68,30 +65,7 @@ struct Sent {
     slow: Option<Instant>,
 }
 
-/// Processes the messages of a topic that have arrived, at most `most`, and counts those that cannot be decoded. `take`
-/// gets `None` for such a message.
-fn drain<M: DeserializeOwned + 'static>(
-    topic: &Subscription<M>,
-    most: usize,
-    received: &mut Received,
-    mut take: impl FnMut(&mut Received, Option<(M, MessageInfo)>),
-) {
-    for _ in 0..most {
-        let taken = match topic.take() {
-            Ok(None) => return,
-            Ok(taken) => taken,
-            Err(_) => None,
-        };
-        received.unreadable += u64::from(taken.is_none());
-        take(received, taken);
-    }
-}
-
-fn is_due(last: Option<Instant>, now: Instant, period: Duration) -> bool {
-    last.is_none_or(|last| now.saturating_duration_since(last) >= period)
-}
-
-impl<'a, D: Decider> Runner<'a, D> {
+impl<'a> Runner<'a> {
     /// Creates a node and joins a graph.
     ///
     /// # Errors
@@ -99,24 +73,21 @@ impl<'a, D: Decider> Runner<'a, D> {
     pub fn join(
         environment: Environment,
         names: &'a Names,
-        gate: D,
+        gate: Box<dyn Decider + 'a>,
         settings: &'a NodeSettings,
     ) -> Result<Self, GraphError> {
         let graph = Graph::join(environment, names, settings, gate.takes_tasks())?;
         Ok(Self {
-            pose: graph.received_poses(names, settings),
             poses: Poses::new(&settings.poses, names.of_poses(settings.poses.kind)),
             refused: None,
             composed: 0,
-            camera_info: graph.received_camera_info(names, settings),
-            odometry: graph.received_odometry(names, settings),
             graph,
             environment,
             names,
             gate,
             settings,
-            heartbeat: Heartbeat::new(),
-            watch: ClockWatch::new(),
+            heartbeat: Heartbeat::start(),
+            watch: ClockWatch::default(),
             clock_steps: 0,
             lifecycle: match settings.is_managed {
                 true => State::Unconfigured,
@@ -134,24 +105,11 @@ impl<'a, D: Decider> Runner<'a, D> {
             "posegate-node: the threads of DDS were interrupted and have ended: joining the graph again"
         );
         let _ = self.gate.inhibit(Now::read(), Reason::CycleLate);
-        let graph = Graph::join(
-            self.environment,
-            self.names,
-            self.settings,
-            self.gate.takes_tasks(),
-        )?;
-        self.pose.peers = graph.received_poses(self.names, self.settings).peers;
-        let (names, settings) = (self.names, self.settings);
-        for (received, again) in [
-            (&mut self.odometry, graph.received_odometry(names, settings)),
-            (
-                &mut self.camera_info,
-                graph.received_camera_info(names, settings),
-            ),
-        ] {
-            if let (Some(received), Some(again)) = (received, again) {
-                received.peers = again.peers;
-            }
+        let takes_tasks = self.gate.takes_tasks();
+        let mut graph = Graph::join(self.environment, self.names, self.settings, takes_tasks)?;
+        for (received, earlier) in graph.received().zip(self.graph.received()) {
+            std::mem::swap(received, earlier);
+            std::mem::swap(&mut received.peers, &mut earlier.peers);
         }
         // A graph without threads cannot leave in order.
         std::mem::forget(std::mem::replace(&mut self.graph, graph));
@@ -169,11 +127,8 @@ impl<'a, D: Decider> Runner<'a, D> {
         while !(stop.load(Ordering::Relaxed) || self.lifecycle == State::Finalized) {
             // A report that came directly after a heartbeat waits no longer than necessary.
             let timeout = if self.has_report { SHORTEST } else { cycle };
-            let timeout = self
-                .gate
-                .patience()
-                .map_or(timeout, |patience| timeout.min(patience));
-            match self.graph.poll.poll(&mut events, Some(timeout)) {
+            let timeout = timeout.min(self.gate.patience());
+            match self.graph.poll().poll(&mut events, Some(timeout)) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => other?,
             }
@@ -196,11 +151,7 @@ impl<'a, D: Decider> Runner<'a, D> {
             let _ = self.gate.inhibit(Now::read(), Reason::TimeBackwards);
         }
         while let Some(event) = self.graph.events.try_recv_status() {
-            self.pose.peers.note(&event);
-            for received in [&mut self.odometry, &mut self.camera_info]
-                .into_iter()
-                .flatten()
-            {
+            for received in self.graph.received() {
                 received.peers.note(&event);
             }
         }
@@ -225,10 +176,10 @@ impl<'a, D: Decider> Runner<'a, D> {
     /// task.
     fn take_task(&mut self) {
         let mut last = None;
-        if let Some(topic) = &self.graph.task {
-            while let Ok(Some((message, _))) = topic.take() {
-                last = Some(message.data);
-            }
+        if let Some(topic) = &mut self.graph.task {
+            topic.drain(BATCH, |_, taken| {
+                last = taken.map(|(name, _)| name).or(last.take());
+            });
         }
         let Some(name) = last else {
             return;
@@ -239,108 +190,84 @@ impl<'a, D: Decider> Runner<'a, D> {
     }
 
     fn take_odometry(&mut self) {
-        if let (Some(topic), Some(received)) = (&self.graph.odom, &mut self.odometry) {
-            drain(topic, BATCH, received, |received, taken| {
-                let _ = match taken {
-                    Some((message, info)) => {
-                        received.note(Now::read(), message.header.stamp);
-                        self.gate.odometry(Now::read(), &message, origin(&info))
-                    }
-                    None => self.gate.odometry_lost(Now::read()),
-                };
-            });
-        }
+        let Some(topic) = &mut self.graph.odom else {
+            return;
+        };
+        topic.drain(BATCH, |received, taken| {
+            let _ = match taken {
+                Some((message, origin)) => {
+                    received.note(Now::read(), message.header.stamp);
+                    self.gate.odometry(Now::read(), &message, origin)
+                }
+                None => self.gate.odometry_lost(Now::read()),
+            };
+        });
     }
 
     fn take_camera_info(&mut self) {
-        if let (Input::Detections(_, topic), Some(received)) =
-            (&self.graph.input, &mut self.camera_info)
-        {
-            drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, _)) = &taken {
-                    received.note(Now::read(), message.header.stamp);
-                }
-                self.gate
-                    .camera_info(taken.as_ref().map(|(message, _)| message));
-            });
-        }
+        let Some(topic) = &mut self.graph.camera_info else {
+            return;
+        };
+        topic.drain(BATCH, |received, taken| {
+            let message = taken.map(|(message, _)| message);
+            if let Some(message) = &message {
+                received.note(Now::read(), message.header.stamp);
+            }
+            self.gate.camera_info(message.as_ref());
+        });
     }
 
     /// Takes poses or detections. After one that could not be read the next has a gap before it, and is denied. A node that is not active
     /// drops them.
     fn take_reports(&mut self) {
-        if self.lifecycle != State::Active {
-            return self.drop_reports();
-        }
-        let (received, poses) = (&mut self.pose, &mut self.poses);
-        let (gate, has_report) = (&mut self.gate, &mut self.has_report);
-        let (refused, composed) = (&mut self.refused, &mut self.composed);
-        let mut take = |received: &mut Received, report: &PoseReport, origin: Origin| {
-            *has_report = true;
+        let is_active = self.lifecycle == State::Active;
+        let most = match self.settings.detector {
+            Some(_) if is_active => DETECTIONS,
+            _ => BATCH,
+        };
+        self.graph.input.drain(most, |received, taken| {
+            let Some((message, mut origin)) = taken else {
+                return;
+            };
+            if !is_active {
+                received.messages += 1;
+                return;
+            }
+            let report = match message {
+                Input::Pose(header, child, pose, covariance) => {
+                    self.poses.pose(header, child, &pose, covariance)
+                }
+                Input::Transforms(message) => {
+                    let Some(report) = self.poses.transforms(&message, origin.publisher) else {
+                        return;
+                    };
+                    // Several publishers share the topic, so their counts do not number the poses.
+                    self.composed += 1;
+                    origin = Origin {
+                        publisher: [0; 16],
+                        number: self.composed,
+                    };
+                    report
+                }
+                Input::Detections(message) => {
+                    self.has_report = true;
+                    received.note(Now::read(), message.header.stamp);
+                    let _ = self.gate.detections(Now::read(), &message, origin);
+                    return;
+                }
+            };
+            self.has_report = true;
             let now = Now::read();
             received.note(now, report.stamp);
-            *refused = report.pose.as_ref().err().map(ToString::to_string);
-            let _ = gate.pose(now, report, origin);
-        };
-        match &self.graph.input {
-            Input::Poses(topic) => drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    take(received, &poses.with_covariance(&message), origin(&info));
-                }
-            }),
-            Input::Odometry(topic) => drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    take(received, &poses.odometry(&message), origin(&info));
-                }
-            }),
-            Input::Plain(topic) => drain(topic, BATCH, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    take(received, &poses.pose(&message), origin(&info));
-                }
-            }),
-            Input::Transforms(topic) => drain(topic, BATCH, received, |received, taken| {
-                let Some((message, info)) = taken else {
-                    return;
-                };
-                let publisher = info.publisher_gid().to_bytes16();
-                if let Some(report) = poses.transforms(&message, publisher) {
-                    // Several publishers share the topic, so their counts do not number the poses.
-                    *composed += 1;
-                    let origin = Origin {
-                        publisher: [0; 16],
-                        number: *composed,
-                    };
-                    take(received, &report, origin);
-                }
-            }),
-            Input::Detections(topic, _) => drain(topic, DETECTIONS, received, |received, taken| {
-                if let Some((message, info)) = taken {
-                    *has_report = true;
-                    received.note(Now::read(), message.header.stamp);
-                    let _ = gate.detections(Now::read(), &message, origin(&info));
-                }
-            }),
-        }
-    }
-
-    fn drop_reports(&mut self) {
-        fn count<M>(received: &mut Received, taken: Option<M>) {
-            received.messages += u64::from(taken.is_some());
-        }
-        let received = &mut self.pose;
-        match &self.graph.input {
-            Input::Poses(topic) => drain(topic, BATCH, received, count),
-            Input::Odometry(topic) => drain(topic, BATCH, received, count),
-            Input::Plain(topic) => drain(topic, BATCH, received, count),
-            Input::Transforms(topic) => drain(topic, BATCH, received, count),
-            Input::Detections(topic, _) => drain(topic, BATCH, received, count),
-        }
+            self.refused = report.pose.as_ref().err().map(ToString::to_string);
+            let _ = self.gate.pose(now, &report, origin);
+        });
     }
 
     /// Returns the action that the node knows and the gate does not: the fault of the topic, of the last pose, of stamps,
     /// the hold that would open, or the movement that a set includes.
     fn hint(&self, answer: &Answer) -> Option<String> {
-        let (pose, settings) = (&self.pose, self.settings);
+        let (pose, settings) = (&self.graph.input.received, self.settings);
         let reason = answer.reason()?;
         if self.lifecycle != State::Active {
             let state = self.lifecycle.labelled().label;
@@ -359,11 +286,7 @@ impl<'a, D: Decider> Runner<'a, D> {
                 .or_else(|| pose.hold(settings)),
             Reason::Stale | Reason::TimeBackwards => pose.stamps(settings),
             Reason::CovarianceZero | Reason::CovarianceUnknown => self.refused.clone(),
-            Reason::FrameMismatch => self.refused.clone().or_else(|| {
-                self.gate
-                    .frame()
-                    .and_then(|frame| wrong_frame(frame, settings))
-            }),
+            Reason::FrameMismatch => self.unused(),
             Reason::PoseSetTooLarge => settings
                 .movement()
                 .map(|movement| format!("{} {movement}", words(reason, None))),
@@ -371,79 +294,77 @@ impl<'a, D: Decider> Runner<'a, D> {
         }
     }
 
+    /// Returns why the last pose was not used.
+    fn unused(&self) -> Option<String> {
+        let wrong_frame = || wrong_frame(self.gate.frame()?, self.settings);
+        self.refused.clone().or_else(wrong_frame)
+    }
+
     /// Publishes the messages that are due. Failed publications are not repeated: silence denies.
     fn publish(&mut self, answer: &Answer, now: Instant, is_last: bool) {
         let has_changed = answer.is_open != self.was_open || is_last;
         self.was_open = answer.is_open;
+        let is_due = |last: Option<Instant>, period: Duration| {
+            let passed = last.map(|last| now.saturating_duration_since(last));
+            has_changed || passed.is_none_or(|passed| passed >= period)
+        };
         let ms = |ms: u32| Duration::from_millis(u64::from(ms));
-        let reports = self.has_report && is_due(self.sent.heartbeat, now, SHORTEST);
+        let (settings, cycle_ms) = (self.settings, self.settings.cycle_ms);
         // A cycle early rather than late.
-        let period = ms(self.settings.heartbeat_ms - self.settings.cycle_ms + 1);
-        if has_changed || reports || is_due(self.sent.heartbeat, now, period) {
+        let period = ms(settings.heartbeat_ms - cycle_ms + 1);
+        let period = match self.has_report {
+            true => period.min(SHORTEST),
+            false => period,
+        };
+        if is_due(self.sent.heartbeat, period) {
             self.has_report = false;
             self.sent.heartbeat = Some(now);
-            let report = self.gate.report();
-            let message = self.heartbeat.next(
-                answer,
-                self.settings,
-                self.gate.chosen(self.settings),
-                report,
-            );
+            let (report, task) = (self.gate.report(), self.gate.chosen(settings));
+            let message = self.heartbeat.next(answer, settings, task, report);
             let _ = self.graph.permission.publish(message);
         }
-        if has_changed
-            || is_due(
-                self.sent.permit,
-                now,
-                PERMIT_PERIOD - ms(self.settings.cycle_ms.min(99)),
-            )
-        {
+        if is_due(self.sent.permit, PERMIT_PERIOD - ms(cycle_ms.min(99))) {
             self.sent.permit = Some(now);
-            let _ = self.graph.permit.publish(Bool {
-                data: answer.is_open,
-            });
+            let _ = self.graph.permit.publish(answer.is_open);
         }
-        if has_changed || is_due(self.sent.slow, now, SLOW_PERIOD) {
+        if is_due(self.sent.slow, SLOW_PERIOD) {
             self.sent.slow = Some(now);
-            let frame = self.gate.frame();
-            let refused = self.refused.clone();
-            let refused =
-                refused.or_else(|| frame.and_then(|frame| wrong_frame(frame, self.settings)));
-            let others = [
-                ("odometry", &self.odometry),
-                ("camera info", &self.camera_info),
-            ];
-            let others = others.into_iter();
-            let others = others.filter_map(|(name, received)| {
-                Some(received.as_ref()?.status(name, answer.now, None))
-            });
+            let received = |name, received: &Received| received.status(name, answer.now, None);
+            let odometry = self.graph.odom.as_ref();
+            let odometry = odometry.map(|topic| received("odometry", &topic.received));
+            let camera_info = self.graph.camera_info.as_ref();
+            let camera_info = camera_info.map(|topic| received("camera info", &topic.received));
+            let others = odometry.into_iter().chain(camera_info);
             let more = others.chain(self.gate.diagnostics(answer.now)).collect();
             let message = diagnostics(
                 answer,
-                self.settings,
-                self.gate.chosen(self.settings),
+                settings,
+                self.gate.chosen(settings),
                 self.hint(answer).as_deref(),
-                (&self.pose, refused),
+                (&self.graph.input.received, self.unused()),
                 self.clock_steps,
                 more,
             );
             let _ = self.graph.diagnostics.publish(message);
-            if let Some(markers) = self.gate.markers(answer).filter(|_| self.settings.markers) {
+            if let Some(markers) = self.gate.markers(answer).filter(|_| settings.markers) {
                 let _ = self.graph.markers.publish(markers);
             }
         }
     }
 
     fn serve(&mut self) {
-        if let Some(servers) = &self.graph.lifecycle {
-            let state = servers.serve(self.lifecycle);
-            if state != self.lifecycle {
-                self.lifecycle = state;
-                let answer = self.now();
-                self.publish(&answer, Instant::now(), false);
-            }
+        let mut served = Served {
+            parameters: &self.settings.parameters,
+            state: self.lifecycle,
+        };
+        for service in &self.graph.services {
+            service(&mut served);
         }
-        self.graph.parameters.serve(&self.settings.parameters);
+        if served.state != self.lifecycle {
+            self.lifecycle = served.state;
+            let answer = self.now();
+            self.publish(&answer, Instant::now(), false);
+        }
         while let Ok(Some((id, _))) = self.graph.explain.receive_request() {
             let answer = self.now();
             let response = TriggerResponse {
@@ -462,12 +383,5 @@ impl<'a, D: Decider> Runner<'a, D> {
             let response = TriggerResponse { success, message };
             let _ = self.graph.reset.send_response(id, response);
         }
-    }
-}
-
-fn origin(info: &MessageInfo) -> Origin {
-    Origin {
-        publisher: info.publisher_gid().to_bytes16(),
-        number: info.sequence_number(),
     }
 }

@@ -35,11 +35,10 @@ pub enum SerialError {
 pub struct Port {
     path: PathBuf,
     baud: u32,
-    file: Option<File>,
+    /// The open line; or when and why it was lost.
+    file: Result<File, (Instant, String)>,
     /// The bytes that did not fit yet.
     pending: Vec<u8>,
-    lost_at: Option<Instant>,
-    problem: Option<String>,
 }
 
 impl Port {
@@ -51,25 +50,21 @@ impl Port {
         Ok(Self {
             path: path.into(),
             baud,
-            file: Some(open(path, baud)?),
+            file: Ok(open(path, baud)?),
             // Ends a frame that an earlier program left unfinished.
             pending: vec![0],
-            lost_at: None,
-            problem: None,
         })
     }
 
     /// Reads the bytes that have arrived. Returns `None` if the line is lost; it is then opened again after a time.
     pub fn read(&mut self, now: Instant) -> Option<Vec<u8>> {
-        if self.file.is_none() {
-            let is_due = self
-                .lost_at
-                .is_none_or(|lost| now.saturating_duration_since(lost) >= RETRY);
-            if is_due {
-                self.open_again(now);
-            }
+        if let Err((lost_at, _)) = self.file
+            && now.saturating_duration_since(lost_at) >= RETRY
+        {
+            let again = open(&self.path, self.baud);
+            self.file = again.map_err(|error| (now, error.to_string()));
         }
-        let file = self.file.as_mut()?;
+        let file = self.file.as_mut().ok()?;
         let mut all = Vec::new();
         let mut buffer = [0; 4096];
         while all.len() < MOST {
@@ -95,7 +90,7 @@ impl Port {
     pub fn write(&mut self, frame: &[u8], now: Instant) -> bool {
         // The rest of the previous frame.
         self.flush(now);
-        if self.file.is_none() || self.pending.len() > 1 {
+        if self.file.is_err() || self.pending.len() > 1 {
             return false;
         }
         self.pending.extend(frame);
@@ -105,7 +100,7 @@ impl Port {
 
     /// Writes the bytes that did not fit before.
     pub fn flush(&mut self, now: Instant) {
-        let Some(file) = &mut self.file else {
+        let Ok(file) = &mut self.file else {
             return;
         };
         while !self.pending.is_empty() {
@@ -120,26 +115,15 @@ impl Port {
     }
 
     fn lose(&mut self, now: Instant, problem: String) {
-        self.file = None;
+        self.file = Err((now, problem));
         self.pending = vec![0];
-        self.lost_at = Some(now);
-        self.problem = Some(problem);
-    }
-
-    fn open_again(&mut self, now: Instant) {
-        match open(&self.path, self.baud) {
-            Ok(file) => {
-                self.file = Some(file);
-                self.problem = None;
-            }
-            Err(error) => self.lose(now, error.to_string()),
-        }
     }
 
     /// Returns the reason why the line is lost; `None` if it is open.
     #[must_use]
     pub fn problem(&self) -> Option<&str> {
-        self.problem.as_deref()
+        let (_, problem) = self.file.as_ref().err()?;
+        Some(problem)
     }
 
     /// Returns the path of the device.

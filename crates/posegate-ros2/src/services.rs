@@ -1,102 +1,107 @@
 //! The services of the node's parameters, and of the lifecycle of a managed node.
 
-use crate::lifecycle::{
-    AvailableStates, AvailableTransitions, ChangeState, Changed, CurrentState, State,
-};
-use crate::message::TriggerRequest;
+use crate::entities::{Entities, GraphError};
+use crate::lifecycle::State;
+use crate::message::Single;
 use crate::parameter_services::{ReportedParameters, refused};
-use ros2_client::parameters::raw::SetParametersResult;
-use ros2_client::rcl_interfaces::{
-    DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest,
-    GetParameterTypesResponse, GetParametersRequest, GetParametersResponse, ListParametersRequest,
-    ListParametersResponse, SetParametersAtomicallyResponse, SetParametersRequest,
-    SetParametersResponse,
-};
-use ros2_client::{Message, Server};
+use ros2_client::parameters::raw::Parameter;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
-/// The six services of a node's parameters.
-pub struct ParameterServers {
-    /// `get_parameters`.
-    pub get: Server<GetParametersRequest, GetParametersResponse>,
-    /// `get_parameter_types`.
-    pub types: Server<GetParameterTypesRequest, GetParameterTypesResponse>,
-    /// `set_parameters`.
-    pub set: Server<SetParametersRequest, SetParametersResponse>,
-    /// `set_parameters_atomically`.
-    pub set_at_once: Server<SetParametersRequest, SetParametersAtomicallyResponse>,
-    /// `list_parameters`.
-    pub list: Server<ListParametersRequest, ListParametersResponse>,
-    /// `describe_parameters`.
-    pub describe: Server<DescribeParametersRequest, DescribeParametersResponse>,
+/// A service: answers the requests that have arrived.
+pub type Service = Box<dyn Fn(&mut Served<'_>)>;
+
+/// What services report and change.
+pub struct Served<'s> {
+    /// The parameters.
+    pub parameters: &'s ReportedParameters,
+    /// The state of the node.
+    pub state: State,
 }
 
-/// The services of a managed node. An empty request is that of `std_srvs/srv/Trigger`.
-pub struct LifecycleServers {
-    /// `change_state`.
-    pub change: Server<ChangeState, Changed>,
-    /// `get_state`.
-    pub current: Server<TriggerRequest, CurrentState>,
-    /// `get_available_states`.
-    pub states: Server<TriggerRequest, AvailableStates>,
-    /// `get_available_transitions`.
-    pub transitions: Server<TriggerRequest, AvailableTransitions>,
+/// Offers services under the name of a node.
+struct Services<'e> {
+    entities: &'e mut Entities,
+    node: String,
+    package: &'static str,
+    all: Vec<Service>,
 }
 
-/// Answers the requests that have arrived. Responses that cannot be sent are not repeated: the caller asks again.
-pub fn answer<Q: Message + Clone + 'static, R: Message + 'static>(
-    server: &Server<Q, R>,
-    mut response: impl FnMut(Q) -> R,
-) {
-    while let Ok(Some((id, request))) = server.receive_request() {
-        let _ = server.send_response(id, response(request));
+impl Services<'_> {
+    /// Offers a service whose request and response have one field each, or are `Q` and `R` themselves. Its type is its
+    /// name in capitals, such as `GetState` of `get_state`. Responses that cannot be sent are not repeated: the caller asks again.
+    fn add<Q, R>(
+        &mut self,
+        name: &str,
+        response: impl Fn(&mut Served<'_>, Q) -> R + 'static,
+    ) -> Result<(), GraphError>
+    where
+        Q: Serialize + DeserializeOwned + Clone + 'static,
+        R: Serialize + DeserializeOwned + 'static,
+    {
+        let capital = |word: &str| word[..1].to_uppercase() + &word[1..];
+        let kind: String = name.split('_').map(capital).collect();
+        let (name, kind) = (format!("{}/{name}", self.node), [self.package, &kind]);
+        let server = self.entities.server::<Single<Q>, Single<R>>(&name, kind)?;
+        self.all.push(Box::new(move |served| {
+            while let Ok(Some((id, Single(request)))) = server.receive_request() {
+                let _ = server.send_response(id, Single(response(served, request)));
+            }
+        }));
+        Ok(())
     }
 }
 
-impl ParameterServers {
-    /// Answers requests. No parameter can be set.
-    pub fn serve(&self, reported: &ReportedParameters) {
-        answer(&self.get, |request| GetParametersResponse {
-            values: reported.values(&request.names),
-        });
-        answer(&self.types, |request| GetParameterTypesResponse {
-            values: reported.types(&request.names),
-        });
-        answer(&self.set, |request| {
-            let each = |given| -> SetParametersResult { refused(std::slice::from_ref(given)) };
-            SetParametersResponse {
-                results: request.parameter.iter().map(each).collect(),
-            }
-        });
-        answer(&self.set_at_once, |request| {
-            SetParametersAtomicallyResponse {
-                result: refused(&request.parameter),
-            }
-        });
-        answer(&self.list, |request| ListParametersResponse {
-            result: reported.list(&request),
-        });
-        answer(&self.describe, |request| DescribeParametersResponse {
-            values: reported.descriptors(&request.names),
-        });
+/// Offers the six services of a node's parameters, of which none can be set, and those of the lifecycle of a managed node. `node` is its
+/// full name.
+///
+/// # Errors
+/// [`GraphError`]
+pub fn offer(
+    entities: &mut Entities,
+    node: String,
+    is_managed: bool,
+) -> Result<Vec<Service>, GraphError> {
+    type Names = Vec<String>;
+    type Wanted = Vec<Parameter>;
+    let mut services = Services {
+        entities,
+        node,
+        package: "rcl_interfaces",
+        all: Vec::new(),
+    };
+    services.add("get_parameters", |of, names: Names| {
+        of.parameters.values(&names)
+    })?;
+    services.add("get_parameter_types", |of, names: Names| {
+        of.parameters.types(&names)
+    })?;
+    services.add("describe_parameters", |of, names: Names| {
+        of.parameters.descriptors(&names)
+    })?;
+    services.add("list_parameters", |of, request| {
+        of.parameters.list(&request)
+    })?;
+    services.add("set_parameters_atomically", |_, wanted: Wanted| {
+        refused(&wanted)
+    })?;
+    services.add("set_parameters", |_, wanted: Wanted| -> Vec<_> {
+        wanted.chunks(1).map(refused).collect()
+    })?;
+    if !is_managed {
+        return Ok(services.all);
     }
-}
-
-impl LifecycleServers {
-    /// Answers requests, and returns the state after them.
-    pub fn serve(&self, before: State) -> State {
-        let mut state = before;
-        answer(&self.change, |request| {
-            let next = state.after(&request.transition);
-            state = next.unwrap_or(state);
-            Changed {
-                success: next.is_some(),
-            }
-        });
-        answer(&self.current, |_| CurrentState {
-            current_state: state.labelled(),
-        });
-        answer(&self.states, |_| State::all());
-        answer(&self.transitions, |_| state.available());
-        state
-    }
+    // An empty request has one byte.
+    services.package = "lifecycle_msgs";
+    services.add("get_state", |of, _: u8| of.state.labelled())?;
+    services.add("get_available_states", |_, _: u8| State::all())?;
+    services.add("get_available_transitions", |of, _: u8| {
+        of.state.available()
+    })?;
+    services.add("change_state", |of, wanted| {
+        let next = of.state.after(&wanted);
+        of.state = next.unwrap_or(of.state);
+        next.is_some()
+    })?;
+    Ok(services.all)
 }

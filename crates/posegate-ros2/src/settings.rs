@@ -1,6 +1,6 @@
 //! The settings of the node: ROS parameters with their ranges, and the settings of the gate and the tracker made from them.
 
-use self::reader::Reader;
+use self::given::Given;
 use crate::arguments::Arguments;
 use crate::parameter_services::ReportedParameters;
 use crate::poses::PoseSettings;
@@ -14,10 +14,11 @@ use posegate_files::printable::hex;
 use posegate_replay::detector::{Detector, DetectorError};
 use std::path::PathBuf;
 
+mod given;
 mod reader;
 
 /// The quality of service of a subscription.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delivery {
     /// `true` for reliable, `false` for best effort.
     pub reliable: bool,
@@ -41,7 +42,8 @@ pub struct Serial {
 #[derive(Clone, Debug)]
 pub struct NodeSettings {
     task: String,
-    task_digest: [u8; 32],
+    /// The settings of the gate, without the task's name and the sources.
+    gate: Settings<'static>,
     table_digest: [u8; 32],
     /// The name of the robot in the permit: the node's full name, unless a parameter states another.
     pub robot: String,
@@ -56,13 +58,6 @@ pub struct NodeSettings {
     pub trust: Trust,
     /// The largest speeds of the robot.
     pub bounds: MotionBounds,
-    maximum_age_ms: u32,
-    report_period_ms: u32,
-    permit_hold_ms: u32,
-    inhibit_hold_ms: u32,
-    permits_in_a_row: u16,
-    restart: Restart,
-    look_at: Option<u32>,
     /// The period of the control cycle, milliseconds.
     pub cycle_ms: u32,
     /// The period of the permission's heartbeat, milliseconds.
@@ -75,6 +70,8 @@ pub struct NodeSettings {
     pub odom_delivery: Delivery,
     /// The tags and the camera, if detections are used instead of poses.
     pub detector: Option<Detector>,
+    /// The topics of the detections and of the camera info, for messages.
+    pub detection_topics: [String; 2],
     /// The quality of service of the detections.
     pub detections_delivery: Delivery,
     /// The quality of service of the camera info.
@@ -222,30 +219,31 @@ impl NodeSettings {
     /// # Errors
     /// [`SettingsError`]. No accepted value disables a check.
     pub fn new(arguments: &Arguments, table: &[u8]) -> Result<Self, SettingsError> {
-        let reader = Reader::new(&arguments.parameters);
-        reader.check_names()?;
-        if reader.bool("use_sim_time", false)? {
+        let names = &arguments.names;
+        let given = Given::new(&arguments.parameters)?;
+        if given.bool("use_sim_time", false) {
             return Err(SettingsError::SimulatedTime);
         }
         let table = Table::parse(table)?;
-        let (digest, site_is_checked) = reader.site(arguments.task_digest.as_deref(), &table)?;
-        let task = reader.text("task", table.task())?;
+        let (task_digest, site_is_checked) =
+            given.site(arguments.task_digest.as_deref(), &table)?;
+        let task = given.text("task", table.task());
         if task != table.task() {
             return Err(SettingsError::WrongTask {
                 found: table.task().to_owned(),
                 expected: task,
             });
         }
-        let serial = reader.serial(arguments)?;
-        let site = reader.site_file(arguments.site.as_deref(), &table)?;
-        let detector = reader.detector(site.as_ref(), &table)?;
-        let frame = reader.text("frame_id", "map")?;
-        let trust = reader.trust(detector.is_some())?;
+        let serial = given.serial(arguments)?;
+        let site = given.site_file(arguments.site.as_deref(), &table)?;
+        let detector = given.detector(site.as_ref(), &table)?;
+        let frame = given.text("frame_id", "map");
+        let trust = given.trust(detector.is_some())?;
         let bounds = match serial {
             Some(_) => MotionBounds::STANDS_STILL,
-            None => reader.bounds()?,
+            None => given.bounds()?,
         };
-        let tracker = reader.tracker(bounds, trust, &table)?;
+        let tracker = given.tracker(bounds, trust, &table)?;
         let source = Source {
             frame: FrameId::of(&frame),
             // A tracker applies the trust itself.
@@ -263,50 +261,49 @@ impl NodeSettings {
             (None, Some(_)) => 500,
             (None, None) => 800,
         };
-        let permit_hold_ms = reader.ms("permit_hold_ms", usual_hold_ms)?;
+        let permit_hold_ms = given.whole("permit_hold_ms", usual_hold_ms);
+        let [cycle_ms, valid_ms] = [given.whole("cycle_ms", 20), given.whole("valid_ms", 250)];
         let settings = Self {
             task,
-            task_digest: digest,
+            gate: Settings {
+                task: "",
+                task_digest,
+                sources: &[],
+                maximum_age_ms: given.whole("maximum_age_ms", 1_500),
+                response_ms: cycle_ms + valid_ms + CLOCKS_MS,
+                report_period_ms: given.whole("report_period_ms", permit_hold_ms),
+                permit_hold_ms,
+                inhibit_hold_ms: given.whole("inhibit_hold_ms", 500),
+                permits_in_a_row: given.whole("permits_in_a_row", 3) as u16,
+                restart: match given.text("restart", "automatic").as_str() {
+                    "on_reset" => Restart::OnReset,
+                    _ => Restart::Automatic,
+                },
+                // A PC walks all cells of a table within a cycle.
+                most_runs: u32::MAX,
+                look_at: given.optional_whole("look_at"),
+            },
             table_digest: table.digest(),
-            robot: reader.text("robot", &arguments.names.full_node())?,
+            robot: given.text("robot", &names.full_node()),
             site_is_checked: site_is_checked || site.is_some(),
             sources: [source],
-            poses: reader.poses(site.as_ref(), &frame, trust, &table)?,
+            poses: given.poses(site.as_ref(), &frame, trust, &table)?,
             frame,
             trust,
             bounds,
-            maximum_age_ms: reader.ms("maximum_age_ms", 1_500)?,
-            report_period_ms: reader.ms("report_period_ms", permit_hold_ms)?,
-            permit_hold_ms,
-            inhibit_hold_ms: reader.ms("inhibit_hold_ms", 500)?,
-            permits_in_a_row: reader.whole(
-                "permits_in_a_row",
-                3,
-                "a whole number from 1 to 65535",
-                1..=65_535,
-            )? as u16,
-            restart: match reader.choice(
-                "restart",
-                ["automatic", "on_reset"],
-                "`automatic` or `on_reset`",
-            )? {
-                0 => Restart::Automatic,
-                _ => Restart::OnReset,
-            },
-            look_at: reader.look_at()?,
-            cycle_ms: reader.ms("cycle_ms", 20)?,
-            heartbeat_ms: reader.ms("heartbeat_ms", 50)?,
-            valid_ms: reader.ms("valid_ms", 250)?,
-            pose_delivery: reader.delivery("pose_reliability", "pose_durability")?,
-            odom_delivery: reader.delivery("odom_reliability", "odom_durability")?,
-            detections_delivery: reader
-                .delivery("detections_reliability", "detections_durability")?,
-            camera_info_delivery: reader.best_effort("camera_info_reliability")?,
+            cycle_ms,
+            heartbeat_ms: given.whole("heartbeat_ms", 50),
+            valid_ms,
+            pose_delivery: given.delivery("pose_reliability", "pose_durability"),
+            odom_delivery: given.delivery("odom_reliability", "odom_durability"),
+            detection_topics: [names.detections.clone(), names.camera_info.clone()],
+            detections_delivery: given.delivery("detections_reliability", "detections_durability"),
+            camera_info_delivery: given.best_effort("camera_info_reliability"),
             detector,
             tracker,
-            markers: reader.bool("markers", true)?,
-            is_managed: reader.bool("lifecycle", false)?,
-            parameters: reader.reported(serial.is_some()),
+            markers: given.bool("markers", true),
+            is_managed: given.bool("lifecycle", false),
+            parameters: given.reported(serial.is_some()),
             serial,
         };
         settings.check()?;
@@ -327,7 +324,7 @@ impl NodeSettings {
         if self.serial.is_some() {
             return Ok(());
         }
-        if !(self.response_ms() < self.maximum_age_ms) {
+        if !(self.response_ms() < self.gate.maximum_age_ms) {
             return Err(SettingsError::Times(
                 "maximum_age_ms is not above valid_ms + cycle_ms + 20: a permission that consumers use for valid_ms would be older than that; lengthen maximum_age_ms or shorten valid_ms",
             ));
@@ -339,13 +336,13 @@ impl NodeSettings {
     /// sum of a cycle, the time for which consumers use the last permission, and the difference of their clocks.
     #[must_use]
     pub const fn response_ms(&self) -> u32 {
-        self.cycle_ms + self.valid_ms + CLOCKS_MS
+        self.gate.response_ms
     }
 
     /// Returns the age at which a report is no longer used, milliseconds.
     #[must_use]
     pub const fn oldest_ms(&self) -> u32 {
-        self.maximum_age_ms.saturating_sub(self.response_ms())
+        self.gate.maximum_age_ms.saturating_sub(self.response_ms())
     }
 
     /// Returns the settings of the gate.
@@ -353,18 +350,8 @@ impl NodeSettings {
     pub fn gate(&self) -> Settings<'_> {
         Settings {
             task: &self.task,
-            task_digest: self.task_digest,
             sources: &self.sources,
-            maximum_age_ms: self.maximum_age_ms,
-            response_ms: self.response_ms(),
-            report_period_ms: self.report_period_ms,
-            permit_hold_ms: self.permit_hold_ms,
-            inhibit_hold_ms: self.inhibit_hold_ms,
-            permits_in_a_row: self.permits_in_a_row,
-            restart: self.restart,
-            // A PC walks all cells of a table within a cycle.
-            most_runs: u32::MAX,
-            look_at: self.look_at,
+            ..self.gate
         }
     }
 
@@ -394,7 +381,7 @@ impl NodeSettings {
     /// Returns the task digest, in hexadecimal digits.
     #[must_use]
     pub fn site(&self) -> String {
-        hex(&self.task_digest)
+        hex(&self.gate.task_digest)
     }
 }
 

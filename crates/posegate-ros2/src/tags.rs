@@ -192,7 +192,7 @@ fn estimate(fix: &Fix) -> PoseEstimate {
 
 /// Returns the calibration of a message.
 fn calibration(message: &CameraInfo) -> detector::CameraInfo {
-    let roi = message.roi;
+    let ([x, y, rows, columns], _) = message.roi;
     detector::CameraInfo {
         width: message.width,
         height: message.height,
@@ -201,8 +201,8 @@ fn calibration(message: &CameraInfo) -> detector::CameraInfo {
         k: message.k,
         r: message.r,
         p: message.p,
-        binning: [message.binning_x, message.binning_y],
-        roi: [roi.x_offset, roi.y_offset, roi.width, roi.height],
+        binning: message.binning,
+        roi: [x, y, columns, rows],
     }
 }
 

@@ -2,10 +2,11 @@
 //! of the same bytes and the plain definition of the success set contradict.
 
 use damage::{Random, damage};
-use posegate_ros2::arguments::Command;
+use posegate::gate::self_test;
+use posegate_ros2::arguments::Arguments;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{
-    Header, Odometry, Pose, PoseWithCovariance, PoseWithCovarianceStamped, TriggerRequest,
+    Header, Odometry, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Single,
 };
 use posegate_ros2::permit_gate::{Origin, PermitGate};
 use posegate_ros2::poses::Poses;
@@ -78,13 +79,11 @@ fn may_permit((sec, nanosec, frame, numbers): &(i32, u32, Vec<u8>, [f64; 43])) -
 
 #[test]
 fn damaged_payloads_never_permit_wrongly() {
-    let Ok(Command::Run(arguments)) = Command::parse(
+    let arguments = Arguments::read(
         "dock.posegate --ros-args -p stands_still:=true -p cross_terms:=filled -p permits_in_a_row:=1 -p inhibit_hold_ms:=1"
             .split(' ')
             .map(str::to_owned),
-    ) else {
-        panic!("arguments");
-    };
+    ).unwrap();
     let settings = NodeSettings::new(&arguments, TABLE).unwrap();
     let gate = settings.gate();
     let now = |ms: i128| Now::from_ns(i128::from(START_S) * 1_000_000_000 + ms * 1_000_000);
@@ -99,7 +98,7 @@ fn damaged_payloads_never_permit_wrongly() {
             &payload,
             RepresentationIdentifier::CDR_LE,
         );
-        let _ = CDRDeserializerAdapter::<TriggerRequest>::from_bytes(
+        let _ = CDRDeserializerAdapter::<Single<u8>>::from_bytes(
             &payload,
             RepresentationIdentifier::CDR_LE,
         );
@@ -115,12 +114,14 @@ fn damaged_payloads_never_permit_wrongly() {
             continue;
         };
         parsed += 1;
-        let mut node = PermitGate::new(TABLE, &settings, &gate, now(-10)).unwrap();
+        let mut node = PermitGate::new(self_test(), TABLE, &settings, &gate, now(-10)).unwrap();
         let origin = Origin {
             publisher: [1; 16],
             number: 1,
         };
-        let report = Poses::new(&settings.poses, "/amcl_pose").with_covariance(&message);
+        let mut poses = Poses::new(&settings.poses, "/amcl_pose");
+        let PoseWithCovarianceStamped { header, pose } = message;
+        let report = poses.pose(header, None, &pose.pose, Some(pose.covariance));
         if node.pose(now(0), &report, origin).is_open {
             permits += 1;
             let is_right = read(&payload).is_some_and(|numbers| may_permit(&numbers));

@@ -3,8 +3,9 @@
 
 use damage::{Random, damage};
 use posegate::bake::BakeInput;
+use posegate::gate::self_test;
 use posegate::report::Heading;
-use posegate_ros2::arguments::Command;
+use posegate_ros2::arguments::Arguments;
 use posegate_ros2::clock::Now;
 use posegate_ros2::message::{AprilTagDetection, AprilTagDetectionArray, CameraInfo, Header};
 use posegate_ros2::permit_gate::{Origin, PermitGate};
@@ -205,10 +206,8 @@ fn settings(table: &[u8]) -> NodeSettings {
     let line = format!(
         "dock.posegate --site {SITE} --ros-args -p stands_still:=true -p use_detections:=true -p corner_sigma_px:=0.3 -p permits_in_a_row:=1 -p inhibit_hold_ms:=1"
     );
-    match Command::parse(line.split(' ').map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, table).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    let arguments = Arguments::read(line.split(' ').map(str::to_owned)).unwrap();
+    NodeSettings::new(&arguments, table).unwrap()
 }
 
 fn table() -> Vec<u8> {
@@ -242,9 +241,7 @@ fn count(
             continue;
         };
         counts[0] += 1;
-        let topics = ["/detections".into(), "/camera_info".into()];
-        let node = PermitGate::new(&table, &settings, &gate, now(-10)).unwrap();
-        let mut node = node.with_tags(topics);
+        let mut node = PermitGate::new(self_test(), &table, &settings, &gate, now(-10)).unwrap();
         node.camera_info(Some(&info));
         if node.detections(now(0), &detections, ORIGIN).is_open {
             counts[1] += 1;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::fixtures::{arguments, at, origin};
 use crate::permission::Heartbeat;
 use posegate::report::{Heading, PoseEstimate};
 use posegate::set::Uncertainty;
@@ -16,7 +16,6 @@ const TABLES: [(&str, &[u8]); 2] = [
         include_bytes!("../../../../examples/tables/see-t7.posegate"),
     ),
 ];
-const START: i128 = 1_800_000_000_000_000_000;
 
 /// Makes the folder of a built site, as a merge writes it.
 fn built(name: &str) -> PathBuf {
@@ -46,19 +45,12 @@ fn read_with(folder: &Path, more: &str) -> Result<Vec<Dock>, DocksError> {
         "{} {more} -p stands_still:=true -p cross_terms:=filled",
         folder.display()
     );
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => read(&arguments),
-        other => panic!("{other:?}"),
-    }
-}
-
-fn at(ms: u32) -> Now {
-    Now::from_ns(START + i128::from(ms) * 1_000_000)
+    read(&arguments(&line))
 }
 
 /// Gives good poses at the dock for 1.5 s. Returns the heartbeats.
 fn drive(gate: &mut DockGate<'_>, docks: &[Dock], ms: &mut u32) -> Vec<(bool, String, String)> {
-    let (given, mut heartbeat) = (&docks[0].settings, Heartbeat::new());
+    let (given, mut heartbeat) = (&docks[0].settings, Heartbeat::start());
     let mut all = Vec::new();
     for _ in 0..15 {
         *ms += 100;
@@ -77,11 +69,7 @@ fn drive(gate: &mut DockGate<'_>, docks: &[Dock], ms: &mut u32) -> Vec<(bool, St
             frame: "map".into(),
             pose: Ok(belief),
         };
-        let origin = Origin {
-            publisher: [1; 16],
-            number: i64::from(*ms / 100),
-        };
-        let answer = gate.pose(at(*ms), &report, origin);
+        let answer = gate.pose(at(*ms), &report, origin(i64::from(*ms / 100)));
         let message = heartbeat.next(&answer, given, gate.chosen(given), Vec::new());
         let status = &message.status[0];
         let value = |key| status.value(key).unwrap_or_default().to_owned();
@@ -96,7 +84,7 @@ fn task_is_asked_for_by_name_and_a_change_closes_first() {
     let docks = read_with(&folder, "--ros-args").unwrap();
     fs::remove_dir_all(&folder).unwrap();
     let gates: Vec<Settings<'_>> = docks.iter().map(|dock| dock.settings.gate()).collect();
-    let mut gate = DockGate::new(&docks, &gates, Default::default());
+    let mut gate = DockGate::new(&docks, &gates);
     let mut ms = 0;
     // None at first.
     let none = drive(&mut gate, &docks, &mut ms);
@@ -157,7 +145,7 @@ fn latched_fault_outlives_a_change_of_the_task() {
     let docks = read_with(&folder, "--ros-args -p restart:=on_reset").unwrap();
     fs::remove_dir_all(&folder).unwrap();
     let gates: Vec<Settings<'_>> = docks.iter().map(|dock| dock.settings.gate()).collect();
-    let mut gate = DockGate::new(&docks, &gates, Default::default());
+    let mut gate = DockGate::new(&docks, &gates);
     let mut ms = 0;
     gate.ask(at(ms), "dock");
     assert!(drive(&mut gate, &docks, &mut ms).last().unwrap().0);

@@ -1,5 +1,6 @@
 use super::*;
 use posegate::gate::{InterlockFault, Reason};
+use posegate::wire::LinkCounters;
 use posegate::wire::{ReportOutcome, encode};
 use proptest::prelude::*;
 
@@ -22,7 +23,7 @@ struct Line {
 impl Line {
     fn new(clock_ms: u32) -> Self {
         Self {
-            link: Link::new(),
+            link: Link::default(),
             start: Instant::now(),
             now_ms: 0,
             number: 0,
@@ -146,7 +147,7 @@ fn telemetry_extends_the_bound_by_the_controllers_clock() {
 #[test]
 fn late_line_of_a_fast_clock_never_permits() {
     for per_mille in [0u64, 1, 5, 10, 20, 30] {
-        let mut link = Link::new();
+        let mut link = Link::default();
         let start = Instant::now();
         let mut on_the_line = VecDeque::new();
         for now_ms in 0..300_000u64 {

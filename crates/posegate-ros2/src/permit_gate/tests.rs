@@ -1,78 +1,36 @@
 use super::*;
-use crate::arguments::Command;
-use crate::message::{Header, Pose as RosPose, PoseWithCovarianceStamped, TwistWithCovariance};
+use crate::fixtures::{self, ODOMETRY, TABLE, at, header, odometry, origin, with_variances};
+use crate::message::Header;
+use posegate::gate::self_test;
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-const START: i128 = 1_800_000_000_000_000_000;
 const STILL: &str = "-p stands_still:=true -p cross_terms:=filled";
-const ODOMETRY: &str = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p odometry_rad_per_sqrt_rad:=0.001 \
-    -p odometry_rad_per_sqrt_m:=0.001 -p odometry_slip:=0.01";
+const VARIANCES: [f64; 3] = [1e-4, 1e-4, 1e-5];
 
 fn settings(line: &str) -> NodeSettings {
-    let line = format!("dock.posegate --ros-args {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE).unwrap(),
-        other => panic!("{other:?}"),
-    }
-}
-
-/// A moment, milliseconds after the start.
-fn at(ms: u32) -> Now {
-    Now::from_ns(START + i128::from(ms) * 1_000_000)
-}
-
-fn origin(number: i64) -> Origin {
-    Origin {
-        publisher: [1; 16],
-        number,
-    }
-}
-
-fn message_at(ms: u32, x: f64, frame: &str) -> PoseWithCovarianceStamped {
-    let mut covariance = [0.0; 36];
-    (covariance[0], covariance[7], covariance[35]) = (1e-4, 1e-4, 1e-5);
-    PoseWithCovarianceStamped {
-        header: Header {
-            stamp: at(ms).time(),
-            frame_id: frame.into(),
-        },
-        pose: PoseWithCovariance {
-            pose: RosPose {
-                position: [x, 0.0, 0.0],
-                orientation: [0.0, 0.0, 0.0, 1.0],
-            },
-            covariance,
-        },
-    }
+    fixtures::settings(TABLE, &format!("--ros-args {line}"))
 }
 
 fn pose_at(ms: u32, x: f64, frame: &str) -> PoseReport {
-    let message = message_at(ms, x, frame);
     PoseReport {
-        stamp: message.header.stamp,
-        frame: message.header.frame_id,
-        pose: Ok(estimate(&message.pose)),
+        stamp: at(ms).time(),
+        frame: frame.into(),
+        pose: Ok(estimate(&with_variances(x, VARIANCES))),
     }
 }
 
 fn odometry_at(ms: u32, x: f64) -> Odometry {
-    let pose = message_at(ms, x, "odom");
-    Odometry {
-        header: pose.header,
-        child_frame_id: "base_link".into(),
-        pose: pose.pose,
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
-    }
+    odometry(
+        header(at(ms), "odom"),
+        "base_link",
+        with_variances(x, VARIANCES),
+    )
 }
 
 /// The moment up to which valid poses have opened the gate, milliseconds after the start.
 const OPENED: u32 = 1_000;
 
 fn opened<'a>(settings: &'a NodeSettings, gate: &'a Settings<'a>) -> PermitGate<'a> {
-    let mut node = PermitGate::new(TABLE, settings, gate, at(0)).unwrap();
+    let mut node = PermitGate::new(self_test(), TABLE, settings, gate, at(0)).unwrap();
     for ms in (0..=OPENED).step_by(20) {
         let _ = node.odometry(at(ms), &odometry_at(ms, 0.0), origin(i64::from(ms / 20)));
         if ms % 100 == 0 {
@@ -162,7 +120,7 @@ fn invalid_reports_close_the_gate() {
 fn two_publishers_never_open_the_gate() {
     let settings = settings("-p stands_still:=true -p permits_in_a_row:=1");
     let gate = settings.gate();
-    let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+    let mut node = PermitGate::new(self_test(), TABLE, &settings, &gate, at(0)).unwrap();
     for k in 0..200u32 {
         let ms = k * 50;
         let origin = Origin {
@@ -179,7 +137,7 @@ fn motion_bounds_enlarge_the_set() {
     let moving = settings("-p max_speed:=0.02 -p max_yaw_rate_deg:=1.0 -p cross_terms:=filled");
     let margins = [&still, &moving].map(|settings| {
         let gate = settings.gate();
-        let mut node = PermitGate::new(TABLE, settings, &gate, at(0)).unwrap();
+        let mut node = PermitGate::new(self_test(), TABLE, settings, &gate, at(0)).unwrap();
         let _ = node.pose(at(10), &pose_at(0, 0.0, "map"), origin(0));
         match node.last().unwrap().verdict {
             Verdict::Permit { margin } => margin,
@@ -313,7 +271,7 @@ fn poses_of_amcl_open_with_the_default_hold() {
     for (more, opens) in [("", true), ("-p permit_hold_ms:=500", false)] {
         let settings = settings(&format!("{STILL} {more}"));
         let gate = settings.gate();
-        let mut node = PermitGate::new(TABLE, &settings, &gate, at(0)).unwrap();
+        let mut node = PermitGate::new(self_test(), TABLE, &settings, &gate, at(0)).unwrap();
         let mut opened = false;
         for ms in (100..10_000).step_by(20) {
             if (ms - 100) % 600 == 0 {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::arguments::Command;
+use crate::fixtures::{self, at};
 use crate::message::{KeyValue, WARN};
 use crate::permission::Heartbeat;
 use crate::permit_gate::Answer;
@@ -11,25 +11,15 @@ const TABLES: [&[u8]; 3] = [
     include_bytes!("../../../../examples/tables/contingent-dock.posegate"),
     include_bytes!("../../../../examples/tables/see-t7.posegate"),
 ];
-const START: i128 = 1_800_000_000_000_000_000;
-
-fn now(ms: i128) -> Now {
-    Now::from_ns(START + ms * MS)
-}
-
 fn settings(table: &[u8], number: usize) -> NodeSettings {
-    let line = format!(
-        "t.posegate --ros-args -r __ns:=/robot{number} -p stands_still:=true -p cross_terms:=filled"
-    );
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, table).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    let line =
+        format!("--ros-args -r __ns:=/robot{number} -p stands_still:=true -p cross_terms:=filled");
+    fixtures::settings(table, &line)
 }
 
 fn answer(ms: i128, is_open: bool) -> Answer {
     Answer {
-        now: now(ms),
+        now: at(ms),
         is_open,
         state: if is_open {
             State::Permitted
@@ -54,7 +44,7 @@ fn set(message: &mut DiagnosticArray, key: &str, value: &str) {
 /// A heartbeat that permits the robot 0 at the time 0, and a watch of it.
 fn good() -> (DiagnosticArray, PermitWatch) {
     let settings = settings(TABLES[0], 0);
-    let message = Heartbeat::new().next(&answer(0, true), &settings, Some(&settings), Vec::new());
+    let message = Heartbeat::start().next(&answer(0, true), &settings, Some(&settings), Vec::new());
     (message, watch(&settings))
 }
 
@@ -83,9 +73,9 @@ fn permit_of_another_robot_is_never_obeyed() {
                     settings.robot.clone_from(&own_settings.robot);
                 }
                 let watch = watch(&settings);
-                nodes.push((settings, Heartbeat::new(), watch));
+                nodes.push((settings, Heartbeat::start(), watch));
             }
-            let (mut watch, mut heartbeat) = (watch(&own_settings), Heartbeat::new());
+            let (mut watch, mut heartbeat) = (watch(&own_settings), Heartbeat::start());
             let mut run = String::new();
             for ms in 0..2_300_i128 {
                 if ms % 50 == 0 {
@@ -97,7 +87,7 @@ fn permit_of_another_robot_is_never_obeyed() {
                     );
                     run = message.status[0].value("run").unwrap().to_owned();
                     if chance() >= 30 {
-                        watch.heartbeat(&message, now(ms + 1), ms * MS);
+                        watch.heartbeat(&message, at(ms + 1), ms * MS);
                     }
                 }
                 for (k, (settings, heartbeat, own_watch)) in nodes.iter_mut().enumerate() {
@@ -106,12 +96,12 @@ fn permit_of_another_robot_is_never_obeyed() {
                     }
                     let mut message =
                         heartbeat.next(&answer(ms, true), settings, Some(settings), Vec::new());
-                    own_watch.heartbeat(&message, now(ms + 1), ms * MS);
+                    own_watch.heartbeat(&message, at(ms + 1), ms * MS);
                     if is_confused(3) {
                         set(&mut message, "run", &run);
                     }
                     if is_confused(0) && chance() >= 30 {
-                        watch.heartbeat(&message, now(ms + 1), ms * MS);
+                        watch.heartbeat(&message, at(ms + 1), ms * MS);
                     }
                 }
                 asks += 1;
@@ -130,9 +120,9 @@ fn permit_of_another_robot_is_never_obeyed() {
 fn two_runs_that_alternate_deny() {
     let settings = settings(TABLES[0], 0);
     let mut watch = watch(&settings);
-    let [mut one, mut two] = [Heartbeat::new(), Heartbeat::new()];
+    let [mut one, mut two] = [Heartbeat::start(), Heartbeat::start()];
     let first = one.next(&answer(0, true), &settings, Some(&settings), Vec::new());
-    watch.heartbeat(&first, now(0), 0);
+    watch.heartbeat(&first, at(0), 0);
     assert!(watch.permitted(0));
     for ms in (50..20_000).step_by(50) {
         let heartbeat = if ms % 3_000 == 0 && ms < 7_000 {
@@ -141,7 +131,7 @@ fn two_runs_that_alternate_deny() {
             &mut two
         };
         let message = heartbeat.next(&answer(ms, true), &settings, Some(&settings), Vec::new());
-        watch.heartbeat(&message, now(ms), ms * MS);
+        watch.heartbeat(&message, at(ms), ms * MS);
         let permits = watch.permitted(ms * MS);
         // The other run is new at 50 ms, and comes back for the last time at 6050 ms.
         let expected = (1_050..3_000).contains(&ms) || ms >= 16_050;
@@ -152,7 +142,7 @@ fn two_runs_that_alternate_deny() {
 #[test]
 fn every_part_of_a_heartbeat_is_required() {
     let (message, mut watch) = good();
-    watch.heartbeat(&message, now(0), 0);
+    watch.heartbeat(&message, at(0), 0);
     assert!(watch.permitted(249 * MS) && !watch.permitted(250 * MS));
     let mut refused: Vec<DiagnosticArray> = Vec::new();
     for key in [
@@ -184,8 +174,8 @@ fn every_part_of_a_heartbeat_is_required() {
         |message: &mut DiagnosticArray| {
             message.status[0].values.push(KeyValue::new("task", "dock"))
         },
-        |message: &mut DiagnosticArray| message.header.stamp = now(-250).time(),
-        |message: &mut DiagnosticArray| message.header.stamp = now(21).time(),
+        |message: &mut DiagnosticArray| message.header.stamp = at(-250).time(),
+        |message: &mut DiagnosticArray| message.header.stamp = at(21).time(),
     ] {
         let mut changed = message.clone();
         change(&mut changed);
@@ -193,7 +183,7 @@ fn every_part_of_a_heartbeat_is_required() {
     }
     for message in &refused {
         let (_, mut watch) = good();
-        watch.heartbeat(message, now(0), 0);
+        watch.heartbeat(message, at(0), 0);
         assert!(!watch.permitted(0), "{message:?}");
         assert!(!watch.reason().is_empty());
     }
@@ -202,7 +192,7 @@ fn every_part_of_a_heartbeat_is_required() {
         set(&mut changed, "robot", robot);
         set(&mut changed, "table", table);
         let mut watch = PermitWatch::new("dock", robot, table);
-        watch.heartbeat(&changed, now(0), 0);
+        watch.heartbeat(&changed, at(0), 0);
         assert!(!watch.permitted(0), "an empty name permits");
     }
 }
@@ -210,8 +200,8 @@ fn every_part_of_a_heartbeat_is_required() {
 #[test]
 fn repeated_heartbeat_ends_the_permit() {
     let (message, mut watch) = good();
-    watch.heartbeat(&message, now(0), 0);
-    watch.heartbeat(&message, now(1), MS);
+    watch.heartbeat(&message, at(0), 0);
+    watch.heartbeat(&message, at(1), MS);
     assert!(!watch.permitted(MS));
     assert_eq!(watch.reason(), "heartbeats out of order");
 }

@@ -1,21 +1,11 @@
 use super::*;
-use crate::arguments::Command;
-use crate::message::{Header, Pose, TransformStamped, TwistWithCovariance};
-use crate::settings::NodeSettings;
+use crate::fixtures::{self, TABLE, pose, with_variances};
+use crate::message::{Header, Odometry, PoseWithCovariance, TransformStamped};
 use posegate::set::Uncertainty;
 use std::fs;
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-
 fn poses(line: &str) -> Poses {
-    let line = format!("dock.posegate {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => {
-            let settings = NodeSettings::new(&arguments, TABLE).unwrap();
-            Poses::new(&settings.poses, "/pose")
-        }
-        other => panic!("{other:?}"),
-    }
+    Poses::new(&fixtures::settings(TABLE, line).poses, "/pose")
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";
@@ -27,29 +17,19 @@ fn header(frame: &str) -> Header {
     }
 }
 
-fn pose(x: f64) -> Pose {
-    Pose {
-        position: [x, 0.0, 0.0],
-        orientation: [0.0, 0.0, 0.0, 1.0],
-    }
+fn odometry(child: &str, x: f64, variance: f64) -> Odometry {
+    fixtures::odometry(header("map"), child, with_variances(x, [variance; 3]))
 }
 
-fn odometry(child: &str, x: f64, variance: f64) -> Odometry {
-    let mut covariance = [0.0; 36];
-    for at in [0, 7, 35] {
-        covariance[at] = variance;
-    }
-    Odometry {
-        header: header("map"),
-        child_frame_id: child.into(),
-        pose: PoseWithCovariance {
-            pose: pose(x),
-            covariance,
-        },
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
+impl Poses {
+    fn odometry(&mut self, message: Odometry) -> PoseReport {
+        let PoseWithCovariance { pose, covariance } = message.pose;
+        self.pose(
+            message.header,
+            Some(message.child_frame_id),
+            &pose,
+            Some(covariance),
+        )
     }
 }
 
@@ -66,10 +46,10 @@ fn site() -> std::path::PathBuf {
 fn pose_of_another_frame_is_refused_or_moved_to_the_base() {
     let mut plain = poses(STILL);
     for base in ["base_link", "/base_footprint"] {
-        assert!(plain.odometry(&odometry(base, 0.0, 1e-4)).pose.is_ok());
+        assert!(plain.odometry(odometry(base, 0.0, 1e-4)).pose.is_ok());
     }
     let refused = plain
-        .odometry(&odometry("antenna", 0.0, 1e-4))
+        .odometry(odometry("antenna", 0.0, 1e-4))
         .pose
         .unwrap_err();
     assert_eq!(refused.reason(), Reason::FrameMismatch);
@@ -78,13 +58,13 @@ fn pose_of_another_frame_is_refused_or_moved_to_the_base() {
         words.contains("[frame.antenna]") && words.contains("child_frame_id:=antenna"),
         "{words}"
     );
-    let refused = plain.odometry(&odometry("robot1/gps", 0.0, 1e-4)).pose;
+    let refused = plain.odometry(odometry("robot1/gps", 0.0, 1e-4)).pose;
     let words = refused.unwrap_err().to_string();
     assert!(words.contains("[frame.\"robot1/gps\"]"), "{words}");
     let mut named = poses(&format!("{STILL} -p child_frame_id:=robot1/base_link"));
     assert!(
         named
-            .odometry(&odometry("robot1/base_link", 0.0, 1e-4))
+            .odometry(odometry("robot1/base_link", 0.0, 1e-4))
             .pose
             .is_ok()
     );
@@ -95,11 +75,7 @@ fn pose_without_covariance_has_the_stated_bound() {
     let mut bounded = poses(&format!(
         "{STILL} -p pose_type:=pose -p set_translation_m:=0.02 -p set_yaw_deg:=1"
     ));
-    let message = PoseStamped {
-        header: header("map"),
-        pose: pose(0.25),
-    };
-    let report = bounded.pose(&message);
+    let report = bounded.pose(header("map"), None, &pose(0.25), None);
     let estimate = report.pose.unwrap();
     assert_eq!((report.frame.as_str(), estimate.x_m), ("map", 0.25));
     let Some(Uncertainty::Bounded {
@@ -116,7 +92,7 @@ fn pose_without_covariance_has_the_stated_bound() {
 fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     let mut plain = poses(STILL);
     let zero = plain
-        .odometry(&odometry("base_link", 0.0, 0.0))
+        .odometry(odometry("base_link", 0.0, 0.0))
         .pose
         .unwrap_err();
     assert_eq!(zero, RefusedPose::ZeroCovariance);
@@ -125,7 +101,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     for _ in 0..50 {
         assert!(
             plain
-                .odometry(&odometry("base_link", 0.0, 1e-4))
+                .odometry(odometry("base_link", 0.0, 1e-4))
                 .pose
                 .is_ok()
         );
@@ -134,7 +110,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     let refused = loop {
         accepted += 1;
         match plain
-            .odometry(&odometry("base_link", 0.01 * f64::from(accepted), 1e-4))
+            .odometry(odometry("base_link", 0.01 * f64::from(accepted), 1e-4))
             .pose
         {
             Ok(_) => assert!(accepted < 50),
@@ -145,7 +121,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
     // Another covariance is an uncertainty again; a stated bound replaces a fixed one.
     assert!(
         plain
-            .odometry(&odometry("base_link", 0.0, 2e-4))
+            .odometry(odometry("base_link", 0.0, 2e-4))
             .pose
             .is_ok()
     );
@@ -153,7 +129,7 @@ fn covariances_of_zero_and_fixed_ones_are_refused_by_name() {
         "{STILL} -p set_translation_m:=0.02 -p set_yaw_deg:=1"
     ));
     for k in 0..50 {
-        let report = bounded.odometry(&odometry("base_link", 0.01 * f64::from(k), 0.0));
+        let report = bounded.odometry(odometry("base_link", 0.01 * f64::from(k), 0.0));
         assert!(matches!(
             report.pose.unwrap().spread,
             Some(Uncertainty::Bounded { .. })
@@ -166,8 +142,8 @@ fn transforms_of_one_robot_give_its_pose() {
     let mut tf = poses(&format!(
         "{STILL} -p pose_type:=tf -p set_translation_m:=0.02 -p set_yaw_deg:=1"
     ));
-    let message = |parent: &str, child: &str, sec: i32, x: f64| TfMessage {
-        transforms: vec![TransformStamped {
+    let message = |parent: &str, child: &str, sec: i32, x: f64| {
+        [TransformStamped {
             header: Header {
                 stamp: Time { sec, nanosec: 7 },
                 frame_id: parent.into(),
@@ -175,7 +151,7 @@ fn transforms_of_one_robot_give_its_pose() {
             child_frame_id: child.into(),
             translation: [x, 0.0, 0.0],
             rotation: [0.0, 0.0, 0.0, 1.0],
-        }],
+        }]
     };
     let [localization, wheels, other] = [[1; 16], [2; 16], [3; 16]];
     assert!(
@@ -218,7 +194,7 @@ fn place_and_origin_of_the_site_are_used() {
     };
     let mut poses = Poses::new(&settings, "/pose");
     let estimate = poses
-        .odometry(&odometry("antenna", 1000.6, 1e-4))
+        .odometry(odometry("antenna", 1000.6, 1e-4))
         .pose
         .unwrap();
     assert!((estimate.x_m - 0.1).abs() < 1e-9, "{estimate:?}");

@@ -1,16 +1,9 @@
 use super::*;
-use crate::arguments::Command;
+use crate::fixtures::{self, TABLE, at};
 use rustdds::{DomainParticipantStatusEvent, GUID};
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-const START: i128 = 1_800_000_000_000_000_000;
-
 fn settings(line: &str) -> NodeSettings {
-    let line = format!("dock.posegate --ros-args -p stands_still:=true {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE).unwrap(),
-        other => panic!("{other:?}"),
-    }
+    fixtures::settings(TABLE, &format!("--ros-args -p stands_still:=true {line}"))
 }
 
 fn received() -> Received {
@@ -24,10 +17,6 @@ fn received() -> Received {
         GUID::from_bytes([0; 16]),
     );
     Received::new("/pose".into(), "", delivery, peers)
-}
-
-fn at(ms: i128) -> Now {
-    Now::from_ns(START + ms * 1_000_000)
 }
 
 #[test]

@@ -1,15 +1,9 @@
 use super::*;
-use crate::arguments::Command;
+use crate::fixtures::{TABLE, arguments};
 use posegate::set::{CrossTerms, Inflation};
 
-const TABLE: &[u8] = include_bytes!("../../../../examples/tables/dock.posegate");
-
 fn settings(line: &str) -> Result<NodeSettings, SettingsError> {
-    let words = format!("dock.posegate {line}");
-    match Command::parse(words.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, TABLE),
-        other => panic!("{line}: {other:?}"),
-    }
+    NodeSettings::new(&arguments(&format!("dock.posegate {line}")), TABLE)
 }
 
 const STILL: &str = "--ros-args -p stands_still:=true";
@@ -222,10 +216,7 @@ fn invalid_parameters_have_their_own_errors() {
 
 #[test]
 fn invalid_table_bytes_are_refused() {
-    let Ok(Command::Run(arguments)) = Command::parse(["x".to_owned()]) else {
-        panic!("a table");
-    };
-    let refused = NodeSettings::new(&arguments, &TABLE[..100]);
+    let refused = NodeSettings::new(&arguments("x"), &TABLE[..100]);
     assert!(matches!(refused, Err(SettingsError::Table(_))));
 }
 

@@ -1,19 +1,15 @@
 use super::*;
-use crate::arguments::Command;
-use crate::clock::Now;
-use crate::message::{
-    AprilTagDetection, Header, Odometry, Pose, PoseWithCovariance, RegionOfInterest,
-    TwistWithCovariance,
-};
-use crate::permit_gate::{Answer, Origin, PermitGate};
+use crate::fixtures::{self, ODOMETRY, at, odometry, origin, with_variances};
+use crate::message::{AprilTagDetection, Header, Odometry};
+use crate::permit_gate::{Answer, PermitGate};
 use crate::settings::NodeSettings;
 use posegate::bake::BakeInput;
+use posegate::gate::self_test;
 use posegate::gate::{Gate, Reason};
 use posegate::report::{FrameId, Report};
 use posegate_site::Site;
 
 const SITE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/tags.toml");
-const START: i128 = 1_800_000_000_000_000_000;
 /// The goal, and the place from which tag 7 looks almost the same: mirrored about its normal.
 const GOAL: [f64; 3] = [0.0, 0.0, 0.0];
 const MIRRORED_DEG: f64 = 40.0;
@@ -33,26 +29,7 @@ fn table() -> Vec<u8> {
 }
 
 fn settings(table: &[u8], line: &str) -> NodeSettings {
-    let line = format!("dock.posegate --site {SITE} --ros-args {line}");
-    match Command::parse(line.split_whitespace().map(str::to_owned)) {
-        Ok(Command::Run(arguments)) => NodeSettings::new(&arguments, table).unwrap(),
-        other => panic!("{other:?}"),
-    }
-}
-
-fn topics() -> [String; 2] {
-    ["/detections".into(), "/camera_info".into()]
-}
-
-fn at(ms: u32) -> Now {
-    Now::from_ns(START + i128::from(ms) * 1_000_000)
-}
-
-fn origin(number: i64) -> Origin {
-    Origin {
-        publisher: [1; 16],
-        number,
-    }
+    fixtures::settings(table, &format!("--site {SITE} --ros-args {line}"))
 }
 
 fn mirrored() -> [f64; 3] {
@@ -96,28 +73,11 @@ fn detection(id: i32, pose: [f64; 3]) -> AprilTagDetection {
 }
 
 fn header(ms: u32) -> Header {
-    Header {
-        stamp: at(ms).time(),
-        frame_id: "front".into(),
-    }
+    fixtures::header(at(ms), "front")
 }
 
 fn at_rest(ms: u32) -> Odometry {
-    Odometry {
-        header: header(ms),
-        child_frame_id: "base_link".into(),
-        pose: PoseWithCovariance {
-            pose: Pose {
-                position: [0.0; 3],
-                orientation: [0.0, 0.0, 0.0, 1.0],
-            },
-            covariance: [0.0; 36],
-        },
-        twist: TwistWithCovariance {
-            twist: [0.0; 6],
-            covariance: [0.0; 36],
-        },
-    }
+    odometry(header(ms), "base_link", with_variances(0.0, [0.0; 3]))
 }
 
 fn image(ms: u32, detections: Vec<AprilTagDetection>) -> AprilTagDetectionArray {
@@ -179,8 +139,7 @@ fn with_node(line: &str, test: impl FnOnce(Node<'_>)) {
     let table = table();
     let settings = settings(&table, line);
     let gate = settings.gate();
-    let node = PermitGate::new(&table, &settings, &gate, at(0)).unwrap();
-    let mut gate = node.with_tags(topics());
+    let mut gate = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
     gate.camera_info(Some(&info()));
     test(Node {
         gate,
@@ -272,9 +231,9 @@ fn detections_without_camera_info_give_no_pose_and_a_reason() {
         let table = table();
         let settings = settings(&table, LINE);
         let gate = settings.gate();
-        let fresh = PermitGate::new(&table, &settings, &gate, at(0)).unwrap();
+        let fresh = PermitGate::new(self_test(), &table, &settings, &gate, at(0)).unwrap();
         let mut fresh = Node {
-            gate: fresh.with_tags(topics()),
+            gate: fresh,
             ms: 0,
             number: 0,
         };
@@ -290,16 +249,11 @@ fn detections_without_camera_info_give_no_pose_and_a_reason() {
         assert!(fresh.gate.last().is_none());
         // A camera info that is not the site's, or cannot be decoded, also removes the earlier one.
         let half = CameraInfo {
-            binning_x: 2,
-            binning_y: 2,
+            binning: [2, 2],
             ..info()
         };
         let part = CameraInfo {
-            roi: RegionOfInterest {
-                width: 640,
-                height: 480,
-                ..RegionOfInterest::default()
-            },
+            roi: ([0, 0, 480, 640], false),
             ..info()
         };
         for (wrong, words) in [
@@ -391,9 +345,8 @@ fn unknown_tags_are_ignored_and_contradictions_close_immediately() {
 /// With odometry, one pose is carried. Two poses are not carried, and are evaluated with the inflation.
 #[test]
 fn two_poses_are_not_carried_along_odometry() {
-    let odometry = "-p use_odometry:=true -p odometry_m_per_sqrt_m:=0.001 -p odometry_rad_per_sqrt_rad:=0.001 \
-        -p odometry_rad_per_sqrt_m:=0.001 -p odometry_slip:=0.01 -p odometry_maximum_gap_ms:=200";
-    with_node(&format!("{LINE} {odometry}"), |mut node| {
+    let line = format!("{LINE} {ODOMETRY} -p odometry_maximum_gap_ms:=200");
+    with_node(&line, |mut node| {
         let mut number = 0;
         let mut step = |node: &mut Node<'_>, found: Option<i32>| {
             let ms = node.ms + 100;
