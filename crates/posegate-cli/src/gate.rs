@@ -1,5 +1,7 @@
 //! `posegate gate`: decides on recorded estimates with the code that runs on the controller.
 
+use crate::arguments::numbers;
+use crate::belief::SetArgs;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
 use posegate::gate::{Reason, Verdict};
@@ -32,15 +34,8 @@ pub struct Arguments {
     /// Confidence of the Gaussian pose-sets [default: the table's]
     #[arg(long)]
     epsilon: Option<f64>,
-    /// Kind of pose-set: Gaussian by each estimate's covariance, or bounded by the same bound for all estimates
-    #[arg(long, value_enum, default_value = "gaussian")]
-    set: Kind,
-    /// Bounded sets: largest error of the position, metres
-    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
-    translation: Option<f64>,
-    /// Bounded sets: largest error of the heading, degrees
-    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
-    yaw_deg: Option<f64>,
+    #[command(flatten)]
+    set: SetArgs,
     /// Grow each pose-set by a movement: the robot's largest speed, m/s
     #[arg(long, requires = "horizon_ms", value_name = "M_S")]
     max_speed: Option<f64>,
@@ -58,22 +53,8 @@ pub struct Arguments {
     json: bool,
 }
 
-fn origin(text: &str) -> Result<[f64; 2], String> {
-    let expected = "expected two numbers in metres, like 448000,5412000";
-    let (x, y) = text.split_once(',').ok_or(expected)?;
-    let number = |text: &str| {
-        let value = text.trim().parse().ok();
-        value
-            .filter(|value: &f64| value.is_finite())
-            .ok_or_else(|| expected.to_string())
-    };
-    Ok([number(x)?, number(y)?])
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Kind {
-    Gaussian,
-    Bounded,
+fn origin(text: &str) -> Result<[f64; 2], &'static str> {
+    numbers(text, f64::is_finite).ok_or("expected two numbers in metres, like 448000,5412000")
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
@@ -87,9 +68,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     })?;
     let radius = radius(&table, arguments.epsilon)?;
     let task_digest = posegate_files::printable::hex(&table.task_digest());
-    let columns = match arguments.set {
-        Kind::Gaussian => Columns::Estimates,
-        Kind::Bounded => Columns::TimedPoses,
+    let columns = match arguments.set.bounded() {
+        None => Columns::Estimates,
+        Some(_) => Columns::TimedPoses,
     };
     let (text, name) = files.read(&arguments.estimates)?;
     let mut rows = estimates(text.as_slice(), &name, columns).map_err(Failure::input)?;
@@ -229,13 +210,9 @@ fn judge_row(
     radius: RadiusSquared,
     movement: Growth,
 ) -> Verdict {
-    let set = match arguments.set {
-        Kind::Gaussian => PoseSet::gaussian(row.estimate, row.covariance, radius),
-        Kind::Bounded => PoseSet::bounded(
-            row.estimate,
-            arguments.translation.unwrap_or(f64::NAN),
-            arguments.yaw_deg.unwrap_or(f64::NAN).to_radians(),
-        ),
+    let set = match arguments.set.bounded() {
+        None => PoseSet::gaussian(row.estimate, row.covariance, radius),
+        Some([translation, yaw]) => PoseSet::bounded(row.estimate, translation, yaw),
     };
     let set = set.map(|set| set.grown(movement));
     // Without a time of use the age is unknown. The estimate is then treated as made at the time of use.

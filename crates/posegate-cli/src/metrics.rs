@@ -1,5 +1,6 @@
 //! `posegate metrics`: compares an estimated trajectory with a reference.
 
+use crate::arguments::numbers;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
 use posegate_files::files::{Files, Input};
 use posegate_replay::metrics::{
@@ -70,15 +71,9 @@ const PAIRS: [(&str, Pairs); 4] = [
     ("delta_0.5_m", Pairs::Metres(0.5)),
 ];
 
-fn thresholds(text: &str) -> Result<[f64; 2], String> {
-    let expected = "expected metres and degrees above 0, like 0.05,2";
-    let (translation, rotation) = text.split_once(',').ok_or(expected)?;
-    let number = |text: &str| {
-        let value = text.trim().parse().ok();
-        let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
-        value.ok_or_else(|| expected.to_string())
-    };
-    Ok([number(translation)?, number(rotation)?])
+fn thresholds(text: &str) -> Result<[f64; 2], &'static str> {
+    let found = numbers(text, |number| number.is_finite() && number > 0.0);
+    found.ok_or("expected metres and degrees above 0, like 0.05,2")
 }
 
 fn poses(path: &Input, files: &Files, times: Option<Named<'_>>) -> Result<Poses, Failure> {

@@ -13,7 +13,6 @@ use self::outputs::Outputs;
 use self::words::{check_requested, check_topics, no_estimates, recording, sentences};
 use crate::recording::{Recorded, failure};
 use crate::site_input::{Failure, Outcome, answer, print_json, progress, site, task, warn};
-use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::set::CrossTerms;
 use posegate::table::Table;
@@ -60,7 +59,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         table: &table,
         settings: &settings,
         success: &chosen.success,
-        bounded: arguments.bounded(),
+        bounded: arguments.set.bounded(),
         world: &arguments.recorded.frame,
         clock: arguments.clock(input.clock),
         examined: !arguments.fast,
@@ -246,22 +245,8 @@ fn table(
         }
         return Ok(bytes);
     }
-    let spec = site.chosen_table(task).ok_or_else(|| {
-        Failure::usage(
-            format!("{}: no extent can be chosen for the task `{}`", arguments.site.display(), arguments.task),
-            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
-        )
-    })?;
-    let order = BakeInput {
-        task: &arguments.task,
-        success: &task.success,
-        spec,
-        epsilon: arguments.epsilon.unwrap_or(site.epsilon),
-    };
-    let built = posegate::verify::build(&order, &|| {});
-    let (bytes, _) =
-        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
-    Ok(bytes)
+    let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
+    crate::table::built(site, &arguments.site, &arguments.task, epsilon)
 }
 
 fn play_failure(error: PlayError<Failure>) -> Failure {

@@ -292,7 +292,7 @@ fn print_extent(spec: &TableSpec, table: &Table<'_>) -> Result<(), Failure> {
 }
 
 /// Returns what the table of a task covers.
-pub fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<TableSpec, Failure> {
+fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<TableSpec, Failure> {
     site.chosen_table(task).ok_or_else(|| {
         Failure::usage(
             format!(
@@ -302,6 +302,20 @@ pub fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<Table
             "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
         )
     })
+}
+
+/// Builds and proves the table of a task; `input` is the site's name in messages.
+pub fn built(site: &Site, input: &Input, name: &str, epsilon: f64) -> Result<Vec<u8>, Failure> {
+    let task = task(site, name)?;
+    let order = BakeInput {
+        task: name,
+        success: &task.success,
+        spec: spec(site, task, input, name)?,
+        epsilon,
+    };
+    let built = build_table(&order, &|| ());
+    let (bytes, _) = built.map_err(|error| Failure::build(input, name, error))?;
+    Ok(bytes)
 }
 
 fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure> {
