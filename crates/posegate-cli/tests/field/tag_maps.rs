@@ -1,6 +1,6 @@
 //! Maps of tags: field layouts of any year, and Limelight's.
 
-use crate::run::Case;
+use posegate_testkit::run::Case;
 use serde_json::{Value, json};
 
 fn layout(tags: &str, field: &str) -> String {

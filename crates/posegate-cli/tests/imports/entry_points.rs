@@ -2,57 +2,22 @@
 
 use super::{OFFSET, TURN, bundle_file, field_file};
 use posegate_site::Site;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use posegate_testkit::run::Case;
 
-struct Folder(tempfile::TempDir);
+fn folder() -> Case {
+    Case::new(&[
+        ("field.json", field_file(OFFSET, TURN).as_bytes()),
+        ("tags.yaml", bundle_file(OFFSET, TURN, 0.2).as_bytes()),
+        ("docks.yaml", DOCKS.as_bytes()),
+    ])
+}
 
-impl Folder {
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        folder.write("field.json", &field_file(OFFSET, TURN));
-        folder.write("tags.yaml", &bundle_file(OFFSET, TURN, 0.2));
-        folder.write("docks.yaml", DOCKS);
-        folder
-    }
-
-    fn path(&self) -> &Path {
-        self.0.path()
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path().join(name), text).unwrap();
-    }
-
-    fn site(&self, text: &str) -> Site {
-        self.write("site.toml", text);
-        match Site::read(self.path().join("site.toml")) {
-            Ok(site) => site,
-            Err(error) => panic!("{error}\n{text}"),
-        }
-    }
-
-    fn run(&self, line: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args(line.split_whitespace())
-            .current_dir(self.path())
-            .stdin(Stdio::null())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs a line and expects an exit code. Returns stdout, and the words of stderr.
-    fn expect(&self, code: i32, line: &str) -> (String, String) {
-        let output = self.run(line);
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
-        let words: Vec<&str> = err.split_whitespace().filter(|word| *word != "│").collect();
-        (out, words.join(" "))
-    }
-
-    fn names(&self) -> usize {
-        std::fs::read_dir(self.path()).unwrap().count()
+/// Reads the text as the site file of a folder.
+fn site(folder: &Case, text: &str) -> Site {
+    folder.write("site.toml", text);
+    match Site::read(folder.path().join("site.toml")) {
+        Ok(site) => site,
+        Err(error) => panic!("{error}\n{text}"),
     }
 }
 
@@ -82,8 +47,8 @@ const IMPORTS: [(&str, &str); 3] = [
 #[test]
 fn printed_tables_equal_the_import() {
     for (arguments, table) in IMPORTS {
-        let folder = Folder::new();
-        let direct = folder.site(&format!("[import.a]\n{table}"));
+        let folder = folder();
+        let direct = site(&folder, &format!("[import.a]\n{table}"));
         assert_eq!(
             direct.tags.len() + direct.goals.len(),
             if table.contains("docks") { 2 } else { 1 }
@@ -92,13 +57,13 @@ fn printed_tables_equal_the_import() {
         let (printed, _) = folder.expect(0, &format!("import {arguments}"));
         let (message, _) = folder.expect(0, &format!("import {arguments} -o out.toml"));
         assert!(message.starts_with("wrote out.toml"), "{message}");
-        assert_eq!(
-            printed,
-            std::fs::read_to_string(folder.path().join("out.toml")).unwrap()
-        );
+        assert_eq!(printed, folder.text("out.toml"));
 
-        let named = folder.site("[import.a]\nfile = 'out.toml'\nformat = 'posegate'\n");
-        let pasted = folder.site(&printed);
+        let named = site(
+            &folder,
+            "[import.a]\nfile = 'out.toml'\nformat = 'posegate'\n",
+        );
+        let pasted = site(&folder, &printed);
         for site in [&named, &pasted] {
             assert_eq!(
                 (&site.tags, &site.goals),
@@ -107,8 +72,7 @@ fn printed_tables_equal_the_import() {
             );
         }
 
-        let (out, _) = folder.expect(0, &format!("import {arguments} --json"));
-        let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let json = folder.json(0, &format!("import {arguments} --json"));
         for (name, tag) in &direct.tags {
             let printed_tag = &json["tags"][0];
             assert_eq!(
@@ -132,16 +96,16 @@ fn printed_tables_equal_the_import() {
 /// after any change of the imported file, even of a space.
 #[test]
 fn table_of_imported_tags_covers_the_imported_files() {
-    let folder = Folder::new();
+    let folder = folder();
     let c = std::f64::consts::FRAC_1_SQRT_2;
     folder.write(
         "wall.json",
-        &field_file([4.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]),
+        field_file([4.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]),
     );
     // The lower left corner of the map is at (1, 2), its x axis is the world's y axis.
     folder.write(
         "turned.json",
-        &field_file([-2.0, -3.0, 0.5], [c, 0.0, 0.0, c]),
+        field_file([-2.0, -3.0, 0.5], [c, 0.0, 0.0, c]),
     );
     folder.write(
         "docks.yaml",
@@ -167,12 +131,12 @@ fn table_of_imported_tags_covers_the_imported_files() {
             "pose = { x = 1, y = 2, z = 0, roll_deg = 0, pitch_deg = 0, yaw_deg = 90 }",
         ),
     ] {
-        let site = folder.site(&imported(file, pose));
+        let site = site(&folder, &imported(file, pose));
         assert_eq!(site.tasks, wanted.tasks, "{file}");
         assert_ne!(site.digest, wanted.digest);
     }
 
-    folder.write("site.toml", &imported("wall.json", ""));
+    folder.write("site.toml", imported("wall.json", ""));
     folder.expect(0, "check site.toml");
     folder.expect(0, "table build site.toml --task see-t7 -o see.posegate");
     folder.expect(0, "table verify see.posegate site.toml");
@@ -194,7 +158,7 @@ fn table_of_imported_tags_covers_the_imported_files() {
             1,
         ),
     ] {
-        let before = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let before = folder.text(file);
         folder.write(file, text);
         let (out, _) = folder.expect(code, "table verify see.posegate site.toml");
         assert_eq!(out.contains("NOT proven"), code == 1, "{file}: {out}");
@@ -206,10 +170,10 @@ fn table_of_imported_tags_covers_the_imported_files() {
 /// The imports shown in the page of the host and in the sample are valid.
 #[test]
 fn documented_imports_are_valid() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.write(
         "tags.yaml",
-        &bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
+        bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
     );
     let lines = posegate_site::SAMPLE.lines();
     let sample: Vec<&str> = lines.filter_map(|line| line.strip_prefix("#   ")).collect();
@@ -221,7 +185,7 @@ fn documented_imports_are_valid() {
         .filter_map(|rest| rest.split("```").next());
     let shown = blocks.find(|block| block.contains("[import.")).unwrap();
     for text in [sample.join("\n").as_str(), shown] {
-        assert_eq!(folder.site(text).tags.len(), 1, "{text}");
+        assert_eq!(site(&folder, text).tags.len(), 1, "{text}");
     }
 }
 
@@ -336,21 +300,17 @@ fn bad_input_is_refused_by_site_files_and_the_command() {
         ),
     ];
     for ((arguments, table), file, from, to, place, expected) in rows {
-        let folder = Folder::new();
-        let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let folder = folder();
+        let text = folder.text(file);
         assert!(text.contains(from), "{from}");
-        folder.write(file, &text.replacen(from, to, 1));
-        folder.write("site.toml", &format!("[import.a]\n{table}"));
+        folder.write(file, text.replacen(from, to, 1));
+        folder.write("site.toml", format!("[import.a]\n{table}"));
         let before = folder.names();
         for line in [
             format!("import {arguments} -o out.toml"),
             "check site.toml".into(),
         ] {
-            let (_, err) = folder.expect(2, &line);
-            assert!(
-                err.contains(place) && err.contains(expected),
-                "{line}, {to}: {err}"
-            );
+            folder.run(&line).is_refused_with(&[place, expected]);
         }
         assert_eq!(folder.names(), before);
     }
@@ -401,12 +361,12 @@ fn bad_input_is_refused_by_site_files_and_the_command() {
         ),
     ];
     for (arguments, from, to, expected) in settings {
-        let folder = Folder::new();
+        let folder = folder();
         let before = folder.names();
         assert!(arguments.contains(from), "{from}");
         let arguments = arguments.replacen(from, to, 1);
-        let (_, err) = folder.expect(2, &format!("import {arguments} -o out.toml"));
-        assert!(err.contains(expected), "{arguments}: {err}");
+        let line = format!("import {arguments} -o out.toml");
+        folder.run(&line).is_refused_with(&[expected]);
         assert_eq!(folder.names(), before);
     }
 }

@@ -1,32 +1,16 @@
 //! The command line: `learn` and `predict`.
 
 use crate::distribution::{Random, SQUARES};
-use serde_json::Value;
+pub use posegate_testkit::run::lines;
 use std::fmt::Write;
-use std::process::Command;
 
 pub fn run(folder: &tempfile::TempDir, line: &str) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(line.split_whitespace())
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (
-        output.status.code().unwrap(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
+    let ended = posegate_testkit::run::run(folder.path(), line);
+    (ended.code, ended.out, ended.err)
 }
 
 pub fn write(folder: &tempfile::TempDir, name: &str, text: &str) {
     std::fs::write(folder.path().join(name), text).unwrap();
-}
-
-pub fn lines(text: &str) -> Vec<Value> {
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
 }
 
 #[test]

@@ -54,8 +54,7 @@ fn killed_shard_loses_no_finished_piece() {
     let damaged = std::fs::read(&pieces[0]).unwrap();
     std::fs::write(&pieces[0], &damaged[..damaged.len() - 1]).unwrap();
     flip(&pieces[1]);
-    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let built = folder.json(0, "site build site.toml --resume --json -o out");
     assert_eq!(built["pieces"], 18);
     let kept = built["kept"].as_u64().unwrap() as usize;
     assert!(kept >= finished - 2 && kept < 18, "{kept} of {finished}");
@@ -72,8 +71,7 @@ fn killed_shard_loses_no_finished_piece() {
     assert!(drafts.contains(&".posegate-1-2.tmp"), "{drafts:?}");
     assert!(!drafts.contains(&".posegate-1-1.tmp"), "{drafts:?}");
     // The second run has nothing to build.
-    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let built = folder.json(0, "site build site.toml --resume --json -o out");
     assert_eq!(built["kept"], 18);
 }
 

@@ -104,8 +104,7 @@ fn mismatched_table_and_proof_are_neither_kept_nor_merged() {
         let mut kept = 0;
         for shard in 0..2 {
             let line = format!("site build site.toml --shard {shard}/2 --resume --json -o {copy}");
-            let (out, _) = folder.expect(0, &line);
-            let built: Value = serde_json::from_str(&out).unwrap();
+            let built = folder.json(0, &line);
             kept += built["kept"].as_u64().unwrap();
         }
         assert_eq!(kept, 4, "{how}");
@@ -121,8 +120,7 @@ fn proving_merge_finds_a_forgery_with_a_matching_proof_file() {
     folder.copied("out", "honest");
     folder.expect(0, "site merge honest");
     let honest = folder.results("honest");
-    let (out, _) = folder.expect(0, "site merge honest --site site.toml --prove --json");
-    let merged: Value = serde_json::from_str(&out).unwrap();
+    let merged = folder.json(0, "site merge honest --site site.toml --prove --json");
     assert_eq!(
         (&merged["tables"], &merged["proven_again"]),
         (&json!(5), &json!(true))

@@ -104,8 +104,7 @@ fn changed_record_or_inventory_is_refused() {
 fn shards_of_different_builds_are_refused() {
     let folder = two_shards();
     let digest = |site: &str| {
-        let (out, _) = folder.expect(0, &format!("site build {site} --json -o digest"));
-        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let built = folder.json(0, &format!("site build {site} --json -o digest"));
         built["site_digest"].as_str().unwrap().to_owned()
     };
     // The site changed between the shards.
