@@ -1,6 +1,7 @@
 //! Parses the arguments of all subcommands, and declares the files that they name.
 
 use crate::failure::Failure;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, ValueHint};
 use posegate_files::files::{self, FileError, Files, Input, NamedInput, Output, OutputFolder};
 use posegate_files::printable::printable_lines;
@@ -127,6 +128,17 @@ fn declare(files: &Files, command: &Command, matches: &ArgMatches) -> Result<(),
         }
     }
     Ok(())
+}
+
+/// Returns a parser that takes one of some names, each with its value.
+pub fn choice<T: Clone + Send + Sync + 'static, const N: usize>(
+    all: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = all.each_ref().map(|(name, _)| *name);
+    PossibleValuesParser::new(names).try_map(move |name| {
+        let known = all.iter().find(|(known, _)| *known == name);
+        known.map(|(_, value)| value.clone()).ok_or(name)
+    })
 }
 
 /// Parses numbers with commas between them. `None` if there are more or fewer, or if one is not accepted.

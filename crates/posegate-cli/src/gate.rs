@@ -175,27 +175,16 @@ struct Decided {
 }
 
 /// Returns the first denial of a report's hypotheses, else the permit of least margin.
-fn judge(rows: &[Row], mut verdict: impl FnMut(&Row) -> Verdict) -> Decided {
-    let mut least: Option<Decided> = None;
-    for row in rows {
-        let decided = Decided {
-            verdict: verdict(row),
-            hypothesis: row.hypothesis,
-        };
-        let Verdict::Permit { margin } = decided.verdict else {
-            return decided;
-        };
-        let is_less = match &least {
-            Some(Decided {
-                verdict: Verdict::Permit { margin: least },
-                ..
-            }) => margin < *least,
-            _ => true,
-        };
-        if is_less {
-            least = Some(decided);
-        }
-    }
+fn judge(rows: &[Row], verdict: impl Fn(&Row) -> Verdict) -> Decided {
+    let decided = rows.iter().map(|row| Decided {
+        verdict: verdict(row),
+        hypothesis: row.hypothesis,
+    });
+    // `None` is less than any margin, and the first of equal ones is taken.
+    let least = decided.min_by_key(|decided| match decided.verdict {
+        Verdict::Permit { margin } => Some(margin.q16()),
+        Verdict::Deny { .. } => None,
+    });
     // Reports are never empty.
     least.unwrap_or(Decided {
         verdict: Verdict::deny(Reason::CovarianceUnknown),

@@ -21,7 +21,8 @@ use posegate_replay::recording::TagLocalizer;
 use posegate_replay::replay::{PlayError, Replay, ReplayConfig, play};
 use posegate_show::draw::replay_picture;
 use posegate_site::{Site, Task};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     check_outputs(arguments)?;
@@ -193,11 +194,8 @@ fn summary(
     if let Some(looks) = &input.part.looks
         && has_detections(input)
     {
-        let counts = looks.counts().into_iter();
-        let counts: Map<String, Value> = counts
-            .map(|(name, count)| (name.into(), json!(count)))
-            .collect();
-        summary["looks"] = Value::Object(counts);
+        let counts: BTreeMap<_, _> = looks.counts().into_iter().collect();
+        summary["looks"] = json!(counts);
         summary["looks"]["frame"] = json!(looks.frame());
     }
     summary

@@ -1,6 +1,6 @@
 //! The arguments of `posegate replay`.
 
-use crate::arguments::numbers;
+use crate::arguments::{choice, numbers};
 use crate::belief::SetArgs;
 use crate::gate::motion;
 use crate::recording::{Options, Reading};
@@ -48,8 +48,8 @@ pub struct Arguments {
     #[arg(long, value_name = "MODEL", conflicts_with = "inflation")]
     pub inflation_model: Option<Input>,
     /// Which terms of their covariance the sources fill (AMCL: yaw-unknown)
-    #[arg(long, value_enum, default_value = "filled")]
-    pub cross_terms: Terms,
+    #[arg(long, value_parser = choice(TERMS), default_value = "filled")]
+    pub cross_terms: CrossTerms,
     #[command(flatten)]
     pub set: SetArgs,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
@@ -128,12 +128,11 @@ pub struct Arguments {
     pub mcap: Option<Output>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Terms {
-    Filled,
-    YawUnknown,
-    AllUnknown,
-}
+const TERMS: [(&str, CrossTerms); 3] = [
+    ("filled", CrossTerms::Filled),
+    ("yaw-unknown", CrossTerms::YawUnknown(SplitWeight::HALF)),
+    ("all-unknown", CrossTerms::AllUnknown(SplitWeight::HALF)),
+];
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum ClockName {
@@ -143,15 +142,6 @@ pub enum ClockName {
 }
 
 impl Arguments {
-    /// Returns which terms of the covariance the sources fill.
-    pub fn terms(&self) -> CrossTerms {
-        match self.cross_terms {
-            Terms::Filled => CrossTerms::Filled,
-            Terms::YawUnknown => CrossTerms::YawUnknown(SplitWeight::HALF),
-            Terms::AllUnknown => CrossTerms::AllUnknown(SplitWeight::HALF),
-        }
-    }
-
     /// Returns the deviations of the odometry.
     pub fn odom_noise(&self) -> Result<[f64; 3], Failure> {
         numbers(&self.odom_noise, |_| true).ok_or_else(|| {
@@ -166,7 +156,7 @@ impl Arguments {
     pub fn trust(&self, inflation: Inflation) -> Trust {
         Trust {
             inflation,
-            cross_terms: self.terms(),
+            cross_terms: self.cross_terms,
         }
     }
 
@@ -180,7 +170,7 @@ impl Arguments {
             camera: self.camera.as_deref(),
             site,
             is_gaussian,
-            is_partial: is_gaussian && self.cross_terms != Terms::Filled,
+            is_partial: is_gaussian && self.cross_terms != CrossTerms::Filled,
             most_true: MOST_TRUE,
         }
     }
