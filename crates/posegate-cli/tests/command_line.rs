@@ -2,7 +2,7 @@
 
 use posegate_site::SAMPLE;
 use posegate_testkit::commands::elf;
-use posegate_testkit::run::{Case, command};
+use posegate_testkit::run::{Case, cases, command};
 use serde_json::{Value, json};
 use std::process::{Command, Stdio};
 
@@ -179,11 +179,11 @@ fn epsilon_option_changes_the_verdict() {
     folder.expect(0, "gate dock.posegate --estimates e.csv");
     folder.expect(1, "gate dock.posegate --estimates e.csv --epsilon 0.9999");
     for epsilon in ["0", "1", "-1", "nan", "inf", "1e-9", "2"] {
-        let (_, err) = folder.expect(
-            2,
-            &format!("gate dock.posegate --estimates e.csv --epsilon={epsilon}"),
-        );
-        assert!(err.contains("epsilon"), "{err}");
+        folder
+            .run(&format!(
+                "gate dock.posegate --estimates e.csv --epsilon={epsilon}"
+            ))
+            .is_refused_with(&["epsilon"]);
     }
     for age in ["0", "2147483648"] {
         folder.expect(
@@ -224,29 +224,20 @@ fn changed(from: &str, to: &str) -> String {
 /// Each bad site file is named with its line and column, exits with 2, and leaves nothing behind.
 #[test]
 fn bad_site_is_reported_with_line_and_column() {
-    let changes = [
-        ("fx = 615.0", "fx = 0.0", "above 0"),
-        ("fx = 615.0", "fx = \"615\"", "is a string"),
-        ("fx = 615.0", "fx = nan", "fx"),
-        ("fx = 615.0", "focal = 615.0", "unknown key"),
-        ("yaw_deg = 180.0", "yaw = 3.14", "yaw_deg"),
-        ("shape = \"box\"", "shape = \"circle\"", "circle"),
-        ("kind = \"work\"", "kind = \"wrok\"", "wrok"),
-        ("tag = \"t7\"", "tag = \"t8\"", "t8"),
-        ("epsilon = 0.99", "epsilon = 1.0", "epsilon"),
-        ("x = [-0.08, 0.08]", "x = [0.08, -0.08]", "0.08"),
-        (
-            "[[2.25, 0.75], [-2.25, 0.75], [-2.25, -0.75], [2.25, -0.75]]",
-            "[[2.25, 0.75], [2.25, -0.75], [-2.25, -0.75], [-2.25, 0.75]]",
-            "clockwise",
-        ),
-        (
-            "[[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]]",
-            "[[2.5, 1.5], [0.0, -0.1], [-2.5, -1.5], [2.5, -1.5]]",
-            "convex",
-        ),
-    ];
-    for (from, to, fragment) in changes {
+    let changes = "
+        fx = 615.0 => fx = 0.0 => above 0
+        fx = 615.0 => fx = \"615\" => is a string
+        fx = 615.0 => fx = nan => fx
+        fx = 615.0 => focal = 615.0 => unknown key
+        yaw_deg = 180.0 => yaw = 3.14 => yaw_deg
+        shape = \"box\" => shape = \"circle\" => circle
+        kind = \"work\" => kind = \"wrok\" => wrok
+        tag = \"t7\" => tag = \"t8\" => t8
+        epsilon = 0.99 => epsilon = 1.0 => epsilon
+        x = [-0.08, 0.08] => x = [0.08, -0.08] => 0.08
+        [[2.25, 0.75], [-2.25, 0.75], [-2.25, -0.75], [2.25, -0.75]] => [[2.25, 0.75], [2.25, -0.75], [-2.25, -0.75], [-2.25, 0.75]] => clockwise
+        [[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]] => [[2.5, 1.5], [0.0, -0.1], [-2.5, -1.5], [2.5, -1.5]] => convex";
+    for [from, to, fragment] in cases(changes) {
         let folder = sample();
         let text = changed(from, to);
         folder.write("bad.toml", &text);
@@ -326,8 +317,9 @@ fn bad_tables_and_recordings_are_refused() {
         ),
     ] {
         folder.write("bad.csv", &text);
-        let (_, err) = folder.expect(2, "gate dock.posegate --estimates bad.csv");
-        assert!(err.contains("bad.csv") && err.contains(fragment), "{err}");
+        folder
+            .run("gate dock.posegate --estimates bad.csv")
+            .is_refused_with(&["bad.csv", fragment]);
     }
     folder.expect(2, "gate dock.posegate --estimates missing.csv");
     // An unclosed quote hides no row.
@@ -365,14 +357,13 @@ fn failed_command_writes_no_file() {
         "wide.toml",
         SAMPLE.replace("x = 4.0, y = 0.0, z = 0.5", "x = 200.0, y = 0.0, z = 0.5"),
     );
-    let (_, err) = folder.expect(
-        2,
-        "table build wide.toml --task see-t7 -o out.posegate --layout facets",
-    );
-    assert!(err.contains("facets"), "{err}");
+    folder
+        .run("table build wide.toml --task see-t7 -o out.posegate --layout facets")
+        .is_refused_with(&["facets"]);
     folder.write("large.toml", SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
-    let (_, err) = folder.expect(2, "table build large.toml --task dock -o out.posegate");
-    assert!(err.contains("400000") && err.contains("65535"), "{err}");
+    folder
+        .run("table build large.toml --task dock -o out.posegate")
+        .is_refused_with(&["400000", "65535"]);
     assert_eq!(folder.names(), ["large.toml", "site.toml", "wide.toml"]);
     folder.expect(2, "init site.toml");
     assert_eq!(folder.text("site.toml"), SAMPLE);
@@ -410,11 +401,9 @@ fn links_and_pipes_are_kept_as_outputs() {
     assert!(is_pipe && output.status.success(), "{output:?}");
     assert_eq!(reader.wait_with_output().unwrap().stdout, table);
     std::os::unix::fs::symlink("nowhere.posegate", path("astray")).unwrap();
-    let (_, err) = folder.expect(2, "table build site.toml --task dock -o astray");
-    assert!(
-        err.contains("a link to a file that does not exist"),
-        "{err}"
-    );
+    folder
+        .run("table build site.toml --task dock -o astray")
+        .is_refused_with(&["a link to a file that does not exist"]);
     std::fs::remove_file(path("astray")).unwrap();
     assert_eq!(
         folder.names(),
@@ -519,10 +508,12 @@ fn every_subcommand_has_help_with_an_example() {
     }
     folder.expect(2, "");
     folder.expect(2, "nonsense");
-    let (_, err) = folder.expect(2, "explain nonsense");
-    assert!(err.contains("the reasons are"), "{err}");
-    let (_, err) = folder.expect(2, "explain not_contaned");
-    assert!(err.contains("did you mean `not_contained`?"), "{err}");
+    folder
+        .run("explain nonsense")
+        .is_refused_with(&["the reasons are"]);
+    folder
+        .run("explain not_contaned")
+        .is_refused_with(&["did you mean `not_contained`?"]);
     let (out, _) = folder.expect(0, "explain");
     for reason in posegate::gate::Reason::ALL {
         assert!(out.contains(reason.name()) && out.contains(reason.action()));
@@ -604,21 +595,17 @@ fn valid_site_with_unusual_numbers_is_built() {
         );
     }
     // Sites that cannot be built are refused by `check`, with the task.
-    for (from, to, fragment) in [
-        (
-            "x = 0.0, y = 0.0, yaw_deg = 0.0 }",
-            "x = 5000.0, y = 0.0, yaw_deg = 0.0 }",
-            "2000 m",
-        ),
-        ("epsilon = 0.99", "epsilon = 0.001", "0.001"),
-        ("step = { xy = 0.02", "step = { xy = 0.0001", "40000 rows"),
-    ] {
+    for [from, to, fragment] in cases(
+        "
+        x = 0.0, y = 0.0, yaw_deg = 0.0 } => x = 5000.0, y = 0.0, yaw_deg = 0.0 } => 2000 m
+        epsilon = 0.99 => epsilon = 0.001 => 0.001
+        step = { xy = 0.02 => step = { xy = 0.0001 => 40000 rows
+        ",
+    ) {
         folder.write("bad.toml", changed(from, to));
-        let (_, err) = folder.expect(2, "check bad.toml");
-        assert!(
-            err.contains("bad.toml: task `") && err.contains(fragment),
-            "{err}"
-        );
+        folder
+            .run("check bad.toml")
+            .is_refused_with(&["bad.toml: task `", fragment]);
     }
     folder.expect(2, "table build site.toml --task dock -o - --json");
     folder.expect(2, "table build site.toml --task dock -o t --threads 0");
@@ -653,8 +640,9 @@ fn firmware_is_sealed_or_left_unchanged() {
     ] {
         let before = std::fs::read(path(name)).ok();
         let names = folder.names();
-        let (_, err) = folder.expect(2, &format!("table seal {name}"));
-        assert!(err.contains(expected) && err.contains("help"), "{err}");
+        folder
+            .run(&format!("table seal {name}"))
+            .is_refused_with(&[expected, "help"]);
         assert_eq!(std::fs::read(path(name)).ok(), before);
         assert_eq!(folder.names(), names);
     }
@@ -687,21 +675,14 @@ fn exact_pose_costs_as_much_as_its_goal() {
         }
         assert_eq!(report.as_object().unwrap().len(), 10, "{report}");
     }
-    for (line, fragment) in [
-        (
-            "--sigma-x 0.1 --sigma-y 0 --sigma-yaw-deg 1",
-            "sigma_y is 0",
-        ),
-        ("--covariance-file flat.csv", "not positive definite"),
-        (
-            "--covariance-file zero.csv --sigma-x 0",
-            "cannot be used with",
-        ),
-        (
-            "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0 --c2 inf",
-            "c2 is inf",
-        ),
-    ] {
+    for [line, fragment] in cases(
+        "
+        --sigma-x 0.1 --sigma-y 0 --sigma-yaw-deg 1 => sigma_y is 0
+        --covariance-file flat.csv => not positive definite
+        --covariance-file zero.csv --sigma-x 0 => cannot be used with
+        --sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0 --c2 inf => c2 is inf
+        ",
+    ) {
         let ended = folder.run(&format!("{see} {line}"));
         ended.is_refused_with(&[fragment]);
         assert!(!ended.err.contains("posegate place"), "{}", ended.err);
@@ -731,54 +712,31 @@ fn invalid_input_of_cost_is_refused() {
     folder.write("p.csv", "0.09,0,0\n0,0.09,0\n0,0,0.0003\n");
     folder.expect(0, "cost site.toml --task see-t7 --covariance-file p.csv");
     let see = "cost site.toml --task see-t7";
-    for (line, fragment) in [
-        (
-            format!("cost site.toml --task dock {sigmas}"),
-            "task `dock`",
-        ),
-        (
-            format!("cost site.toml --task dock {sigmas}"),
-            "no view of a tag",
-        ),
-        (format!("cost site.toml --task see-t8 {sigmas}"), "see-t7"),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y 0.3"),
-            "--sigma-yaw-deg",
-        ),
-        (see.to_string(), "--covariance-file"),
-        (
-            format!("{see} {sigmas} --covariance-file p.csv"),
-            "cannot be used with",
-        ),
-        (
-            format!("{see} --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1"),
-            "sigma_x is 0",
-        ),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1"),
-            "sigma_y is -0.3",
-        ),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan"),
-            "sigma_yaw is NaN",
-        ),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5"),
-            "turns",
-        ),
-        (format!("{see} {sigmas} --epsilon 0"), "epsilon is 0"),
-        (format!("{see} {sigmas} --epsilon 1"), "epsilon is 1"),
-        (format!("{see} {sigmas} --epsilon -0.5"), "epsilon is -0.5"),
-        (format!("{see} {sigmas} --epsilon nan"), "epsilon is NaN"),
-        (format!("{see} {sigmas} --c-high -1"), "c_high is -1"),
-        (format!("{see} {sigmas} --c2 inf"), "c2 is inf"),
-        (format!("{see} {sigmas} --accuracy 0"), "accuracy is 0"),
-        (
-            format!("{see} --covariance-file missing.csv"),
-            "missing.csv",
-        ),
-    ] {
-        folder.run(&line).is_refused_with(&[fragment]);
+    for [line, fragment] in cases(
+        "
+        dock SIGMAS => task `dock`
+        dock SIGMAS => no view of a tag
+        see-t8 SIGMAS => see-t7
+        see-t7 --sigma-x 0.3 --sigma-y 0.3 => --sigma-yaw-deg
+        see-t7 => --covariance-file
+        see-t7 SIGMAS --covariance-file p.csv => cannot be used with
+        see-t7 --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1 => sigma_x is 0
+        see-t7 --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1 => sigma_y is -0.3
+        see-t7 --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan => sigma_yaw is NaN
+        see-t7 --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5 => turns
+        see-t7 SIGMAS --epsilon 0 => epsilon is 0
+        see-t7 SIGMAS --epsilon 1 => epsilon is 1
+        see-t7 SIGMAS --epsilon -0.5 => epsilon is -0.5
+        see-t7 SIGMAS --epsilon nan => epsilon is NaN
+        see-t7 SIGMAS --c-high -1 => c_high is -1
+        see-t7 SIGMAS --c2 inf => c2 is inf
+        see-t7 SIGMAS --accuracy 0 => accuracy is 0
+        see-t7 --covariance-file missing.csv => missing.csv
+        ",
+    ) {
+        let line = line.replace("SIGMAS", sigmas);
+        let ended = folder.run(&format!("cost site.toml --task {line}"));
+        ended.is_refused_with(&[fragment]);
     }
     for (text, fragment) in [
         ("0.09,0,0\n0,0.09,0\n", "p.csv:2: 2 rows"),
@@ -902,18 +860,17 @@ fn metrics_compares_or_refuses_trajectories() {
 fn earlier_commands_tell_what_to_type() {
     let folder = sample();
     let before = folder.names();
-    for (line, instead) in [
-        ("completions bash", "posegate --completions SHELL"),
-        ("doctor site.toml -o out", "posegate check SITE --draw DIR"),
-        ("family site.toml --tag t7 --r 0.02", "posegate table build"),
-        (
-            "inscribe site.toml --task dock",
-            "posegate contains SITE --task TASK --box",
-        ),
-        ("man -o pages", "posegate --man DIR"),
-        ("seal firmware", "posegate table seal FIRMWARE"),
-        ("seal --help", "posegate table seal FIRMWARE"),
-    ] {
+    for [line, instead] in cases(
+        "
+        completions bash => posegate --completions SHELL
+        doctor site.toml -o out => posegate check SITE --draw DIR
+        family site.toml --tag t7 --r 0.02 => posegate table build
+        inscribe site.toml --task dock => posegate contains SITE --task TASK --box
+        man -o pages => posegate --man DIR
+        seal firmware => posegate table seal FIRMWARE
+        seal --help => posegate table seal FIRMWARE
+        ",
+    ) {
         let ended = folder.run(line);
         ended.is_refused_with(&[instead]);
         assert_eq!(ended.err.lines().count(), 1, "{}", ended.err);
@@ -1083,8 +1040,9 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
         "site.toml",
         format!("{site}\n[controller]\ncore = \"cortex-m4\"\ncycles_per_decision = 9\n"),
     );
-    let (_, err) = folder.expect(2, "check site.toml");
-    assert!(err.contains("cortex-m4f"), "{err}");
+    folder
+        .run("check site.toml")
+        .is_refused_with(&["cortex-m4f"]);
     folder.write(
         "site.toml",
         format!("{site}\n[controller]\ncore = \"cortex-m4f\"\ncycles_per_decision = 0\n"),
@@ -1100,9 +1058,9 @@ fn empty_table_is_refused_with_the_cause() {
     let seen = "yaw_deg = 180.0 }";
     assert!(site.contains(seen));
     folder.write("site.toml", site.replace(seen, "yaw_deg = 0.0 }"));
-    let (_, err) = folder.expect(2, "table build site.toml --task see-t7 -o t.posegate");
-    assert!(err.contains("away from every camera"), "{err}");
-    assert!(!err.contains("make the steps finer"), "{err}");
+    let ended = folder.run("table build site.toml --task see-t7 -o t.posegate");
+    ended.is_refused_with(&["away from every camera"]);
+    assert!(!ended.words().contains("make the steps finer"));
 }
 
 /// `place` prints the pose as the site file has it. A reserve is in metres, and it is also an error of every pose from that tag.
@@ -1124,6 +1082,7 @@ fn place_prints_the_pose_in_site_file_syntax() {
         err.contains("off by the reserve") && err.contains("task see-t7"),
         "{err}"
     );
-    let (_, err) = folder.expect(2, &format!("{place} --reserve 20,1"));
-    assert!(err.contains("20 m is more than 1 m"), "{err}");
+    folder
+        .run(&format!("{place} --reserve 20,1"))
+        .is_refused_with(&["20 m is more than 1 m"]);
 }

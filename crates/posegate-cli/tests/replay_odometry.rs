@@ -1,6 +1,6 @@
 //! `posegate replay --odom FILE`: fixes that come twice a second are carried along an odometry, and a faulty file is refused with its line.
 
-use posegate_testkit::run::{Case, Ended};
+use posegate_testkit::run::{Case, Ended, cases};
 use serde_json::Value;
 
 const SITE: &str = include_str!("../../../examples/sites/dock.toml");
@@ -184,21 +184,14 @@ fn faulty_odometry_is_refused_with_its_line() {
 
 #[test]
 fn odometry_needs_an_existing_file_and_a_speed() {
-    for (arguments, words) in [
-        (
-            "--odom other.csv --max-speed 0.1",
-            "other.csv: there is no such file",
-        ),
-        ("--odom odom.csv", "--max-speed"),
-        (
-            "--odom odom.csv --max-speed 0.1 --odom-noise 0.1,0.1",
-            "--odom-noise 0.1,0.1 is not three numbers",
-        ),
-        (
-            "--odom odom.csv --max-speed 0.1 --odom-slip -1",
-            "--odom-slip",
-        ),
-    ] {
+    for [arguments, words] in cases(
+        "
+        --odom other.csv --max-speed 0.1 => other.csv: there is no such file
+        --odom odom.csv => --max-speed
+        --odom odom.csv --max-speed 0.1 --odom-noise 0.1,0.1 => --odom-noise 0.1,0.1 is not three numbers
+        --odom odom.csv --max-speed 0.1 --odom-slip -1 => --odom-slip
+        ",
+    ) {
         replay(&fixes(), csv(&driven()).as_bytes(), arguments).is_refused_with(&[words]);
     }
 }

@@ -10,7 +10,7 @@ mod merging;
 #[path = "site_build/mixed.rs"]
 mod mixed;
 use posegate_testkit::plant;
-use posegate_testkit::run::{self, Ended};
+use posegate_testkit::run::{self, Ended, cases};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -49,8 +49,8 @@ impl Folder {
         checked(code, line, self.command(line).output().unwrap())
     }
 
-    fn json(&self, code: i32, line: &str) -> Value {
-        Ended::of(&mut self.command(line)).json(code)
+    fn run(&self, line: &str) -> Ended {
+        Ended::of(&mut self.command(line))
     }
 
     /// Finished pieces of a build: names that are keys.
@@ -154,7 +154,7 @@ fn two_shards() -> Folder {
 fn bytes_are_equal_for_any_number_of_shards_and_threads() {
     let folder = Folder::with(&PLANT);
     folder.expect(0, "site build site.toml --threads 1 -o one");
-    let merged = folder.json(0, "site merge one --json");
+    let merged = folder.run("site merge one --json").json(0);
     assert_eq!(
         (&merged["tables"], &merged["plans"]),
         (&8.into(), &4.into())
@@ -376,48 +376,33 @@ fn site_without_tasks_is_refused() {
 #[test]
 fn invalid_usage_is_refused() {
     let folder = Folder::with(&boxes());
-    for (line, expected) in [
-        ("--shard 3/2 -o out", "counted from 0, the last of 2 is 1/2"),
-        ("--shard 0/0 -o out", "one shard at least"),
-        ("--shard half -o out", "`half` is no shard"),
-        (
-            "--shard-index 2 --shard-count 2 -o out",
-            "the last of 2 is 1/2",
-        ),
-        ("--shard-index 1 -o out", "--shard-count"),
-        ("--shard +1/2 -o out", "`+1/2` is no shard"),
-        ("--shard 1/+2 -o out", "`1/+2` is no shard"),
-        (
-            "--shard-index +1 --shard-count 2 -o out",
-            "`+1` is no number of shards",
-        ),
-        (
-            "--shard 0/1000001 -o out",
-            "a site is cut into 1000000 shards at most",
-        ),
-        (
-            "--shard 0/2 --shard-index 1 --shard-count 2 -o out",
-            "--shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX",
-        ),
-        (
-            "--shard 1/2 --shard-index 2 --shard-count 2 -o out",
-            "the last of 2 is 1/2",
-        ),
-        ("--threads 0 -o out", "--threads 0 does no work"),
-        ("--most-risk nan -o out", "not a probability"),
-        (
-            "-o site.toml",
-            "site.toml: is a file, and a folder is needed",
-        ),
-    ] {
-        let (_, err) = folder.expect(2, &format!("site build site.toml {line}"));
-        assert!(err.contains(expected), "{line}: {err}");
+    for [line, expected] in cases(
+        "
+        --shard 3/2 -o out => counted from 0, the last of 2 is 1/2
+        --shard 0/0 -o out => one shard at least
+        --shard half -o out => `half` is no shard
+        --shard-index 2 --shard-count 2 -o out => the last of 2 is 1/2
+        --shard-index 1 -o out => --shard-count
+        --shard +1/2 -o out => `+1/2` is no shard
+        --shard 1/+2 -o out => `1/+2` is no shard
+        --shard-index +1 --shard-count 2 -o out => `+1` is no number of shards
+        --shard 0/1000001 -o out => a site is cut into 1000000 shards at most
+        --shard 0/2 --shard-index 1 --shard-count 2 -o out => --shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX
+        --shard 1/2 --shard-index 2 --shard-count 2 -o out => the last of 2 is 1/2
+        --threads 0 -o out => --threads 0 does no work
+        --most-risk nan -o out => not a probability
+        -o site.toml => site.toml: is a file, and a folder is needed
+        ",
+    ) {
+        folder.run(&format!("site build site.toml {line}")).is_refused_with(&[expected]);
     }
     assert!(!folder.path().join("out").exists());
-    let (_, err) = folder.expect(2, "site merge site.toml");
-    assert!(err.contains("is a file"), "{err}");
-    let (_, err) = folder.expect(2, "site merge out --prove");
-    assert!(err.contains("--site"), "{err}");
+    folder
+        .run("site merge site.toml")
+        .is_refused_with(&["is a file"]);
+    folder
+        .run("site merge out --prove")
+        .is_refused_with(&["--site"]);
     // The same shard by both options.
     folder.expect(
         0,
@@ -426,10 +411,8 @@ fn invalid_usage_is_refused() {
     // A folder with foreign tables is left unchanged.
     std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
     folder.write("own/tables/mine", "1");
-    let (_, err) = folder.expect(2, "site build site.toml -o own");
-    assert!(
-        err.contains("own: there is a `tables` already that is of no site build"),
-        "{err}"
-    );
+    folder
+        .run("site build site.toml -o own")
+        .is_refused_with(&["own: there is a `tables` already that is of no site build"]);
     assert!(folder.path().join("own/tables/mine").exists());
 }

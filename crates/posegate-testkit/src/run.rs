@@ -154,3 +154,12 @@ impl Case {
         self.run(line).json(code)
     }
 }
+
+/// Returns the cells of a table that has a case in each line, and ` => ` between cells.
+pub fn cases<const N: usize>(table: &str) -> impl Iterator<Item = [&str; N]> {
+    let lines = table.lines().map(str::trim_start);
+    lines.filter(|line| !line.is_empty()).map(|line| {
+        let cells: Vec<&str> = line.split(" => ").collect();
+        cells.try_into().unwrap_or_else(|_| panic!("{line}"))
+    })
+}

@@ -1,6 +1,6 @@
 //! Docks of Nav2: databases, and the parameters of the docking server.
 
-use posegate_testkit::run::Case;
+use posegate_testkit::run::{Case, cases};
 use serde_json::{Value, json};
 
 const DATABASE: &str = "docks:\n  a: {type: t, frame: map, pose: [1.0, 2.0, 1.0]}\n";
@@ -176,29 +176,15 @@ fn directions_that_differ_are_refused() {
 
 #[test]
 fn faults_of_parameters_are_named() {
-    for (from, to, words) in [
-        (
-            "docking_threshold: 0.03",
-            "docking_threshold: 0",
-            "docking_threshold is 0",
-        ),
-        ("\"backward\"", "\"back\"", "the dock direction is `back`"),
-        (
-            "pose: [2.0, 1.0, 0.0]",
-            "pose: [2.0, 1.0]",
-            "home.pose has 2 numbers",
-        ),
-        (
-            "docks: [\"home\", \"01\"]",
-            "docks: [\"homes\"]",
-            "`homes.pose` is missing",
-        ),
-        (
-            "docks: [\"home\", \"01\"]",
-            "dock_database: docks.yaml",
-            "no `docks`",
-        ),
-    ] {
+    for [from, to, words] in cases(
+        "
+        docking_threshold: 0.03 => docking_threshold: 0 => docking_threshold is 0
+        \"backward\" => \"back\" => the dock direction is `back`
+        pose: [2.0, 1.0, 0.0] => pose: [2.0, 1.0] => home.pose has 2 numbers
+        docks: [\"home\", \"01\"] => docks: [\"homes\"] => `homes.pose` is missing
+        docks: [\"home\", \"01\"] => dock_database: docks.yaml => no `docks`
+        ",
+    ) {
         let changed = PARAMETERS.replace(from, to);
         assert_ne!(changed, PARAMETERS, "{from}");
         refused(&changed, "", &["d.yaml", words]);

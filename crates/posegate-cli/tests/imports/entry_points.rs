@@ -2,7 +2,7 @@
 
 use super::{OFFSET, TURN, bundle_file, field_file};
 use posegate_site::Site;
-use posegate_testkit::run::Case;
+use posegate_testkit::run::{Case, cases};
 
 fn folder() -> Case {
     Case::new(&[
@@ -192,114 +192,27 @@ fn documented_imports_are_valid() {
 /// Site files and `posegate import` both refuse bad input, with the file, the line and what to do. Nothing is written.
 #[test]
 fn bad_input_is_refused_by_site_files_and_the_command() {
-    let (wpilib, bundle, docks) = (IMPORTS[0], IMPORTS[1], IMPORTS[2]);
-    let rows = [
-        (
-            wpilib,
-            "field.json",
-            "\"W\": 0.8",
-            "\"W\": 0.9",
-            "field.json:1:",
-            "a unit quaternion",
-        ),
-        (
-            wpilib,
-            "field.json",
-            "\"x\": 0.35",
-            "\"x\": NaN",
-            "field.json:1:",
-            "JSON has no NaN",
-        ),
-        (
-            wpilib,
-            "field.json",
-            "}]}",
-            "}]",
-            "field.json:",
-            "not valid JSON",
-        ),
-        (
-            wpilib,
-            "field.json",
-            "}]}",
-            "}, {\"ID\": 7, \"pose\": {\"translation\": {\"x\": 0, \"y\": 0, \"z\": 0}, \"rotation\": {\"quaternion\": {\"W\": 1, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]}",
-            "field.json:1:",
-            "tag 7 is there twice",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "qw: 0.8",
-            "qw: 0.1",
-            "tags.yaml:4:",
-            "the quaternion of tag 7",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "  - {",
-            "\t- {",
-            "tags.yaml:4:1",
-            "indented by a tab",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "x: 0.35",
-            "x: .nan",
-            "tags.yaml:4:",
-            "x of tag 7 is NaN",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "size: 0.2, ",
-            "",
-            "tags.yaml:4:",
-            "`size` is missing",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "size: 0.2",
-            "size: 200",
-            "tags.yaml:4:",
-            "165 mm are 0.165",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "name: b",
-            "name: c",
-            "tags.yaml:1:1",
-            "no bundle and no tag `b`",
-        ),
-        (
-            docks,
-            "docks.yaml",
-            "frame: map",
-            "frame: odom",
-            "docks.yaml:2:",
-            "in the frame `odom`",
-        ),
-        (
-            docks,
-            "docks.yaml",
-            ", 1.5]",
-            ", 90]",
-            "docks.yaml:2:",
-            "90 degrees are 1.5708",
-        ),
-        (
-            docks,
-            "docks.yaml",
-            ", 1.5]",
-            "]",
-            "docks.yaml:2:",
-            "has 2 numbers",
-        ),
-    ];
-    for ((arguments, table), file, from, to, place, expected) in rows {
+    let of = |format: &str| match format {
+        "wpilib" => IMPORTS[0],
+        "bundle" => IMPORTS[1],
+        _ => IMPORTS[2],
+    };
+    let rows = "
+        wpilib => field.json => \"W\": 0.8 => \"W\": 0.9 => field.json:1: => a unit quaternion
+        wpilib => field.json => \"x\": 0.35 => \"x\": NaN => field.json:1: => JSON has no NaN
+        wpilib => field.json => }]} => }] => field.json: => not valid JSON
+        wpilib => field.json => }]} => }, {\"ID\": 7, \"pose\": {\"translation\": {\"x\": 0, \"y\": 0, \"z\": 0}, \"rotation\": {\"quaternion\": {\"W\": 1, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]} => field.json:1: => tag 7 is there twice
+        bundle => tags.yaml => qw: 0.8 => qw: 0.1 => tags.yaml:4: => the quaternion of tag 7
+        bundle => tags.yaml =>   - { => \t- { => tags.yaml:4:1 => indented by a tab
+        bundle => tags.yaml => x: 0.35 => x: .nan => tags.yaml:4: => x of tag 7 is NaN
+        bundle => tags.yaml => size: 0.2,  =>  => tags.yaml:4: => `size` is missing
+        bundle => tags.yaml => size: 0.2 => size: 200 => tags.yaml:4: => 165 mm are 0.165
+        bundle => tags.yaml => name: b => name: c => tags.yaml:1:1 => no bundle and no tag `b`
+        docks => docks.yaml => frame: map => frame: odom => docks.yaml:2: => in the frame `odom`
+        docks => docks.yaml => , 1.5] => , 90] => docks.yaml:2: => 90 degrees are 1.5708
+        docks => docks.yaml => , 1.5] => ] => docks.yaml:2: => has 2 numbers";
+    for [format, file, from, to, place, expected] in cases(rows) {
+        let (arguments, table) = of(format);
         let folder = folder();
         let text = folder.text(file);
         assert!(text.contains(from), "{from}");
@@ -314,53 +227,23 @@ fn bad_input_is_refused_by_site_files_and_the_command() {
         }
         assert_eq!(folder.names(), before);
     }
-    let settings = [
-        (wpilib.0, " --size 0.1651", "", "`size` is missing"),
-        (
-            wpilib.0,
-            "--size 0.1651",
-            "--size nan",
-            "the tags' size is NaN",
-        ),
-        (wpilib.0, "--size 0.1651", "--size 165.1", "in metres"),
-        (wpilib.0, " --family tag36h11", "", "`family` is missing"),
-        (
-            wpilib.0,
-            "wpilib",
-            "wpilib --convention opencv",
-            "has its own",
-        ),
-        (wpilib.0, "wpilib", "frc", "possible values: wpilib"),
-        (wpilib.0, "x=4.25", "x=4.25,x=4", "twice"),
-        (wpilib.0, "x=4.25", "u=4.25", "is not a part of"),
-        (wpilib.0, "x=4.25", "x=inf", "not a finite number"),
-        (wpilib.0, "field.json", "other.json", "check the path"),
-        (
-            bundle.0,
-            " --convention apriltag",
-            "",
-            "\"apriltag\" (AprilTag 3's library: x right, y down, z into the tag)",
-        ),
-        (
-            bundle.0,
-            "--convention apriltag",
-            "--convention april",
-            "apriltag",
-        ),
-        (
-            bundle.0,
-            " --pose x=4,z=0.5,yaw_deg=180",
-            "",
-            "`pose` is missing",
-        ),
-        (
-            docks.0,
-            "nav2_docks",
-            "nav2_docks --size 1",
-            "docks are no tags",
-        ),
-    ];
-    for (arguments, from, to, expected) in settings {
+    let settings = "
+        wpilib =>  --size 0.1651 =>  => `size` is missing
+        wpilib => --size 0.1651 => --size nan => the tags' size is NaN
+        wpilib => --size 0.1651 => --size 165.1 => in metres
+        wpilib =>  --family tag36h11 =>  => `family` is missing
+        wpilib => wpilib => wpilib --convention opencv => has its own
+        wpilib => wpilib => frc => possible values: wpilib
+        wpilib => x=4.25 => x=4.25,x=4 => twice
+        wpilib => x=4.25 => u=4.25 => is not a part of
+        wpilib => x=4.25 => x=inf => not a finite number
+        wpilib => field.json => other.json => check the path
+        bundle =>  --convention apriltag =>  => \"apriltag\" (AprilTag 3's library: x right, y down, z into the tag)
+        bundle => --convention apriltag => --convention april => apriltag
+        bundle =>  --pose x=4,z=0.5,yaw_deg=180 =>  => `pose` is missing
+        docks => nav2_docks => nav2_docks --size 1 => docks are no tags";
+    for [format, from, to, expected] in cases(settings) {
+        let (arguments, _) = of(format);
         let folder = folder();
         let before = folder.names();
         assert!(arguments.contains(from), "{from}");
