@@ -1,6 +1,7 @@
 //! Parses the arguments of all subcommands, and declares the files that they name.
 
 use crate::failure::Failure;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, ValueHint};
 use posegate_files::files::{self, FileError, Files, Input, NamedInput, Output, OutputFolder};
 use posegate_files::printable::printable_lines;
@@ -106,38 +107,48 @@ fn declare(files: &Files, command: &Command, matches: &ArgMatches) -> Result<(),
     {
         return declare(files, command, matches);
     }
-    let arguments = || {
-        let with_role = |argument| Role::of(argument).map(|role| (argument, role));
-        command.get_arguments().filter_map(with_role)
+    let named = |wanted: Role| {
+        let all = command.get_arguments();
+        let of_role = all.filter(move |argument| Role::of(argument) == Some(wanted));
+        of_role.map(|argument| argument.get_id().as_str())
     };
-    for (argument, role) in arguments() {
-        if role == Role::Output {
-            let outputs = matches.get_many::<Output>(argument.get_id().as_str());
-            outputs
-                .into_iter()
-                .flatten()
-                .try_for_each(|output| files.declare_output(output))?;
+    for id in named(Role::Output) {
+        for output in matches.get_many::<Output>(id).into_iter().flatten() {
+            files.declare_output(output)?;
         }
     }
-    for (argument, role) in arguments() {
-        let id = argument.get_id().as_str();
-        match role {
-            Role::Input => {
-                let inputs = matches.get_many::<Input>(id).into_iter().flatten();
-                inputs
-                    .into_iter()
-                    .try_for_each(|input| files.declare_input(input))?;
-            }
-            Role::NamedInput => {
-                let inputs = matches.get_many::<NamedInput>(id).into_iter().flatten();
-                inputs
-                    .into_iter()
-                    .try_for_each(|named| files.declare_input(&named.input))?;
-            }
-            Role::Output | Role::OutputFolder => {}
+    for id in named(Role::Input) {
+        for input in matches.get_many::<Input>(id).into_iter().flatten() {
+            files.declare_input(input)?;
+        }
+    }
+    for id in named(Role::NamedInput) {
+        for named in matches.get_many::<NamedInput>(id).into_iter().flatten() {
+            files.declare_input(&named.input)?;
         }
     }
     Ok(())
+}
+
+/// Returns a parser that takes one of some names, each with its value.
+pub fn choice<T: Clone + Send + Sync + 'static, const N: usize>(
+    all: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = all.each_ref().map(|(name, _)| *name);
+    PossibleValuesParser::new(names).try_map(move |name| {
+        let known = all.iter().find(|(known, _)| *known == name);
+        known.map(|(_, value)| value.clone()).ok_or(name)
+    })
+}
+
+/// Parses numbers with commas between them. `None` if there are more or fewer, or if one is not accepted.
+pub fn numbers<const N: usize>(text: &str, is_accepted: fn(f64) -> bool) -> Option<[f64; N]> {
+    let number = |part: &str| {
+        let number = part.trim().parse().ok();
+        number.filter(|number| is_accepted(*number))
+    };
+    let all: Option<Vec<f64>> = text.split(',').map(number).collect();
+    all?.try_into().ok()
 }
 
 /// Prints clap's message about wrong usage, in its colours. If the message contains unprintable text that was typed, it is

@@ -1,4 +1,4 @@
-//! Arguments for the uncertainty of a pose and for the cost of views.
+//! Arguments for the uncertainty of a pose, for the kind of pose-sets and for the cost of views.
 
 use crate::site_input::Failure;
 use posegate_files::files::{Files, Input};
@@ -20,6 +20,39 @@ pub struct UncertaintyArgs {
     /// The covariance of x, y, yaw: a CSV of three rows, m and rad, world axes; `-` for standard input
     #[arg(long, conflicts_with_all = ["sigma_x", "sigma_y", "sigma_yaw_deg"])]
     covariance_file: Option<Input>,
+}
+
+/// The kind of the pose-sets of a recording's estimates.
+#[derive(clap::Args)]
+pub struct SetArgs {
+    /// Kind of pose-set: Gaussian by each estimate's covariance, or bounded by the same bound for all estimates
+    #[arg(long, value_enum, default_value = "gaussian")]
+    set: Kind,
+    /// Bounded sets: largest error of the position, metres
+    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
+    translation: Option<f64>,
+    /// Bounded sets: largest error of the heading, degrees
+    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
+    yaw_deg: Option<f64>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Kind {
+    Gaussian,
+    Bounded,
+}
+
+impl SetArgs {
+    /// Returns the bound of bounded pose-sets: metres, radians. `None` if the sets are Gaussian.
+    pub fn bounded(&self) -> Option<[f64; 2]> {
+        match self.set {
+            Kind::Gaussian => None,
+            Kind::Bounded => Some([
+                self.translation.unwrap_or(f64::NAN),
+                self.yaw_deg.unwrap_or(f64::NAN).to_radians(),
+            ]),
+        }
+    }
 }
 
 /// The weights of the cost of a pose.
@@ -51,41 +84,42 @@ impl Weights {
 }
 
 impl UncertaintyArgs {
-    pub fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Gaussian, Failure> {
-        let refused = |place: &str, error: GaussianError| {
-            let help = match error {
-                GaussianError::Sigma { .. } => {
-                    "give standard deviations above 0, metres and degrees; for a pose that is known exactly use `posegate place --exact`"
-                }
-                GaussianError::Epsilon(_) => "write an epsilon such as --epsilon 0.99",
-                GaussianError::Turns(_) => {
-                    "a pose-set with such a large heading deviation is not Gaussian: give a smaller --sigma-yaw-deg"
-                }
-                _ => "give the covariance of x, y, yaw in m and rad, as a filter reports it",
-            };
-            Failure::usage(format!("{place}{error}"), help)
-        };
-        if let Some(file) = &self.covariance_file {
+    /// Returns the pose-set. `None` if the pose is known exactly: all standard deviations, or all numbers of the covariance, are zero.
+    pub fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Option<Gaussian>, Failure> {
+        let sigmas = [self.sigma_x, self.sigma_y, self.sigma_yaw_deg];
+        let (place, found) = if let Some(file) = &self.covariance_file {
             let (bytes, name) = files.read(file)?;
             let rows = covariance(bytes.as_slice(), &name).map_err(Failure::input)?;
-            return Gaussian::new(rows, epsilon)
-                .map_err(|error| refused(&format!("{name}: "), error));
-        }
-        let (Some(x), Some(y), Some(yaw_deg)) = (self.sigma_x, self.sigma_y, self.sigma_yaw_deg)
-        else {
+            if rows == [[0.0; 3]; 3] {
+                return Ok(None);
+            }
+            (format!("{name}: "), Gaussian::new(rows, epsilon))
+        } else if let [Some(x), Some(y), Some(yaw_deg)] = sigmas {
+            if sigmas == [Some(0.0); 3] {
+                return Ok(None);
+            }
+            let sigmas = [x, y, yaw_deg.to_radians()];
+            (String::new(), Gaussian::of_sigmas(sigmas, epsilon))
+        } else {
             return Err(Failure::usage(
                 "the uncertainty of the pose is missing".into(),
                 "give --sigma-x, --sigma-y and --sigma-yaw-deg, or a --covariance-file",
             ));
         };
-        Gaussian::of_sigmas([x, y, yaw_deg.to_radians()], epsilon)
-            .map_err(|error| refused("", error))
-    }
-}
-
-impl UncertaintyArgs {
-    /// Returns `true` if every standard deviation is given as zero: the pose is known exactly.
-    pub fn is_exact(&self) -> bool {
-        [self.sigma_x, self.sigma_y, self.sigma_yaw_deg] == [Some(0.0); 3]
+        found.map(Some).map_err(|error| {
+            let help = match error {
+                GaussianError::Sigma { .. } => {
+                    "give standard deviations above 0, metres and degrees, or 0 for all three if the pose is known exactly"
+                }
+                GaussianError::Epsilon(_) => "write an epsilon such as --epsilon 0.99",
+                GaussianError::Turns(_) => {
+                    "a pose-set with such a large heading deviation is not Gaussian: give a smaller --sigma-yaw-deg"
+                }
+                _ => {
+                    "give the covariance of x, y, yaw in m and rad, as a filter reports it, or only zeros for a pose that is known exactly"
+                }
+            };
+            Failure::usage(format!("{place}{error}"), help)
+        })
     }
 }

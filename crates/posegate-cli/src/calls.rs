@@ -5,10 +5,8 @@
 use crate::failure::Failure;
 use crate::site_input;
 use crate::{gate, table};
-use posegate::bake::BakeInput;
 use posegate::set::RadiusSquared;
 use posegate::table::Table;
-use posegate::verify::build;
 use posegate_files::files::{Files, Input, captured};
 use posegate_site::{Site, Task};
 use std::ffi::OsString;
@@ -129,16 +127,5 @@ pub fn task<'a>(site: &'a Site, name: &str) -> Result<&'a Task, Refusal> {
 /// # Errors
 /// The task does not exist, or its set gives no table that can be proven.
 pub fn build_table(site: &Site, path: OsString, name: &str) -> Result<Vec<u8>, Refusal> {
-    let task = site_input::task(site, name)?;
-    let input = Input::from(path);
-    let spec = table::spec(site, task, &input, name)?;
-    let order = BakeInput {
-        task: name,
-        success: &task.success,
-        spec,
-        epsilon: site.epsilon,
-    };
-    let built = build(&order, &|| ());
-    let (bytes, _) = built.map_err(|error| Failure::build(&input, name, error))?;
-    Ok(bytes)
+    Ok(table::built(site, &Input::from(path), name, site.epsilon)?)
 }

@@ -1,5 +1,6 @@
 //! `posegate chain`: evaluates a manual chain of the site file, step by step.
 
+use crate::arguments::choice;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, relied_on};
 use posegate::chain::StartAssumption;
 use posegate_files::files::{Files, Input, Output};
@@ -21,8 +22,8 @@ pub struct Arguments {
     name: String,
     /// Where the estimate is when a task begins: at the task's goal (as in the paper), or anywhere that the steps before
     /// may leave it
-    #[arg(long, value_enum, default_value = "general")]
-    assume: Assumption,
+    #[arg(long, value_parser = choice(ASSUMPTIONS), default_value = "general")]
+    assume: StartAssumption,
     /// Draw the hall with the route and the looks, then the chain step by step (SVG)
     #[arg(short, long)]
     output: Option<Output>,
@@ -31,25 +32,15 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-pub enum Assumption {
-    AtGoal,
-    General,
-}
-
-impl From<Assumption> for StartAssumption {
-    fn from(assumption: Assumption) -> Self {
-        match assumption {
-            Assumption::AtGoal => Self::AtGoal,
-            Assumption::General => Self::General,
-        }
-    }
-}
+const ASSUMPTIONS: [(&str, StartAssumption); 2] = [
+    ("at-goal", StartAssumption::AtGoal),
+    ("general", StartAssumption::General),
+];
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let site = relied_on(files, &arguments.site)?;
     let chain = site.chain(&arguments.name).map_err(Failure::input)?;
-    let report = evaluate(&site, &arguments.name, chain, arguments.assume.into())
+    let report = evaluate(&site, &arguments.name, chain, arguments.assume)
         .map_err(|error| failure(&arguments.site, error))?;
     if let Some(path) = &arguments.output {
         let success = |name: &str| site.tasks.get(name).map(|task| &task.success);

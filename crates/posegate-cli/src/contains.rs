@@ -5,7 +5,8 @@ use posegate::shape::{Sight, SuccessSet};
 use posegate_files::files::{Files, Input};
 use posegate_replay::{Columns, estimates};
 use posegate_site::inscribe::inscribed_box;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// Reports for each pose whether it is in a task's success set, or finds a large box of poses that are
 ///
@@ -52,11 +53,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         let [x, y] = [pose.x_m - east, pose.y_m - north];
         let membership = task.success.membership([x, y, pose.yaw_rad]);
         if arguments.json {
-            let slack: Map<String, Value> = membership
-                .slack
-                .iter()
-                .map(|(name, value)| ((*name).into(), json!(value)))
-                .collect();
+            let slack: BTreeMap<_, _> = membership.slack.iter().copied().collect();
             let mut line = json!({"index": index, "inside": membership.inside, "slack": slack});
             if let Some(sight) = membership.sight {
                 add_sight(&mut line, &sight, membership.inside);
@@ -81,11 +78,10 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
 }
 
 fn add_sight(line: &mut Value, sight: &Sight, visible: bool) {
-    let corners: Vec<Value> = sight
+    // NaN is null in JSON.
+    let corners = sight
         .corners_px
-        .iter()
-        .map(|corner| corner.map_or(json!([null, null]), |uv| json!(uv)))
-        .collect();
+        .map(|corner| corner.unwrap_or([f64::NAN; 2]));
     line["d"] = json!(sight.d);
     line["phi_deg"] = json!(sight.phi.to_degrees());
     line["psi_deg"] = json!(sight.psi.to_degrees());

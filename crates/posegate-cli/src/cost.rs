@@ -2,12 +2,8 @@
 
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
-use clap::{ArgMatches, Args, Command, FromArgMatches};
 use posegate_files::files::{Files, Input};
-use posegate_place::{
-    Approximate, CostError, ExpectedCost, Gaussian, GaussianError, Quadrature, expected_cost,
-};
-use posegate_replay::covariance;
+use posegate_place::{Approximate, CostError, ExpectedCost, Quadrature, expected_cost};
 use serde_json::{Map, Value, json};
 
 /// Computes the expected cost of seeing a task's tag from a Gaussian pose-set at the task's goal
@@ -26,7 +22,7 @@ pub struct Arguments {
     #[arg(long)]
     task: String,
     #[command(flatten)]
-    belief: Spread,
+    belief: UncertaintyArgs,
     /// Confidence of the pose-set [default: the site's]
     #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
@@ -38,73 +34,6 @@ pub struct Arguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-}
-
-/// The uncertainty of the pose. All values are zero if the pose is known exactly.
-struct Spread {
-    belief: UncertaintyArgs,
-    /// Metres, metres, degrees.
-    sigmas: [Option<f64>; 3],
-    covariance_file: Option<Input>,
-}
-
-impl Args for Spread {
-    fn augment_args(command: Command) -> Command {
-        UncertaintyArgs::augment_args(command)
-    }
-
-    fn augment_args_for_update(command: Command) -> Command {
-        UncertaintyArgs::augment_args_for_update(command)
-    }
-}
-
-impl FromArgMatches for Spread {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        Ok(Self {
-            sigmas: ["sigma_x", "sigma_y", "sigma_yaw_deg"]
-                .map(|name| matches.get_one::<f64>(name).copied()),
-            covariance_file: matches.get_one::<Input>("covariance_file").cloned(),
-            belief: UncertaintyArgs::from_arg_matches(matches)?,
-        })
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
-    }
-}
-
-impl Spread {
-    /// Returns the pose-set, or `None` if the pose is known exactly.
-    fn gaussian(&self, epsilon: f64, files: &Files) -> Result<Option<Gaussian>, Failure> {
-        let Some(file) = &self.covariance_file else {
-            if self.belief.is_exact() {
-                return Ok(None);
-            }
-            if let [Some(x), Some(y), Some(yaw_deg)] = self.sigmas
-                && let Err(error @ GaussianError::Sigma { .. }) =
-                    Gaussian::of_sigmas([x, y, yaw_deg.to_radians()], epsilon)
-            {
-                return Err(Failure::usage(
-                    error.to_string(),
-                    "give standard deviations above 0, metres and degrees, or 0 for all three if the pose is known exactly",
-                ));
-            }
-            return self.belief.gaussian(epsilon, files).map(Some);
-        };
-        let (bytes, name) = files.read(file)?;
-        let rows = covariance(bytes.as_slice(), &name).map_err(Failure::input)?;
-        if rows.iter().flatten().all(|entry| *entry == 0.0) {
-            return Ok(None);
-        }
-        let gaussian = Gaussian::new(rows, epsilon).map_err(|error| {
-            Failure::usage(
-                format!("{name}: {error}"),
-                "give the covariance of x, y, yaw in m and rad, as a filter reports it, or only zeros for a pose that is known exactly",
-            )
-        })?;
-        Ok(Some(gaussian))
-    }
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {

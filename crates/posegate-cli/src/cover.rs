@@ -1,5 +1,6 @@
 //! `posegate cover`: chooses the cheapest tags with which every work task of a site has a plan.
 
+use crate::arguments::choice;
 use crate::sheet;
 use crate::site_input::{
     Failure, Outcome, answer, check_stated_errors, parsed, print, print_json, progress, warn,
@@ -37,8 +38,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=1))]
     survive_lost_tags: u8,
     /// exact: the cheapest choice, with a proven bound; greedy: a quick choice
-    #[arg(long, value_enum, default_value = "exact")]
-    method: Choice,
+    #[arg(long, value_parser = choice(METHODS), default_value = "exact")]
+    method: Method,
     /// Stop when the proven bound is below the cost by at most this share of the cost
     #[arg(long, default_value_t = 0.05)]
     gap: f64,
@@ -66,11 +67,7 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-pub enum Choice {
-    Exact,
-    Greedy,
-}
+const METHODS: [(&str, Method); 2] = [("exact", Method::Exact), ("greedy", Method::Greedy)];
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let (text, name) = files.read_text(&arguments.site)?;
@@ -82,10 +79,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     let order = CoverOptions {
         from: arguments.from.clone(),
         survive_a_lost_tag: arguments.survive_lost_tags > 0,
-        method: match arguments.method {
-            Choice::Exact => Method::Exact,
-            Choice::Greedy => Method::Greedy,
-        },
+        method: arguments.method,
         gap: arguments.gap,
         time_limit: arguments.time_limit,
         beside: arguments.beside,

@@ -1,13 +1,14 @@
 //! The failure of a subcommand, and the only renderer of errors. Messages are escaped and shortened before they are printed.
 
-use miette::{Diagnostic, LabeledSpan, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+use miette::{
+    LabeledSpan, MietteDiagnostic, MietteSpanContents, Report, SourceCode, SourceSpan, SpanContents,
+};
 use posegate::bake::BakeError;
 use posegate::verify::BuildError;
 use posegate_files::excerpt::Excerpt;
 use posegate_files::files::{FileError, Input};
 use posegate_files::printable::{printable, printable_lines};
 use posegate_site::SiteError;
-use std::fmt;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -19,8 +20,8 @@ const LONGEST_LIST: usize = 64_000;
 /// The failure of a subcommand, with its exit code.
 pub struct Failure {
     code: u8,
-    /// The message. `None` if it is printed already, or if the reader of standard output has ended.
-    shown: Option<Box<Shown>>,
+    /// The message, of printable texts. `None` if it is printed already, or if the reader of standard output has ended.
+    report: Option<Report>,
 }
 
 pub type Outcome = Result<ExitCode, Failure>;
@@ -39,20 +40,19 @@ pub fn to_stderr(text: &str) {
 impl Failure {
     /// Bad input or usage: exit code 2.
     pub fn input(error: impl std::error::Error) -> Self {
-        Self::of(2, Shown::with_causes(&error))
+        Self::of(2, with_causes(&error))
     }
 
     /// Bad input or usage: exit code 2, with a message and what to do about it.
     pub fn usage(message: String, help: &str) -> Self {
-        Self::of(2, Shown::new(&message).help(help))
+        Self::of(2, with_help(short(&message), help))
     }
 
     /// As [`Failure::usage`], with a message of several lines. The caller must escape names from files: a line end in a name
     /// would look like one of the message.
     pub fn list(message: &str, help: &str) -> Self {
-        let mut shown = Shown::new("");
-        shown.message = cut(&printable_lines(message), LONGEST_LIST);
-        Self::of(2, shown.help(help))
+        let message = cut(&printable_lines(message), LONGEST_LIST);
+        Self::of(2, with_help(message, help))
     }
 
     /// An error at a place in a site file, with the text around it: exit code 2.
@@ -64,21 +64,21 @@ impl Failure {
             ),
             None => format!("{}: {}", error.file, error.message),
         };
-        let mut shown = Shown::new(&message);
+        let mut shown = MietteDiagnostic::new(short(&message));
         shown.help = error.help.as_deref().map(short);
-        shown.place = error
-            .at
-            .zip(error.excerpt.as_deref())
-            .map(|(at, excerpt)| Place {
-                name: short(&error.file),
-                column: at.column,
-                label: error
-                    .expected
-                    .as_deref()
-                    .map(|expected| short(&format!("expected {expected}"))),
-                excerpt: excerpt.clone(),
-            });
-        Self::of(2, shown)
+        let Some((at, excerpt)) = error.at.zip(error.excerpt.as_deref()) else {
+            return Self::of(2, shown.into());
+        };
+        let expected = error.expected.as_deref();
+        let label = expected.map(|expected| short(&format!("expected {expected}")));
+        let fault = excerpt.fault.clone();
+        shown.labels = Some(vec![LabeledSpan::new(label, fault.start, fault.len())]);
+        let place = Place {
+            name: short(&error.file),
+            column: at.column,
+            excerpt: excerpt.clone(),
+        };
+        Self::of(2, Report::new(shown).with_source_code(place))
     }
 
     /// An error of making a table from a site file: exit code 2.
@@ -125,40 +125,36 @@ impl Failure {
     /// An internal error: exit code 3.
     pub fn internal(message: String) -> Self {
         let help = "this is an internal error of posegate: please report it with the site file";
-        Self::of(3, Shown::new(&message).help(help))
+        Self::of(3, with_help(short(&message), help))
     }
 
     /// Bad usage whose message is printed already: exit code 2.
     pub fn printed() -> Self {
         Self {
             code: 2,
-            shown: None,
+            report: None,
         }
     }
 
-    fn of(code: u8, shown: Shown) -> Self {
-        Self {
-            code,
-            shown: Some(Box::new(shown)),
-        }
+    fn of(code: u8, report: Report) -> Self {
+        let report = Some(report);
+        Self { code, report }
     }
 
     /// Returns the message with its causes, each after a colon, and what to do about it. `None` if it is printed already.
     pub fn words(&self) -> Option<(String, Option<String>)> {
-        let shown = self.shown.as_deref()?;
-        let mut message = shown.message.clone();
-        let mut cause = shown.cause.as_deref();
-        while let Some(next) = cause {
-            message = format!("{message}: {}", next.message);
-            cause = next.cause.as_deref();
-        }
-        Some((message, shown.help.clone()))
+        let report = self.report.as_ref()?;
+        let messages: Vec<String> = report.chain().map(ToString::to_string).collect();
+        Some((
+            messages.join(": "),
+            report.help().map(|help| help.to_string()),
+        ))
     }
 
     /// Prints the failure and returns its exit code.
     pub fn report(self) -> ExitCode {
-        if let Some(shown) = self.shown {
-            to_stderr(&format!("{:?}", miette::Report::new(*shown)));
+        if let Some(report) = self.report {
+            to_stderr(&format!("{report:?}"));
         }
         ExitCode::from(self.code)
     }
@@ -190,12 +186,16 @@ fn cut(text: &str, most: usize) -> String {
     format!("{head} \u{2026} {tail}")
 }
 
-/// The parts of a failure that are printed. All texts are printable.
-struct Shown {
-    message: String,
-    help: Option<String>,
-    cause: Option<Box<Shown>>,
-    place: Option<Place>,
+fn with_help(message: String, help: &str) -> Report {
+    MietteDiagnostic::new(message).with_help(short(help)).into()
+}
+
+fn with_causes(error: &dyn std::error::Error) -> Report {
+    let message = short(&error.to_string());
+    match error.source() {
+        Some(cause) => with_causes(cause).wrap_err(message),
+        None => MietteDiagnostic::new(message).into(),
+    }
 }
 
 /// A place in a file.
@@ -203,67 +203,7 @@ struct Place {
     name: String,
     /// Column in characters, counted from 1.
     column: usize,
-    label: Option<String>,
     excerpt: Excerpt,
-}
-
-impl Shown {
-    fn new(message: &str) -> Self {
-        Self {
-            message: short(message),
-            help: None,
-            cause: None,
-            place: None,
-        }
-    }
-
-    fn help(mut self, help: &str) -> Self {
-        self.help = Some(short(help));
-        self
-    }
-
-    fn with_causes(error: &dyn std::error::Error) -> Self {
-        let mut shown = Self::new(&error.to_string());
-        shown.cause = error
-            .source()
-            .map(|cause| Box::new(Self::with_causes(cause)));
-        shown
-    }
-}
-
-impl fmt::Debug for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
-
-impl fmt::Display for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
-    }
-}
-
-impl std::error::Error for Shown {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        self.cause.as_ref().map(|cause| &**cause as _)
-    }
-}
-
-impl Diagnostic for Shown {
-    fn help(&self) -> Option<Box<dyn fmt::Display + '_>> {
-        self.help.as_ref().map(|help| Box::new(help) as _)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place.as_ref().map(|place| place as _)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let place = self.place.as_ref()?;
-        let fault = place.excerpt.fault.clone();
-        let label = LabeledSpan::new(place.label.clone(), fault.start, fault.len());
-        Some(Box::new(std::iter::once(label)))
-    }
 }
 
 /// Provides the excerpt with line and column numbers of the whole file.

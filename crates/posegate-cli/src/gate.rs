@@ -1,5 +1,7 @@
 //! `posegate gate`: decides on recorded estimates with the code that runs on the controller.
 
+use crate::arguments::numbers;
+use crate::belief::SetArgs;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress};
 use posegate::confidence::core_radius;
 use posegate::gate::{Reason, Verdict};
@@ -32,15 +34,8 @@ pub struct Arguments {
     /// Confidence of the Gaussian pose-sets [default: the table's]
     #[arg(long)]
     epsilon: Option<f64>,
-    /// Kind of pose-set: Gaussian by each estimate's covariance, or bounded by the same bound for all estimates
-    #[arg(long, value_enum, default_value = "gaussian")]
-    set: Kind,
-    /// Bounded sets: largest error of the position, metres
-    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
-    translation: Option<f64>,
-    /// Bounded sets: largest error of the heading, degrees
-    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
-    yaw_deg: Option<f64>,
+    #[command(flatten)]
+    set: SetArgs,
     /// Grow each pose-set by a movement: the robot's largest speed, m/s
     #[arg(long, requires = "horizon_ms", value_name = "M_S")]
     max_speed: Option<f64>,
@@ -58,22 +53,8 @@ pub struct Arguments {
     json: bool,
 }
 
-fn origin(text: &str) -> Result<[f64; 2], String> {
-    let expected = "expected two numbers in metres, like 448000,5412000";
-    let (x, y) = text.split_once(',').ok_or(expected)?;
-    let number = |text: &str| {
-        let value = text.trim().parse().ok();
-        value
-            .filter(|value: &f64| value.is_finite())
-            .ok_or_else(|| expected.to_string())
-    };
-    Ok([number(x)?, number(y)?])
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Kind {
-    Gaussian,
-    Bounded,
+fn origin(text: &str) -> Result<[f64; 2], &'static str> {
+    numbers(text, f64::is_finite).ok_or("expected two numbers in metres, like 448000,5412000")
 }
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
@@ -87,9 +68,9 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     })?;
     let radius = radius(&table, arguments.epsilon)?;
     let task_digest = posegate_files::printable::hex(&table.task_digest());
-    let columns = match arguments.set {
-        Kind::Gaussian => Columns::Estimates,
-        Kind::Bounded => Columns::TimedPoses,
+    let columns = match arguments.set.bounded() {
+        None => Columns::Estimates,
+        Some(_) => Columns::TimedPoses,
     };
     let (text, name) = files.read(&arguments.estimates)?;
     let mut rows = estimates(text.as_slice(), &name, columns).map_err(Failure::input)?;
@@ -194,27 +175,16 @@ struct Decided {
 }
 
 /// Returns the first denial of a report's hypotheses, else the permit of least margin.
-fn judge(rows: &[Row], mut verdict: impl FnMut(&Row) -> Verdict) -> Decided {
-    let mut least: Option<Decided> = None;
-    for row in rows {
-        let decided = Decided {
-            verdict: verdict(row),
-            hypothesis: row.hypothesis,
-        };
-        let Verdict::Permit { margin } = decided.verdict else {
-            return decided;
-        };
-        let is_less = match &least {
-            Some(Decided {
-                verdict: Verdict::Permit { margin: least },
-                ..
-            }) => margin < *least,
-            _ => true,
-        };
-        if is_less {
-            least = Some(decided);
-        }
-    }
+fn judge(rows: &[Row], verdict: impl Fn(&Row) -> Verdict) -> Decided {
+    let decided = rows.iter().map(|row| Decided {
+        verdict: verdict(row),
+        hypothesis: row.hypothesis,
+    });
+    // `None` is less than any margin, and the first of equal ones is taken.
+    let least = decided.min_by_key(|decided| match decided.verdict {
+        Verdict::Permit { margin } => Some(margin.q16()),
+        Verdict::Deny { .. } => None,
+    });
     // Reports are never empty.
     least.unwrap_or(Decided {
         verdict: Verdict::deny(Reason::CovarianceUnknown),
@@ -229,13 +199,9 @@ fn judge_row(
     radius: RadiusSquared,
     movement: Growth,
 ) -> Verdict {
-    let set = match arguments.set {
-        Kind::Gaussian => PoseSet::gaussian(row.estimate, row.covariance, radius),
-        Kind::Bounded => PoseSet::bounded(
-            row.estimate,
-            arguments.translation.unwrap_or(f64::NAN),
-            arguments.yaw_deg.unwrap_or(f64::NAN).to_radians(),
-        ),
+    let set = match arguments.set.bounded() {
+        None => PoseSet::gaussian(row.estimate, row.covariance, radius),
+        Some([translation, yaw]) => PoseSet::bounded(row.estimate, translation, yaw),
     };
     let set = set.map(|set| set.grown(movement));
     // Without a time of use the age is unknown. The estimate is then treated as made at the time of use.

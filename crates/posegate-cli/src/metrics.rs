@@ -1,13 +1,15 @@
 //! `posegate metrics`: compares an estimated trajectory with a reference.
 
+use crate::arguments::{choice, numbers};
 use crate::site_input::{Failure, Outcome, answer, print, print_json, site, task};
 use posegate_files::files::{Files, Input};
 use posegate_replay::metrics::{
-    self, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,
+    Align, AlignError, Errors, PairError, Pairs, Statistics, absolute, aligned, associated,
     correct_rate, in_set, relative,
 };
 use posegate_replay::trajectories::{Named, Poses, read};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// Compares an estimated trajectory with a reference: ATE, RPE, Correct Rate
 ///
@@ -26,7 +28,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     times: Option<Input>,
     /// How the estimate is moved onto the reference before it is compared
-    #[arg(long, value_enum, default_value = "none")]
+    #[arg(long, value_parser = choice(ALIGNMENTS), default_value = "none")]
     align: Align,
     /// Largest time difference of two poses that are paired, seconds
     #[arg(long, default_value_t = 0.01, allow_negative_numbers = true)]
@@ -45,13 +47,12 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Align {
-    None,
-    Se3,
-    Sim3,
-    Origin,
-}
+const ALIGNMENTS: [(&str, Align); 4] = [
+    ("none", Align::None),
+    ("se3", Align::Se3),
+    ("sim3", Align::Sim3),
+    ("origin", Align::Origin),
+];
 
 /// The thresholds used in the literature: the default. Metres and degrees.
 const THRESHOLDS: [[f64; 2]; 5] = [
@@ -70,15 +71,9 @@ const PAIRS: [(&str, Pairs); 4] = [
     ("delta_0.5_m", Pairs::Metres(0.5)),
 ];
 
-fn thresholds(text: &str) -> Result<[f64; 2], String> {
-    let expected = "expected metres and degrees above 0, like 0.05,2";
-    let (translation, rotation) = text.split_once(',').ok_or(expected)?;
-    let number = |text: &str| {
-        let value = text.trim().parse().ok();
-        let value = value.filter(|value: &f64| value.is_finite() && *value > 0.0);
-        value.ok_or_else(|| expected.to_string())
-    };
-    Ok([number(translation)?, number(rotation)?])
+fn thresholds(text: &str) -> Result<[f64; 2], &'static str> {
+    let found = numbers(text, |number| number.is_finite() && number > 0.0);
+    found.ok_or("expected metres and degrees above 0, like 0.05,2")
 }
 
 fn poses(path: &Input, files: &Files, times: Option<Named<'_>>) -> Result<Poses, Failure> {
@@ -119,13 +114,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
             };
             Failure::usage(format!("{}: {error}", names(arguments)), help)
         })?;
-    let align = match arguments.align {
-        Align::None => metrics::Align::None,
-        Align::Se3 => metrics::Align::Se3,
-        Align::Sim3 => metrics::Align::Sim3,
-        Align::Origin => metrics::Align::Origin,
-    };
-    let matched = aligned(&matched, align).map_err(|error: AlignError| {
+    let matched = aligned(&matched, arguments.align).map_err(|error: AlignError| {
         let place = names(arguments);
         Failure::usage(
             format!("{place}: {error}"),
@@ -178,15 +167,13 @@ fn statistics(errors: &Errors) -> Value {
         return Value::Null;
     };
     let part = |statistics: &Statistics| {
-        let named = statistics.named().into_iter();
-        let mut all: Map<String, Value> = named
-            .map(|(name, value)| (name.into(), json!(value)))
-            .collect();
-        all.insert("count".into(), json!(statistics.count));
-        Value::Object(all)
+        let named: BTreeMap<_, _> = statistics.named().into_iter().collect();
+        let mut all = json!(named);
+        all["count"] = json!(statistics.count);
+        all
     };
-    let parts = parts.iter().map(|(name, of)| ((*name).into(), part(of)));
-    Value::Object(parts.collect())
+    let parts: BTreeMap<_, _> = parts.iter().map(|(name, of)| (*name, part(of))).collect();
+    json!(parts)
 }
 
 /// Prints the result as text.

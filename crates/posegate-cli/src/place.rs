@@ -1,5 +1,6 @@
 //! `posegate place`: finds the best place of a task's tag.
 
+use crate::arguments::numbers;
 use crate::belief::{UncertaintyArgs, Weights};
 use crate::sheet;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
@@ -94,15 +95,9 @@ enum MethodName {
 }
 
 fn reserve(text: &str) -> Result<Tolerance, String> {
-    let expected = || "expected metres and degrees, such as 0.01,0.5".to_owned();
-    let (translation, turn_deg) = text.split_once(',').ok_or_else(expected)?;
-    let number = |text: &str| {
-        let number = text.trim().parse::<f64>().ok();
-        number.filter(|number| number.is_finite() && *number >= 0.0)
-    };
-    let (Some(translation), Some(turn_deg)) = (number(translation), number(turn_deg)) else {
-        return Err(expected() + ", neither of them below 0");
-    };
+    let found = numbers(text, |number| number.is_finite() && number >= 0.0);
+    let [translation, turn_deg] =
+        found.ok_or("expected metres and degrees, such as 0.01,0.5, neither of them below 0")?;
     if translation > 1.0 {
         return Err(format!(
             "{translation} m is more than 1 m: the first number is in metres, such as 0.01"
@@ -139,12 +134,12 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         tag,
         wall: arguments.wall.clone(),
     };
-    let known = if arguments.exact || arguments.belief.is_exact() {
-        PosePrior::Exactly
-    } else {
-        let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
-        PosePrior::About(arguments.belief.gaussian(epsilon, files)?)
+    let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
+    let belief = match arguments.exact {
+        true => None,
+        false => arguments.belief.gaussian(epsilon, files)?,
     };
+    let known = belief.map_or(PosePrior::Exactly, PosePrior::About);
     let cost = arguments.weights.cost();
     cost.check()
         .map_err(|error| Failure::usage(error.to_string(), "see `posegate place --help`"))?;

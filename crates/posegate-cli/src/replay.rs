@@ -13,7 +13,6 @@ use self::outputs::Outputs;
 use self::words::{check_requested, check_topics, no_estimates, recording, sentences};
 use crate::recording::{Recorded, failure};
 use crate::site_input::{Failure, Outcome, answer, print_json, progress, site, task, warn};
-use posegate::bake::BakeInput;
 use posegate::gate::{InvalidParameter, Restart, Settings, Source};
 use posegate::set::CrossTerms;
 use posegate::table::Table;
@@ -22,7 +21,8 @@ use posegate_replay::recording::TagLocalizer;
 use posegate_replay::replay::{PlayError, Replay, ReplayConfig, play};
 use posegate_show::draw::replay_picture;
 use posegate_site::{Site, Task};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     check_outputs(arguments)?;
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
         table: &table,
         settings: &settings,
         success: &chosen.success,
-        bounded: arguments.bounded(),
+        bounded: arguments.set.bounded(),
         world: &arguments.recorded.frame,
         clock: arguments.clock(input.clock),
         examined: !arguments.fast,
@@ -194,11 +194,8 @@ fn summary(
     if let Some(looks) = &input.part.looks
         && has_detections(input)
     {
-        let counts = looks.counts().into_iter();
-        let counts: Map<String, Value> = counts
-            .map(|(name, count)| (name.into(), json!(count)))
-            .collect();
-        summary["looks"] = Value::Object(counts);
+        let counts: BTreeMap<_, _> = looks.counts().into_iter().collect();
+        summary["looks"] = json!(counts);
         summary["looks"]["frame"] = json!(looks.frame());
     }
     summary
@@ -246,22 +243,8 @@ fn table(
         }
         return Ok(bytes);
     }
-    let spec = site.chosen_table(task).ok_or_else(|| {
-        Failure::usage(
-            format!("{}: no extent can be chosen for the task `{}`", arguments.site.display(), arguments.task),
-            "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
-        )
-    })?;
-    let order = BakeInput {
-        task: &arguments.task,
-        success: &task.success,
-        spec,
-        epsilon: arguments.epsilon.unwrap_or(site.epsilon),
-    };
-    let built = posegate::verify::build(&order, &|| {});
-    let (bytes, _) =
-        built.map_err(|error| Failure::build(&arguments.site, &arguments.task, error))?;
-    Ok(bytes)
+    let epsilon = arguments.epsilon.unwrap_or(site.epsilon);
+    crate::table::built(site, &arguments.site, &arguments.task, epsilon)
 }
 
 fn play_failure(error: PlayError<Failure>) -> Failure {

@@ -1,8 +1,8 @@
 //! `posegate table`: builds, shows, proves and exports tables, and seals the firmware that has them.
 
+use crate::arguments::choice;
 use crate::gate::not_a_table;
 use crate::site_input::{Failure, Outcome, answer, print, print_json, progress, site, task, warn};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use posegate::bake::{self, BakeError, BakeInput, Language, Layout, source};
 use posegate::table::{EDGE_BITS, PIXEL_BITS, SightRecord, Table};
 use posegate::verify::{
@@ -107,8 +107,8 @@ pub struct Export {
     /// The table; `-` for standard input
     table: Input,
     /// The language
-    #[arg(long, value_enum)]
-    format: Format,
+    #[arg(long, value_parser = choice(LANGUAGES))]
+    format: Language,
     /// The file to write the source to; `-` for standard output
     #[arg(short, long)]
     output: Output,
@@ -117,24 +117,20 @@ pub struct Export {
     json: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Format {
-    C,
-    Rust,
-}
+const LANGUAGES: [(&str, Language); 2] = [("c", Language::C), ("rust", Language::Rust)];
 
 #[derive(clap::Args)]
 pub struct Cost {
     /// The table; `-` for standard input
     table: Input,
     /// The processor core
-    #[arg(long, value_parser = PossibleValuesParser::new(Core::ALL.map(Core::name)).try_map(core))]
+    #[arg(long, value_parser = choice(Core::ALL.map(|core| (core.name(), core))))]
     core: Core,
     /// With a tracker: fixes are carried along odometry
     #[arg(long)]
     tracker: bool,
     /// The level of optimization of the archive
-    #[arg(long, default_value = "3", value_parser = PossibleValuesParser::new(Level::ALL.map(Level::name)).try_map(level))]
+    #[arg(long, default_value = "3", value_parser = choice(Level::ALL.map(|level| (level.name(), level))))]
     level: Level,
     /// Print JSON
     #[arg(long)]
@@ -292,7 +288,7 @@ fn print_extent(spec: &TableSpec, table: &Table<'_>) -> Result<(), Failure> {
 }
 
 /// Returns what the table of a task covers.
-pub fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<TableSpec, Failure> {
+fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<TableSpec, Failure> {
     site.chosen_table(task).ok_or_else(|| {
         Failure::usage(
             format!(
@@ -302,6 +298,20 @@ pub fn spec(site: &Site, task: &Task, input: &Input, name: &str) -> Result<Table
             "add `expected = { translation = .., yaw_deg = .. }` to the task, or an extent in [table] or task.NAME.table",
         )
     })
+}
+
+/// Builds and proves the table of a task; `input` is the site's name in messages.
+pub fn built(site: &Site, input: &Input, name: &str, epsilon: f64) -> Result<Vec<u8>, Failure> {
+    let task = task(site, name)?;
+    let order = BakeInput {
+        task: name,
+        success: &task.success,
+        spec: spec(site, task, input, name)?,
+        epsilon,
+    };
+    let built = build_table(&order, &|| ());
+    let (bytes, _) = built.map_err(|error| Failure::build(input, name, error))?;
+    Ok(bytes)
 }
 
 fn claim<'a>(site: &'a Site, name: &'a str) -> Result<ExpectedTable<'a>, Failure> {
@@ -431,18 +441,6 @@ fn info(arguments: &Info, files: &Files) -> Outcome {
     Ok(answer(true))
 }
 
-/// Returns the core of a name.
-fn core(name: String) -> Result<Core, String> {
-    let known = Core::ALL.into_iter().find(|core| core.name() == name);
-    known.ok_or(name)
-}
-
-/// Returns the level of optimization of a name.
-fn level(name: String) -> Result<Level, String> {
-    let known = Level::ALL.into_iter().find(|level| level.name() == name);
-    known.ok_or(name)
-}
-
 fn cost(arguments: &Cost, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
@@ -521,11 +519,7 @@ fn check(arguments: &Verify, files: &Files) -> Outcome {
 fn export(arguments: &Export, files: &Files) -> Outcome {
     let (bytes, name) = files.read(&arguments.table)?;
     let table = Table::parse(&bytes).map_err(|error| not_a_table(&name, error))?;
-    let language = match arguments.format {
-        Format::C => Language::C,
-        Format::Rust => Language::Rust,
-    };
-    let text = source(&table, language);
+    let text = source(&table, arguments.format);
     files.write(&arguments.output, text.as_bytes())?;
     if arguments.json && !arguments.output.is_standard() {
         print_json(&json!({

@@ -2,10 +2,10 @@
 //!
 //! Run by `ci.sh cases DIR` with the folder in `POSEGATE_CASES`; a missing folder fails.
 
+use posegate_testkit::run::run as posegate;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 fn cases(file: &str) -> Vec<Value> {
     let folder = std::env::var("POSEGATE_CASES")
@@ -17,21 +17,6 @@ fn cases(file: &str) -> Vec<Value> {
     let list = whole["cases"].as_array().unwrap().clone();
     assert!(!list.is_empty());
     list
-}
-
-fn posegate(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
-fn lines(output: &Output) -> Vec<Value> {
-    let text = std::str::from_utf8(&output.stdout).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -194,20 +179,8 @@ fn navigation() {
                 + case["tolerance"]["relative"].as_f64().unwrap() * expected.abs()
         };
         for assume in ["at-goal", "general"] {
-            let output = posegate(
-                &[
-                    "chain",
-                    "site.toml",
-                    "--name",
-                    "c",
-                    "--assume",
-                    assume,
-                    "--json",
-                ],
-                &folder,
-            );
-            assert_eq!(output.status.code(), Some(0), "{name}: {output:?}");
-            let line = &lines(&output)[0];
+            let command = format!("chain site.toml --name c --assume {assume}");
+            let line = posegate(&folder, &format!("{command} --json")).json(0);
             assert_eq!(line["success"], true, "{name}");
             let step = &line["steps"][0];
             assert_eq!(step["type"], "navigation");
@@ -258,24 +231,8 @@ fn membership() {
             writeln!(csv, "{:?},{:?},{:?}", pose[0], pose[1], pose[2]).unwrap();
         }
         std::fs::write(folder.join("poses.csv"), csv).unwrap();
-        let output = posegate(
-            &[
-                "contains",
-                "site.toml",
-                "--task",
-                "t",
-                "--poses",
-                "poses.csv",
-                "--json",
-            ],
-            &folder,
-        );
-        assert!(
-            output.status.success(),
-            "{name}: {}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let answers = lines(&output);
+        let line = "contains site.toml --task t --poses poses.csv --json";
+        let answers = posegate(&folder, line).with(0).lines();
         let expected = &case["expected"];
         let inside = expected["inside"].as_array().unwrap();
         assert_eq!(answers.len(), inside.len(), "{name}");
@@ -354,28 +311,11 @@ fn containment() {
         );
         let (_keep, folder) = folder();
         std::fs::write(folder.join("site.toml"), site(&case, epsilon, &table)).unwrap();
-        let built = posegate(
-            &[
-                "table",
-                "build",
-                "site.toml",
-                "--task",
-                "t",
-                "-o",
-                "t.posegate",
-            ],
-            &folder,
-        );
-        assert!(
-            built.status.success(),
-            "{name}: {}",
-            String::from_utf8_lossy(&built.stderr)
-        );
+        posegate(&folder, "table build site.toml --task t -o t.posegate").with(0);
         let estimate = numbers(&case["estimate"]);
         let mut csv =
             String::from("x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n");
-        let mut arguments = vec!["gate", "t.posegate", "--estimates", "e.csv", "--json"];
-        let (translation, yaw_deg);
+        let mut set = String::new();
         write!(csv, "{:?},{:?},{:?}", estimate[0], estimate[1], estimate[2]).unwrap();
         if pose_set["type"] == "gaussian" {
             for (row, column) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)] {
@@ -383,24 +323,18 @@ fn containment() {
             }
         } else {
             csv.push_str(",0,0,0,0,0,0");
-            translation = pose_set["translation"].to_string();
-            yaw_deg = format!("{:?}", deg(&pose_set["yaw"]));
-            arguments.extend([
-                "--set",
-                "bounded",
-                "--translation",
-                &translation,
-                "--yaw-deg",
-                &yaw_deg,
-            ]);
+            let yaw_deg = deg(&pose_set["yaw"]);
+            let translation = &pose_set["translation"];
+            set = format!("--set bounded --translation {translation} --yaw-deg {yaw_deg:?}");
         }
         csv.push('\n');
         std::fs::write(folder.join("e.csv"), csv).unwrap();
-        let output = posegate(&arguments, &folder);
-        let answer = &lines(&output)[0];
+        let gate = format!("gate t.posegate --estimates e.csv --json {set}");
+        let output = posegate(&folder, &gate);
+        let answer = &output.lines()[0];
         let truth = case["expected"]["s_star"].as_f64().unwrap_or(f64::INFINITY);
         let permit = answer["verdict"] == "permit";
-        assert_eq!(output.status.code(), Some(i32::from(!permit)), "{name}");
+        assert_eq!(output.code, i32::from(!permit), "{name}");
         if case["expected"]["contained"] == false {
             assert!(!permit, "{name}: FALSE PERMIT: {answer}");
         }
@@ -505,20 +439,15 @@ fn expected_cost() {
         let epsilon = pose_set["epsilon"].to_string();
         let weight = |key: &str| case["cost"][key].to_string();
         let weights = ["c_high", "c1", "c2", "c3"].map(weight);
-        let run = |belief: &[&str]| {
+        let run = |belief: &str| {
             let [c_high, c1, c2, c3] = &weights;
-            let mut arguments = vec!["cost", "site.toml", "--task", "t", "--epsilon", &epsilon];
-            arguments.extend([
-                "--c-high", c_high, "--c1", c1, "--c2", c2, "--c3", c3, "--json",
-            ]);
-            arguments.extend(belief);
-            let output = posegate(&arguments, &folder);
-            let error = String::from_utf8_lossy(&output.stderr);
-            assert!(output.status.success(), "{name}: {error}");
-            lines(&output).remove(0)
+            let weights = format!("--c-high {c_high} --c1 {c1} --c2 {c2} --c3 {c3}");
+            let line =
+                format!("cost site.toml --task t --epsilon {epsilon} {weights} --json {belief}");
+            posegate(&folder, &line).json(0)
         };
         let start = std::time::Instant::now();
-        let answer = run(&["--covariance-file", "p.csv"]);
+        let answer = run("--covariance-file p.csv");
         let seconds = start.elapsed().as_secs_f64();
         let get = |key: &str| answer[key].as_f64().unwrap();
         let want = |key: &str| case["expected"][key].as_f64().unwrap();
@@ -568,14 +497,9 @@ fn expected_cost() {
             let sigma = |axis: usize| format!("{:?}", entry(axis, axis).sqrt());
             let yaw_deg = format!("{:?}", entry(2, 2).sqrt().to_degrees());
             let [x, y] = [0, 1].map(sigma);
-            let again = run(&[
-                "--sigma-x",
-                &x,
-                "--sigma-y",
-                &y,
-                "--sigma-yaw-deg",
-                &yaw_deg,
-            ]);
+            let again = run(&format!(
+                "--sigma-x {x} --sigma-y {y} --sigma-yaw-deg {yaw_deg}"
+            ));
             let ratio = again["integral"].as_f64().unwrap() / get("integral");
             assert!((ratio - 1.0).abs() < 1e-7, "{name}: {ratio}");
         }
@@ -597,26 +521,21 @@ fn metrics() {
         let text = |key: &str| case[key].as_str().unwrap().to_string();
         let max_diff = case["max_diff_s"].to_string();
         let (reference, estimate, align) = (text("reference"), text("estimate"), text("align"));
-        let mut arguments = vec!["metrics", &reference, &estimate, "--align", &align];
-        arguments.extend(["--max-diff", &max_diff, "--json"]);
-        let thresholds: Vec<String> = case["expected"]["correct_rate"]
+        let thresholds: String = case["expected"]["correct_rate"]
             .as_array()
             .unwrap()
             .iter()
             .map(|rate| {
                 format!(
-                    "{},{}",
+                    " --correct-rate {},{}",
                     rate["translation_below"], rate["rotation_below_deg"]
                 )
             })
             .collect();
-        for pair in &thresholds {
-            arguments.extend(["--correct-rate", pair]);
-        }
-        let output = posegate(&arguments, Path::new(&root));
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{name}: {error}");
-        let answer = lines(&output).remove(0);
+        let line = format!(
+            "metrics {reference} {estimate} --align {align} --max-diff {max_diff} --json{thresholds}"
+        );
+        let answer = posegate(Path::new(&root), &line).json(0);
         let tolerance = case["tolerance"]["absolute"].as_f64().unwrap();
         compare(
             name,

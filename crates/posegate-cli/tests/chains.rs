@@ -1,30 +1,21 @@
 //! `posegate chain` and `posegate plan`: the contract of the command line, and the message for each bad input.
 
 use posegate_testkit::counts;
+use posegate_testkit::run::Case;
 use serde_json::Value;
-use std::process::{Command, Stdio};
 
 const PAPER: &str = include_str!("../../../examples/sites/paper-chain.toml");
 
-/// Runs a line in a folder with this site file. Returns the exit code, stdout, stderr and the folder.
-fn run(site: &str, line: &str) -> (i32, String, String, tempfile::TempDir) {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("site.toml"), site).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(line.split_whitespace())
-        .current_dir(folder.path())
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    let code = output.status.code().unwrap();
-    (code, text(output.stdout), text(output.stderr), folder)
+/// Runs a line in a folder with this site file. Returns the exit code, stdout, the words of stderr and the folder.
+fn run(site: &str, line: &str) -> (i32, String, String, Case) {
+    let folder = Case::new(&[("site.toml", site.as_bytes())]);
+    let ended = folder.run(line);
+    let words = ended.words();
+    (ended.code, ended.out, words, folder)
 }
 
 fn json(site: &str, line: &str, code: i32) -> Value {
-    let (got, out, err, _) = run(site, line);
-    assert_eq!(got, code, "{line}\n{out}\n{err}");
-    serde_json::from_str(&out).unwrap()
+    Case::new(&[("site.toml", site.as_bytes())]).json(code, line)
 }
 
 fn changed(from: &str, to: &str) -> String {
@@ -56,17 +47,12 @@ const DOCKS: &str = include_str!("../../../examples/sites/docks.toml");
 /// A plan whose worst margin is hardly above 1 says so and names the remedy, and the remedy works.
 #[test]
 fn little_slack_is_reported_with_the_key_that_reserves_some() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let posegate = |line: &str| {
-        let program = Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args(line.split_whitespace())
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
-        let text = String::from_utf8(program.stdout).unwrap();
-        (program.status.code().unwrap(), text)
+        let ended = folder.run(line);
+        (ended.code, ended.out)
     };
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let write = |name: &str, text: &str| folder.write(name, text);
     write("docks.toml", DOCKS);
     let line = "cover docks.toml --survive-lost-tags 1 -o with-tags.toml";
     let (code, out) = posegate(line);
@@ -94,7 +80,7 @@ fn little_slack_is_reported_with_the_key_that_reserves_some() {
     };
     // A plan with more slack also holds for less, so plans with less are not more expensive: the library's places alone give 6.597
     // below 1.4.
-    let tags = std::fs::read_to_string(folder.path().join("with-tags.toml")).unwrap();
+    let tags = folder.text("with-tags.toml");
     let costs = ["1.02", "1.1", "1.3", "1.5"].map(|least| {
         write("slack.toml", &with(&tags, least));
         let (code, out) = posegate("plan slack.toml --to dock-2 --json");
@@ -282,43 +268,23 @@ fn infeasible_plan_reports_the_nearest_miss() {
 
 #[test]
 fn plan_uses_the_drive_costs_of_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("site.toml"), PAPER).unwrap();
+    let folder = Case::new(&[("site.toml", PAPER.as_bytes())]);
     let plan = |costs: &str| {
-        std::fs::write(folder.path().join("costs.csv"), costs).unwrap();
-        let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args(
-                "plan site.toml --from back-to-dock --to dock --costs costs.csv --json".split(' '),
-            )
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
-        (
-            output.status.code().unwrap(),
-            String::from_utf8(output.stdout).unwrap(),
-            String::from_utf8(output.stderr).unwrap(),
-        )
+        folder.write("costs.csv", costs);
+        folder.run("plan site.toml --from back-to-dock --to dock --costs costs.csv --json")
     };
-    let cost = |out: &str| {
-        serde_json::from_str::<Value>(out).unwrap()["cost"]
-            .as_f64()
-            .unwrap()
-    };
-    let (_, free, _) = plan("from,to,cost\nstart,see-t7,0\nsee-t7,dock,0\nsee-t7,see-t7,0\n");
-    let (_, costly, _) =
-        plan("from,to,cost\nstart,see-t7,30\nstart,dock,30\nsee-t7,dock,10\nsee-t7,see-t7,30\n");
-    assert!(
-        cost(&free) <= 2.0 + 1e-9 && cost(&costly) > 10.0,
-        "{free} {costly}"
-    );
+    let cost = |costs: &str| plan(costs).lines()[0]["cost"].as_f64().unwrap();
+    let free = cost("from,to,cost\nstart,see-t7,0\nsee-t7,dock,0\nsee-t7,see-t7,0\n");
+    let costly =
+        cost("from,to,cost\nstart,see-t7,30\nstart,dock,30\nsee-t7,dock,10\nsee-t7,see-t7,30\n");
+    assert!(free <= 2.0 + 1e-9 && costly > 10.0, "{free} {costly}");
     for (bad, expected) in [
         ("to,from,cost\n", "costs.csv:1"),
         ("from,to,cost\nstart,dock,-1\n", "costs.csv:2"),
         ("from,to,cost\nstart,dock\n", "costs.csv:2"),
         ("from,to,cost\nstrat,dock,1\n", "no place `strat`"),
     ] {
-        let (code, _, err) = plan(bad);
-        assert!(code == 2 && err.contains(expected), "{err}");
+        plan(bad).is_refused_with(&[expected]);
     }
 }
 
@@ -403,16 +369,8 @@ fn bad_input_is_reported_with_the_reason() {
             "not a probability",
         ),
     ] {
-        let (code, out, err, _) = run(&site, line);
-        let flat: String = err
-            .split_whitespace()
-            .filter(|w| *w != "│")
-            .collect::<Vec<_>>()
-            .join(" ");
-        assert!(
-            code == 2 && flat.contains(expected),
-            "{line}: {expected}\n{out}\n{err}"
-        );
+        let case = Case::new(&[("site.toml", site.as_bytes())]);
+        case.run(line).is_refused_with(&[expected]);
     }
     // A site without localization tasks and tags.
     let start = PAPER.find("[tag.t7]").unwrap();

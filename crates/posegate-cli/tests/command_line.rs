@@ -1,53 +1,14 @@
 //! The contract of the command line: exit codes, places in files, no partly written files.
 
 use posegate_site::SAMPLE;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use posegate_testkit::commands::elf;
+use posegate_testkit::run::{Case, cases, command};
+use serde_json::{Value, json};
+use std::process::{Command, Stdio};
 
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        folder.write("site.toml", SAMPLE);
-        folder
-    }
-
-    fn path(&self) -> &Path {
-        self.0.path()
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path().join(name), text).unwrap();
-    }
-
-    fn run(&self, line: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args(line.split_whitespace())
-            .current_dir(self.path())
-            .stdin(Stdio::null())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs a line and expects an exit code. Returns stdout and stderr.
-    fn expect(&self, code: i32, line: &str) -> (String, String) {
-        let output = self.run(line);
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
-        (out, err)
-    }
-
-    /// Returns the names in the folder.
-    fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> = std::fs::read_dir(self.path())
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
+/// Returns a folder with the sample site.
+fn sample() -> Case {
+    Case::new(&[("site.toml", SAMPLE.as_bytes())])
 }
 
 const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
@@ -55,20 +16,20 @@ const HEADER: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw
 /// A table tells the share of the set that it holds, and what it lacks on stderr: of a union the set that it lacks.
 #[test]
 fn table_build_warns_of_what_table_lacks() {
-    let folder = Folder::new();
+    let folder = sample();
     let build = |success: &str, xy: f64, options: &str| {
         let site = format!(
             "[task.t]\nkind = \"work\"\ngoal = {{ x = 1.0, y = 0.0, yaw_deg = 90.0 }}\nsuccess = {success}\n[confidence]\nepsilon = 0.99\n\
              [table]\nextent = {{ x = [-1.0, 1.0], y = [-1.0, 1.0], yaw_deg = [-10.0, 10.0] }}\nstep = {{ xy = {xy:?}, yaw_deg = 1.0 }}\n"
         );
-        std::fs::write(folder.path().join("t.toml"), site).unwrap();
+        folder.write("t.toml", site);
         folder.expect(
             0,
             &format!("table build t.toml --task t -o t.posegate {options}"),
         )
     };
     let covered = |out: &str| {
-        let built: serde_json::Value = serde_json::from_str(out).unwrap();
+        let built: Value = serde_json::from_str(out).unwrap();
         built["covered"].as_f64().unwrap()
     };
     let large = "{ shape = \"box\", x = [-0.8, 0.4], y = [-0.53, 0.5], yaw_deg = [-8.0, 8.0] }";
@@ -103,16 +64,14 @@ fn table_build_warns_of_what_table_lacks() {
 
 #[test]
 fn site_becomes_a_table_that_decides() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(0, "check site.toml");
-    let (out, _) = folder.expect(
+    let built = folder.json(
         0,
         "table build site.toml --task dock -o dock.posegate --json --layout grid",
     );
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(built["proven"]["cells"], 384);
-    let (out, _) = folder.expect(0, "table info dock.posegate --json");
-    let info: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let info = folder.json(0, "table info dock.posegate --json");
     assert_eq!(
         (&info["task"], &info["epsilon"]),
         (&"dock".into(), &0.99.into())
@@ -124,13 +83,13 @@ fn site_becomes_a_table_that_decides() {
     assert!(info["site_digest"].is_null());
     assert_eq!(built["site_digest"].as_str().unwrap().len(), 64);
     assert_ne!(built["site_digest"], built["task_digest"]);
-    assert_eq!(info["parts"], serde_json::json!(["cells"]));
+    assert_eq!(info["parts"], json!(["cells"]));
     // The table's own bound on the instructions of a decision.
-    let bytes = std::fs::read(folder.path().join("dock.posegate")).unwrap();
+    let bytes = folder.read("dock.posegate");
     let worst = posegate::table::Table::parse(&bytes).unwrap().worst_case();
     assert_eq!(
         info["worst_case"],
-        serde_json::json!({"m4f": worst.instructions_m4f(), "m0plus": worst.instructions_m0_plus()})
+        json!({"m4f": worst.instructions_m4f(), "m0plus": worst.instructions_m0_plus()})
     );
     assert!(worst.runs > 0 && info["worst_case"] == built["worst_case"]);
     let (out, _) = folder.expect(
@@ -146,20 +105,18 @@ fn site_becomes_a_table_that_decides() {
     assert!(info["sight"].is_null());
     folder.expect(0, "table verify dock.posegate site.toml");
     folder.expect(0, "table build site.toml --task see-t7 -o see-t7.posegate");
-    let (out, _) = folder.expect(0, "table info see-t7.posegate --json");
-    let info: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let info = folder.json(0, "table info see-t7.posegate --json");
     let sight = &info["sight"];
     assert_eq!((&sight["tag"], &sight["d_max"]), (&7.into(), &5.5.into()));
-    assert_eq!(info["parts"], serde_json::json!(["headings", "sight"]));
-    assert_eq!(sight["tag_position"], serde_json::json!([4.0, 0.0, 0.5]));
+    assert_eq!(info["parts"], json!(["headings", "sight"]));
+    assert_eq!(sight["tag_position"], json!([4.0, 0.0, 0.5]));
     assert_eq!(sight["camera"]["fx"], 615.0);
     assert!((sight["phi_max_deg"].as_f64().unwrap() - 25.0).abs() < 1e-6);
     for (layout, made) in [("facets", "facets"), ("both", "facets"), ("auto", "facets")] {
         let line = format!(
             "table build site.toml --task dock -o {layout}.posegate --layout {layout} --json"
         );
-        let (out, _) = folder.expect(0, &line);
-        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let built = folder.json(0, &line);
         assert_eq!(built["layout"], made);
         assert!(
             built["proven"]["corners"].as_u64().unwrap() > 0
@@ -172,19 +129,18 @@ fn site_becomes_a_table_that_decides() {
     for layout in ["facets", "both", "auto"] {
         folder.expect(0, &format!("gate {layout}.posegate --estimates permit.csv"));
     }
-    let (out, _) = folder.expect(0, "gate dock.posegate --estimates permit.csv --json");
-    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let line = folder.json(0, "gate dock.posegate --estimates permit.csv --json");
     assert_eq!(
         (&line["verdict"], &line["reason"]),
-        (&"permit".into(), &serde_json::Value::Null)
+        (&"permit".into(), &Value::Null)
     );
     assert_eq!(line["task_digest"], task_digest);
     folder.write(
         "both.csv",
-        &format!("{permit}0,0.07,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
+        format!("{permit}0,0.07,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
     );
     let (out, _) = folder.expect(1, "gate dock.posegate --estimates both.csv --json");
-    let denied: serde_json::Value = serde_json::from_str(out.lines().nth(1).unwrap()).unwrap();
+    let denied: Value = serde_json::from_str(out.lines().nth(1).unwrap()).unwrap();
     assert_eq!(
         (&denied["index"], &denied["reason"]),
         (&1.into(), &"not_contained".into())
@@ -193,11 +149,10 @@ fn site_becomes_a_table_that_decides() {
         denied["margin"].as_f64().unwrap() < 1.0
             && denied["worst_pose"][0].as_f64().unwrap() > 0.07
     );
-    let (out, _) = folder.expect(
+    let line = folder.json(
         0,
         "contains site.toml --task see-t7 --poses permit.csv --json",
     );
-    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!(
         (&line["inside"], &line["visible"], &line["d"]),
         (&true.into(), &true.into(), &3.75.into())
@@ -209,26 +164,26 @@ fn site_becomes_a_table_that_decides() {
         let (out, _) = folder.expect(1, "table verify dock.posegate changed.toml");
         assert!(out.contains("NOT proven") && out.contains(why), "{out}");
     }
-    folder.write("commented.toml", &format!("# a comment\n{SAMPLE}"));
+    folder.write("commented.toml", format!("# a comment\n{SAMPLE}"));
     folder.expect(0, "table verify dock.posegate commented.toml");
 }
 
 #[test]
 fn epsilon_option_changes_the_verdict() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(0, "table build site.toml --task dock -o dock.posegate");
     folder.write(
         "e.csv",
-        &format!("{HEADER}0,0,0,0,2.5e-4,0,0,2.5e-4,0,1e-5\n"),
+        format!("{HEADER}0,0,0,0,2.5e-4,0,0,2.5e-4,0,1e-5\n"),
     );
     folder.expect(0, "gate dock.posegate --estimates e.csv");
     folder.expect(1, "gate dock.posegate --estimates e.csv --epsilon 0.9999");
     for epsilon in ["0", "1", "-1", "nan", "inf", "1e-9", "2"] {
-        let (_, err) = folder.expect(
-            2,
-            &format!("gate dock.posegate --estimates e.csv --epsilon={epsilon}"),
-        );
-        assert!(err.contains("epsilon"), "{err}");
+        folder
+            .run(&format!(
+                "gate dock.posegate --estimates e.csv --epsilon={epsilon}"
+            ))
+            .is_refused_with(&["epsilon"]);
     }
     for age in ["0", "2147483648"] {
         folder.expect(
@@ -269,30 +224,21 @@ fn changed(from: &str, to: &str) -> String {
 /// Each bad site file is named with its line and column, exits with 2, and leaves nothing behind.
 #[test]
 fn bad_site_is_reported_with_line_and_column() {
-    let changes = [
-        ("fx = 615.0", "fx = 0.0", "above 0"),
-        ("fx = 615.0", "fx = \"615\"", "is a string"),
-        ("fx = 615.0", "fx = nan", "fx"),
-        ("fx = 615.0", "focal = 615.0", "unknown key"),
-        ("yaw_deg = 180.0", "yaw = 3.14", "yaw_deg"),
-        ("shape = \"box\"", "shape = \"circle\"", "circle"),
-        ("kind = \"work\"", "kind = \"wrok\"", "wrok"),
-        ("tag = \"t7\"", "tag = \"t8\"", "t8"),
-        ("epsilon = 0.99", "epsilon = 1.0", "epsilon"),
-        ("x = [-0.08, 0.08]", "x = [0.08, -0.08]", "0.08"),
-        (
-            "[[2.25, 0.75], [-2.25, 0.75], [-2.25, -0.75], [2.25, -0.75]]",
-            "[[2.25, 0.75], [2.25, -0.75], [-2.25, -0.75], [-2.25, 0.75]]",
-            "clockwise",
-        ),
-        (
-            "[[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]]",
-            "[[2.5, 1.5], [0.0, -0.1], [-2.5, -1.5], [2.5, -1.5]]",
-            "convex",
-        ),
-    ];
-    for (from, to, fragment) in changes {
-        let folder = Folder::new();
+    let changes = "
+        fx = 615.0 => fx = 0.0 => above 0
+        fx = 615.0 => fx = \"615\" => is a string
+        fx = 615.0 => fx = nan => fx
+        fx = 615.0 => focal = 615.0 => unknown key
+        yaw_deg = 180.0 => yaw = 3.14 => yaw_deg
+        shape = \"box\" => shape = \"circle\" => circle
+        kind = \"work\" => kind = \"wrok\" => wrok
+        tag = \"t7\" => tag = \"t8\" => t8
+        epsilon = 0.99 => epsilon = 1.0 => epsilon
+        x = [-0.08, 0.08] => x = [0.08, -0.08] => 0.08
+        [[2.25, 0.75], [-2.25, 0.75], [-2.25, -0.75], [2.25, -0.75]] => [[2.25, 0.75], [2.25, -0.75], [-2.25, -0.75], [-2.25, 0.75]] => clockwise
+        [[2.5, 1.5], [-2.5, 1.5], [-2.5, -1.5], [2.5, -1.5]] => [[2.5, 1.5], [0.0, -0.1], [-2.5, -1.5], [2.5, -1.5]] => convex";
+    for [from, to, fragment] in cases(changes) {
+        let folder = sample();
         let text = changed(from, to);
         folder.write("bad.toml", &text);
         for line in [
@@ -301,9 +247,8 @@ fn bad_site_is_reported_with_line_and_column() {
         ] {
             let (_, err) = folder.expect(2, line);
             // Whitespace and line breaks of the report do not matter.
-            let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(
-                flat.contains("bad.toml:") && flat.contains(fragment),
+                err.contains("bad.toml:") && err.contains(fragment),
                 "{to}: {err}"
             );
             let number = text
@@ -312,7 +257,7 @@ fn bad_site_is_reported_with_line_and_column() {
                 .unwrap()
                 + 1;
             assert!(
-                flat.contains(&format!("bad.toml:{number}:")),
+                err.contains(&format!("bad.toml:{number}:")),
                 "{to}, line {number}: {err}"
             );
         }
@@ -322,13 +267,13 @@ fn bad_site_is_reported_with_line_and_column() {
 
 #[test]
 fn bad_tables_and_recordings_are_refused() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(
         0,
         "table build site.toml --task dock -o dock.posegate --layout both",
     );
-    folder.write("e.csv", &format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n"));
-    let good = std::fs::read(folder.path().join("dock.posegate")).unwrap();
+    folder.write("e.csv", format!("{HEADER}0,0,0,0,1e-4,0,0,1e-4,0,1e-5\n"));
+    let good = folder.read("dock.posegate");
     let mut flipped = good.clone();
     flipped[200] ^= 4;
     let mut version = good.clone();
@@ -347,18 +292,14 @@ fn bad_tables_and_recordings_are_refused() {
             "POSEGATE",
         ),
     ] {
-        std::fs::write(folder.path().join(name), bytes).unwrap();
+        folder.write(name, bytes);
         for line in [
             format!("gate {name} --estimates e.csv"),
             format!("table info {name}"),
             format!("table verify {name} site.toml"),
             format!("table export {name} --format c -o out.h"),
         ] {
-            let (out, err) = folder.expect(2, &line);
-            assert!(
-                err.contains(word) && err.contains(name) && out.is_empty(),
-                "{line}: {err}"
-            );
+            folder.run(&line).is_refused_with(&[word, name]);
         }
     }
     assert!(!folder.path().join("out.h").exists());
@@ -376,21 +317,21 @@ fn bad_tables_and_recordings_are_refused() {
         ),
     ] {
         folder.write("bad.csv", &text);
-        let (_, err) = folder.expect(2, "gate dock.posegate --estimates bad.csv");
-        let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(flat.contains("bad.csv") && flat.contains(fragment), "{err}");
+        folder
+            .run("gate dock.posegate --estimates bad.csv")
+            .is_refused_with(&["bad.csv", fragment]);
     }
     folder.expect(2, "gate dock.posegate --estimates missing.csv");
     // An unclosed quote hides no row.
     let row = "9,9,9,9,1,0,0,1,0,1";
     let header = HEADER.trim_end();
-    folder.write("note.csv", &format!("{header},note\n{row},\"a\n{row},b\n"));
+    folder.write("note.csv", format!("{header},note\n{row},\"a\n{row},b\n"));
     let (out, _) = folder.expect(1, "gate dock.posegate --estimates note.csv --json");
     assert!(out.contains("\"index\":1"), "{out}");
     // NaN is a number that is denied, not bad input.
     folder.write(
         "nan.csv",
-        &format!("{HEADER}0,nan,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
+        format!("{HEADER}0,nan,0,0,1e-4,0,0,1e-4,0,1e-5\n"),
     );
     assert!(
         folder
@@ -402,7 +343,7 @@ fn bad_tables_and_recordings_are_refused() {
 
 #[test]
 fn failed_command_writes_no_file() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(2, "table build site.toml --task nothing -o out.posegate");
     folder.expect(
         2,
@@ -414,22 +355,18 @@ fn failed_command_writes_no_file() {
     );
     folder.write(
         "wide.toml",
-        &SAMPLE.replace("x = 4.0, y = 0.0, z = 0.5", "x = 200.0, y = 0.0, z = 0.5"),
+        SAMPLE.replace("x = 4.0, y = 0.0, z = 0.5", "x = 200.0, y = 0.0, z = 0.5"),
     );
-    let (_, err) = folder.expect(
-        2,
-        "table build wide.toml --task see-t7 -o out.posegate --layout facets",
-    );
-    assert!(err.contains("facets"), "{err}");
-    folder.write("large.toml", &SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
-    let (_, err) = folder.expect(2, "table build large.toml --task dock -o out.posegate");
-    assert!(err.contains("400000") && err.contains("65535"), "{err}");
+    folder
+        .run("table build wide.toml --task see-t7 -o out.posegate --layout facets")
+        .is_refused_with(&["facets"]);
+    folder.write("large.toml", SAMPLE.replace("xy = 0.02", "xy = 0.00001"));
+    folder
+        .run("table build large.toml --task dock -o out.posegate")
+        .is_refused_with(&["400000", "65535"]);
     assert_eq!(folder.names(), ["large.toml", "site.toml", "wide.toml"]);
     folder.expect(2, "init site.toml");
-    assert_eq!(
-        std::fs::read_to_string(folder.path().join("site.toml")).unwrap(),
-        SAMPLE
-    );
+    assert_eq!(folder.text("site.toml"), SAMPLE);
 }
 
 /// An output that is a link replaces the linked file, and the link stays. An output that is not a regular file is written to
@@ -438,15 +375,15 @@ fn failed_command_writes_no_file() {
 #[test]
 fn links_and_pipes_are_kept_as_outputs() {
     use std::os::unix::fs::FileTypeExt;
-    let folder = Folder::new();
+    let folder = sample();
     let path = |name: &str| folder.path().join(name);
     folder.expect(0, "table build site.toml --task dock -o plain.posegate");
-    let table = std::fs::read(path("plain.posegate")).unwrap();
+    let table = folder.read("plain.posegate");
     folder.write("old.posegate", "old");
     std::os::unix::fs::symlink("old.posegate", path("link.posegate")).unwrap();
     folder.expect(0, "table build site.toml --task dock -o link.posegate");
     assert!(path("link.posegate").is_symlink());
-    assert_eq!(std::fs::read(path("old.posegate")).unwrap(), table);
+    assert_eq!(folder.read("old.posegate"), table);
     let made = Command::new("mkfifo").arg(path("pipe")).status().unwrap();
     assert!(made.success());
     let mut reader = Command::new("cat")
@@ -454,7 +391,8 @@ fn links_and_pipes_are_kept_as_outputs() {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    let output = folder.run("table build site.toml --task dock -o pipe");
+    let mut build = command(folder.path(), "table build site.toml --task dock -o pipe");
+    let output = build.output().unwrap();
     let is_pipe = path("pipe").metadata().unwrap().file_type().is_fifo();
     if !is_pipe || !output.status.success() {
         // It would wait forever.
@@ -463,11 +401,9 @@ fn links_and_pipes_are_kept_as_outputs() {
     assert!(is_pipe && output.status.success(), "{output:?}");
     assert_eq!(reader.wait_with_output().unwrap().stdout, table);
     std::os::unix::fs::symlink("nowhere.posegate", path("astray")).unwrap();
-    let (_, err) = folder.expect(2, "table build site.toml --task dock -o astray");
-    assert!(
-        err.contains("a link to a file that does not exist"),
-        "{err}"
-    );
+    folder
+        .run("table build site.toml --task dock -o astray")
+        .is_refused_with(&["a link to a file that does not exist"]);
     std::fs::remove_file(path("astray")).unwrap();
     assert_eq!(
         folder.names(),
@@ -486,9 +422,9 @@ fn links_and_pipes_are_kept_as_outputs() {
 #[test]
 fn open_output_is_appended_to() {
     use std::io::{Read, Seek, Write};
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(0, "table build site.toml --task dock -o plain.posegate");
-    let table = std::fs::read(folder.path().join("plain.posegate")).unwrap();
+    let table = folder.read("plain.posegate");
     let path = |name: &str| folder.path().join(name);
     let open = |name: &str| {
         let mut options = std::fs::File::options();
@@ -499,12 +435,9 @@ fn open_output_is_appended_to() {
     std::fs::remove_file(path("nameless")).unwrap();
     for mut log in [open("log"), nameless] {
         log.write_all(b"before").unwrap();
-        let status = Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args("table build site.toml --task dock --json -o /proc/self/fd/1".split(' '))
-            .current_dir(folder.path())
-            .stdout(log.try_clone().unwrap())
-            .status()
-            .unwrap();
+        let line = "table build site.toml --task dock --json -o /proc/self/fd/1";
+        let mut command = command(folder.path(), line);
+        let status = command.stdout(log.try_clone().unwrap()).status().unwrap();
         assert!(status.success());
         let mut all = Vec::new();
         log.rewind().unwrap();
@@ -517,15 +450,15 @@ fn open_output_is_appended_to() {
 
 #[test]
 fn exported_array_equals_the_table() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(0, "table build site.toml --task see-t7 -o t.posegate");
-    let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
+    let bytes = folder.read("t.posegate");
     for format in ["c", "rust"] {
         folder.expect(
             0,
             &format!("table export t.posegate --format {format} -o out"),
         );
-        let text = std::fs::read_to_string(folder.path().join("out")).unwrap();
+        let text = folder.text("out");
         let body = text.split(['{', '[']).next_back().unwrap();
         let values: Vec<u8> = body
             .split("0x")
@@ -543,13 +476,13 @@ fn exported_array_equals_the_table() {
 
 #[test]
 fn version_starts_with_the_program_name() {
-    let (out, _) = Folder::new().expect(0, "--version");
+    let (out, _) = sample().expect(0, "--version");
     assert_eq!(out.trim(), concat!("posegate ", env!("CARGO_PKG_VERSION")));
 }
 
 #[test]
 fn every_subcommand_has_help_with_an_example() {
-    let folder = Folder::new();
+    let folder = sample();
     for command in [
         "",
         "init",
@@ -575,10 +508,12 @@ fn every_subcommand_has_help_with_an_example() {
     }
     folder.expect(2, "");
     folder.expect(2, "nonsense");
-    let (_, err) = folder.expect(2, "explain nonsense");
-    assert!(err.contains("the reasons are"), "{err}");
-    let (_, err) = folder.expect(2, "explain not_contaned");
-    assert!(err.contains("did you mean `not_contained`?"), "{err}");
+    folder
+        .run("explain nonsense")
+        .is_refused_with(&["the reasons are"]);
+    folder
+        .run("explain not_contaned")
+        .is_refused_with(&["did you mean `not_contained`?"]);
     let (out, _) = folder.expect(0, "explain");
     for reason in posegate::gate::Reason::ALL {
         assert!(out.contains(reason.name()) && out.contains(reason.action()));
@@ -588,17 +523,17 @@ fn every_subcommand_has_help_with_an_example() {
 /// Two runs of one build give the same bytes.
 #[test]
 fn builds_are_reproducible() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.expect(0, "table build site.toml --task see-t7 -o a --threads 1");
     folder.expect(0, "table build site.toml --task see-t7 -o b --threads 2");
-    let read = |name| std::fs::read(folder.path().join(name)).unwrap();
+    let read = |name| folder.read(name);
     assert!(read("a") == read("b"));
 }
 
 /// Sites that `check` calls valid can be built, whatever their angles and steps.
 #[test]
 fn valid_site_with_unusual_numbers_is_built() {
-    let folder = Folder::new();
+    let folder = sample();
     let site = |goal: &str, yaw: &str, x: &str, extent: &str, xy: &str| {
         format!(
             "[task.t]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = {goal} }}\n\
@@ -648,11 +583,10 @@ fn valid_site_with_unusual_numbers_is_built() {
             60 * 60 * 2,
         ),
     ] {
-        folder.write("odd.toml", &site(goal, yaw, x, extent, xy));
+        folder.write("odd.toml", site(goal, yaw, x, extent, xy));
         folder.expect(0, "check odd.toml");
         let line = "table build odd.toml --task t -o odd.posegate --json --layout grid";
-        let (out, _) = folder.expect(0, line);
-        let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let built = folder.json(0, line);
         let proven = built["proven"]["cells"].as_u64().unwrap();
         // The last row and column may lie half outside.
         assert!(
@@ -661,68 +595,44 @@ fn valid_site_with_unusual_numbers_is_built() {
         );
     }
     // Sites that cannot be built are refused by `check`, with the task.
-    for (from, to, fragment) in [
-        (
-            "x = 0.0, y = 0.0, yaw_deg = 0.0 }",
-            "x = 5000.0, y = 0.0, yaw_deg = 0.0 }",
-            "2000 m",
-        ),
-        ("epsilon = 0.99", "epsilon = 0.001", "0.001"),
-        ("step = { xy = 0.02", "step = { xy = 0.0001", "40000 rows"),
-    ] {
-        folder.write("bad.toml", &changed(from, to));
-        let (_, err) = folder.expect(2, "check bad.toml");
-        let flat: String = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(
-            flat.contains("bad.toml: task `") && flat.contains(fragment),
-            "{err}"
-        );
+    for [from, to, fragment] in cases(
+        "
+        x = 0.0, y = 0.0, yaw_deg = 0.0 } => x = 5000.0, y = 0.0, yaw_deg = 0.0 } => 2000 m
+        epsilon = 0.99 => epsilon = 0.001 => 0.001
+        step = { xy = 0.02 => step = { xy = 0.0001 => 40000 rows
+        ",
+    ) {
+        folder.write("bad.toml", changed(from, to));
+        folder
+            .run("check bad.toml")
+            .is_refused_with(&["bad.toml: task `", fragment]);
     }
     folder.expect(2, "table build site.toml --task dock -o - --json");
     folder.expect(2, "table build site.toml --task dock -o t --threads 0");
 }
 
-/// Returns an ELF file of one segment at an address.
-fn elf(address: u32, bytes: &[u8]) -> Vec<u8> {
-    let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
-    let halves = |file: &mut Vec<u8>, values: &[u16]| {
-        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-    };
-    let words = |file: &mut Vec<u8>, values: &[u32]| {
-        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-    };
-    halves(&mut file, &[2, 40]);
-    words(&mut file, &[1, 0, 52, 0, 0]);
-    halves(&mut file, &[52, 32, 1, 40, 0, 0]);
-    let length = bytes.len() as u32;
-    words(&mut file, &[1, 84, address, address, length, length, 5, 4]);
-    file.extend(bytes);
-    file
-}
-
 #[test]
 fn firmware_is_sealed_or_left_unchanged() {
     use posegate::gate::Seal;
-    let folder = Folder::new();
+    let folder = sample();
     let path = |name: &str| folder.path().join(name);
     let code: Vec<u8> = (0..100).collect();
     let image = [&code[..], &Seal::MAGIC, &[0xff; 12], &code[..60]].concat();
-    std::fs::write(path("firmware"), elf(0x0800_0000, &image)).unwrap();
-    let (out, _) = folder.expect(0, "table seal firmware -o sealed --json");
-    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    folder.write("firmware", elf(0x0800_0000, &image));
+    let report = folder.json(0, "table seal firmware -o sealed --json");
     assert_eq!(
         (report["start"].as_u64(), report["length"].as_u64()),
         (Some(0x0800_0000), Some(180))
     );
-    let sealed = std::fs::read(path("sealed")).unwrap();
+    let sealed = folder.read("sealed");
     assert_eq!(posegate::table::checksum(&sealed[84..]), Seal::SUM);
     // In place, and again.
     for _ in 0..2 {
         folder.expect(0, "table seal firmware");
-        assert_eq!(std::fs::read(path("firmware")).unwrap(), sealed);
+        assert_eq!(folder.read("firmware"), sealed);
     }
     // A file that cannot be sealed is not changed.
-    std::fs::write(path("bare"), elf(0, &code)).unwrap();
+    folder.write("bare", elf(0, &code));
     for (name, expected) in [
         ("bare", "no seal record"),
         ("site.toml", "not a 32-bit little-endian ELF file"),
@@ -730,9 +640,9 @@ fn firmware_is_sealed_or_left_unchanged() {
     ] {
         let before = std::fs::read(path(name)).ok();
         let names = folder.names();
-        let (_, err) = folder.expect(2, &format!("table seal {name}"));
-        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(err.contains(expected) && err.contains("help"), "{err}");
+        folder
+            .run(&format!("table seal {name}"))
+            .is_refused_with(&[expected, "help"]);
         assert_eq!(std::fs::read(path(name)).ok(), before);
         assert_eq!(folder.names(), names);
     }
@@ -741,7 +651,7 @@ fn firmware_is_sealed_or_left_unchanged() {
 /// All sigmas zero, or a covariance of zeros, give the cost of the goal. A single zero is refused.
 #[test]
 fn exact_pose_costs_as_much_as_its_goal() {
-    let folder = Folder::new();
+    let folder = sample();
     folder.write("zero.csv", "0,0,0\n0,0,0\n0,0,0\n");
     folder.write("flat.csv", "0.01,0,0\n0,0,0\n0,0,0.0003\n");
     let see = "cost site.toml --task see-t7";
@@ -749,8 +659,7 @@ fn exact_pose_costs_as_much_as_its_goal() {
         "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0",
         "--covariance-file zero.csv",
     ] {
-        let (out, _) = folder.expect(0, &format!("{see} {exact} --json"));
-        let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let report = folder.json(0, &format!("{see} {exact} --json"));
         for (name, value) in [
             ("integral", 1406.25),
             ("mass", 1.0),
@@ -760,45 +669,36 @@ fn exact_pose_costs_as_much_as_its_goal() {
         ] {
             assert!(
                 (report[name].as_f64().unwrap() - value).abs() < 1e-9,
-                "{out}"
+                "{report}"
             );
-            assert_eq!(report[format!("{name}_error")], 0.0, "{out}");
+            assert_eq!(report[format!("{name}_error")], 0.0, "{report}");
         }
-        assert_eq!(report.as_object().unwrap().len(), 10, "{out}");
+        assert_eq!(report.as_object().unwrap().len(), 10, "{report}");
     }
-    for (line, fragment) in [
-        (
-            "--sigma-x 0.1 --sigma-y 0 --sigma-yaw-deg 1",
-            "sigma_y is 0",
-        ),
-        ("--covariance-file flat.csv", "not positive definite"),
-        (
-            "--covariance-file zero.csv --sigma-x 0",
-            "cannot be used with",
-        ),
-        (
-            "--sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0 --c2 inf",
-            "c2 is inf",
-        ),
-    ] {
-        let (out, err) = folder.expect(2, &format!("{see} {line}"));
-        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
-        assert!(!err.contains("posegate place"), "{line}: {err}");
+    for [line, fragment] in cases(
+        "
+        --sigma-x 0.1 --sigma-y 0 --sigma-yaw-deg 1 => sigma_y is 0
+        --covariance-file flat.csv => not positive definite
+        --covariance-file zero.csv --sigma-x 0 => cannot be used with
+        --sigma-x 0 --sigma-y 0 --sigma-yaw-deg 0 --c2 inf => c2 is inf
+        ",
+    ) {
+        let ended = folder.run(&format!("{see} {line}"));
+        ended.is_refused_with(&[fragment]);
+        assert!(!ended.err.contains("posegate place"), "{}", ended.err);
     }
 }
 
 /// Invalid pose-sets, costs and views are named, and nothing is printed for them.
 #[test]
 fn invalid_input_of_cost_is_refused() {
-    let folder = Folder::new();
+    let folder = sample();
     let sigmas = "--sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1";
-    let (out, _) = folder.expect(0, &format!("cost site.toml --task see-t7 {sigmas} --json"));
-    let line: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let line = folder.json(0, &format!("cost site.toml --task see-t7 {sigmas} --json"));
     for key in ["integral", "mass", "mean", "outside_mass", "p_miss"] {
         assert!(
             line[key].is_f64() && line[format!("{key}_error")].is_f64(),
-            "{out}"
+            "{line}"
         );
     }
     // The site's epsilon is the default.
@@ -812,56 +712,31 @@ fn invalid_input_of_cost_is_refused() {
     folder.write("p.csv", "0.09,0,0\n0,0.09,0\n0,0,0.0003\n");
     folder.expect(0, "cost site.toml --task see-t7 --covariance-file p.csv");
     let see = "cost site.toml --task see-t7";
-    for (line, fragment) in [
-        (
-            format!("cost site.toml --task dock {sigmas}"),
-            "task `dock`",
-        ),
-        (
-            format!("cost site.toml --task dock {sigmas}"),
-            "no view of a tag",
-        ),
-        (format!("cost site.toml --task see-t8 {sigmas}"), "see-t7"),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y 0.3"),
-            "--sigma-yaw-deg",
-        ),
-        (see.to_string(), "--covariance-file"),
-        (
-            format!("{see} {sigmas} --covariance-file p.csv"),
-            "cannot be used with",
-        ),
-        (
-            format!("{see} --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1"),
-            "sigma_x is 0",
-        ),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1"),
-            "sigma_y is -0.3",
-        ),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan"),
-            "sigma_yaw is NaN",
-        ),
-        (
-            format!("{see} --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5"),
-            "turns",
-        ),
-        (format!("{see} {sigmas} --epsilon 0"), "epsilon is 0"),
-        (format!("{see} {sigmas} --epsilon 1"), "epsilon is 1"),
-        (format!("{see} {sigmas} --epsilon -0.5"), "epsilon is -0.5"),
-        (format!("{see} {sigmas} --epsilon nan"), "epsilon is NaN"),
-        (format!("{see} {sigmas} --c-high -1"), "c_high is -1"),
-        (format!("{see} {sigmas} --c2 inf"), "c2 is inf"),
-        (format!("{see} {sigmas} --accuracy 0"), "accuracy is 0"),
-        (
-            format!("{see} --covariance-file missing.csv"),
-            "missing.csv",
-        ),
-    ] {
-        let (out, err) = folder.expect(2, &line);
-        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(err.contains(fragment) && out.is_empty(), "{line}: {err}");
+    for [line, fragment] in cases(
+        "
+        dock SIGMAS => task `dock`
+        dock SIGMAS => no view of a tag
+        see-t8 SIGMAS => see-t7
+        see-t7 --sigma-x 0.3 --sigma-y 0.3 => --sigma-yaw-deg
+        see-t7 => --covariance-file
+        see-t7 SIGMAS --covariance-file p.csv => cannot be used with
+        see-t7 --sigma-x 0 --sigma-y 0.3 --sigma-yaw-deg 1 => sigma_x is 0
+        see-t7 --sigma-x 0.3 --sigma-y -0.3 --sigma-yaw-deg 1 => sigma_y is -0.3
+        see-t7 --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg nan => sigma_yaw is NaN
+        see-t7 --sigma-x 0.3 --sigma-y 0.3 --sigma-yaw-deg 1e5 => turns
+        see-t7 SIGMAS --epsilon 0 => epsilon is 0
+        see-t7 SIGMAS --epsilon 1 => epsilon is 1
+        see-t7 SIGMAS --epsilon -0.5 => epsilon is -0.5
+        see-t7 SIGMAS --epsilon nan => epsilon is NaN
+        see-t7 SIGMAS --c-high -1 => c_high is -1
+        see-t7 SIGMAS --c2 inf => c2 is inf
+        see-t7 SIGMAS --accuracy 0 => accuracy is 0
+        see-t7 --covariance-file missing.csv => missing.csv
+        ",
+    ) {
+        let line = line.replace("SIGMAS", sigmas);
+        let ended = folder.run(&format!("cost site.toml --task {line}"));
+        ended.is_refused_with(&[fragment]);
     }
     for (text, fragment) in [
         ("0.09,0,0\n0,0.09,0\n", "p.csv:2: 2 rows"),
@@ -880,29 +755,24 @@ fn invalid_input_of_cost_is_refused() {
         ("", "p.csv:1: 0 rows"),
     ] {
         folder.write("p.csv", text);
-        let (out, err) = folder.expect(2, &format!("{see} --covariance-file p.csv"));
-        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(
-            err.contains(fragment) && err.contains("p.csv") && out.is_empty(),
-            "{err}"
-        );
+        folder
+            .run(&format!("{see} --covariance-file p.csv"))
+            .is_refused_with(&[fragment, "p.csv"]);
     }
 }
 
 #[test]
 fn metrics_compares_or_refuses_trajectories() {
-    let folder = Folder::new();
+    let folder = sample();
     let line = |k: u32, y: f64| format!("{k}.0 {}.5 {y} 0 0 0 0 1\n", k / 4);
     let truth: String = (0..20).map(|k| line(k, f64::from(k % 3))).collect();
     let estimate: String = (0..20).map(|k| line(k, f64::from(k % 3) + 0.07)).collect();
     folder.write(
         "truth.txt",
-        &format!("# truth\r\n\r\n{}", truth.replace('\n', "\r\n")),
+        format!("# truth\r\n\r\n{}", truth.replace('\n', "\r\n")),
     );
     folder.write("estimate.txt", &estimate);
-    let get = |line: &str| -> serde_json::Value {
-        serde_json::from_str(&folder.expect(0, line).0).unwrap()
-    };
+    let get = |line: &str| folder.json(0, line);
     let found = get("metrics truth.txt estimate.txt --json");
     assert_eq!(found["pairs"], 20);
     assert!((found["ape"]["translation"]["rmse"].as_f64().unwrap() - 0.07).abs() < 1e-12);
@@ -979,47 +849,42 @@ fn metrics_compares_or_refuses_trajectories() {
         ),
         ("- -", "standard input"),
     ] {
-        let (out, err) = folder.expect(2, &format!("metrics {arguments} --json"));
-        let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(
-            err.contains(fragment) && out.is_empty(),
-            "{arguments}: {err}"
-        );
+        folder
+            .run(&format!("metrics {arguments} --json"))
+            .is_refused_with(&[fragment]);
     }
 }
 
 /// A command of an earlier version answers in one line that has a command of today, and writes nothing.
 #[test]
 fn earlier_commands_tell_what_to_type() {
-    let folder = Folder::new();
+    let folder = sample();
     let before = folder.names();
-    for (line, instead) in [
-        ("completions bash", "posegate --completions SHELL"),
-        ("doctor site.toml -o out", "posegate check SITE --draw DIR"),
-        ("family site.toml --tag t7 --r 0.02", "posegate table build"),
-        (
-            "inscribe site.toml --task dock",
-            "posegate contains SITE --task TASK --box",
-        ),
-        ("man -o pages", "posegate --man DIR"),
-        ("seal firmware", "posegate table seal FIRMWARE"),
-        ("seal --help", "posegate table seal FIRMWARE"),
-    ] {
-        let (out, err) = folder.expect(2, line);
-        assert!(out.is_empty() && err.lines().count() == 1, "{err}");
-        assert!(err.contains(instead), "{line}: {err}");
+    for [line, instead] in cases(
+        "
+        completions bash => posegate --completions SHELL
+        doctor site.toml -o out => posegate check SITE --draw DIR
+        family site.toml --tag t7 --r 0.02 => posegate table build
+        inscribe site.toml --task dock => posegate contains SITE --task TASK --box
+        man -o pages => posegate --man DIR
+        seal firmware => posegate table seal FIRMWARE
+        seal --help => posegate table seal FIRMWARE
+        ",
+    ) {
+        let ended = folder.run(line);
+        ended.is_refused_with(&[instead]);
+        assert_eq!(ended.err.lines().count(), 1, "{}", ended.err);
     }
     assert_eq!(folder.names(), before);
 }
 
 #[test]
 fn box_is_inside_the_set_and_about_the_goal() {
-    let folder = Folder::new();
-    let (out, _) = folder.expect(0, "contains site.toml --task dock --box --json");
-    let found: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let folder = sample();
+    let found = folder.json(0, "contains site.toml --task dock --box --json");
     for axis in ["x", "y", "yaw_deg"] {
         let [low, high] = [0, 1].map(|end| found[axis][end].as_f64().unwrap());
-        assert!(low < 0.0 && high > 0.0, "{out}");
+        assert!(low < 0.0 && high > 0.0, "{found}");
     }
     let (text, _) = folder.expect(0, "contains site.toml --task dock --box --yaw-deg 1");
     assert!(text.contains("yaw_deg = [-1.0, 1.0]"), "{text}");
@@ -1030,7 +895,7 @@ fn box_is_inside_the_set_and_about_the_goal() {
 
 #[test]
 fn completions_and_manuals_list_every_command() {
-    let folder = Folder::new();
+    let folder = sample();
     let (help, _) = folder.expect(0, "--help");
     let (_, commands) = help.split_once("Commands:\n").unwrap();
     let names: Vec<&str> = commands
@@ -1050,16 +915,14 @@ fn completions_and_manuals_list_every_command() {
     folder.expect(2, "--completions tcsh");
     folder.expect(0, "--man pages");
     for name in &names {
-        let page = std::fs::read_to_string(folder.path().join(format!("pages/posegate-{name}.1")));
-        let page = page.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let page = folder.text(&format!("pages/posegate-{name}.1"));
         assert!(
             page.contains(".SH SYNOPSIS") && page.contains(&format!("posegate\\-{name}"))
                 || page.contains(&format!("posegate {name}")),
             "{name}:\n{page}"
         );
     }
-    let below =
-        std::fs::read_to_string(folder.path().join("pages/posegate-table-build.1")).unwrap();
+    let below = folder.text("pages/posegate-table-build.1");
     assert!(below.contains("Example"), "{below}");
     folder.expect(2, "--man site.toml");
     // They stand alone.
@@ -1070,20 +933,19 @@ fn completions_and_manuals_list_every_command() {
 /// `check` prints all warnings about a site, with the line of the file.
 #[test]
 fn check_prints_warnings_with_their_lines() {
-    let folder = Folder::new();
-    let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    let folder = sample();
+    let site = folder.text("site.toml");
     let wall = "\n[wall.north]\nfrom = [0.0, 3.0]\nto = [6.0, 3.0]\nz = [0.0, 2.5]\n";
     let rows = "\n[candidates.row]\nwall = \"north\"\nevery = 1.5\nz = [1.0]\nfamily = \"tag36h1\"\nsize = 0.2\n";
     let into = "\n[candidate.into]\nfamily = \"tag36h11\"\nsize = 300\npose = { x = 3.0, y = 2.99, z = 1.0, roll_deg = 0.0, pitch_deg = 0.0, yaw_deg = 90.0 }\n";
     let text = site + wall + rows + into;
     folder.write("site.toml", &text);
     let line = |wanted: &str| 1 + text.lines().position(|line| line == wanted).unwrap();
-    let (out, _) = folder.expect(0, "check site.toml --json");
-    let found: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let found = folder.json(0, "check site.toml --json");
     let warnings = found["warnings"].as_array().unwrap();
     let at = |wanted: &str, words: &str| {
         let number = line(wanted);
-        let here = |warning: &serde_json::Value| {
+        let here = |warning: &Value| {
             warning["line"] == number && warning["message"].as_str().unwrap().contains(words)
         };
         assert!(
@@ -1107,16 +969,15 @@ fn check_prints_warnings_with_their_lines() {
 /// A site that names its controller is warned of each table that may take too long, and only of those.
 #[test]
 fn check_warns_of_tables_beyond_the_cycle_budget() {
-    let folder = Folder::new();
-    let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    let folder = sample();
+    let site = folder.text("site.toml");
     let advice = |site: &str, keys: &str| {
-        folder.write("site.toml", &format!("{site}\n[controller]\n{keys}\n"));
-        let (out, _) = folder.expect(0, "check site.toml --json");
-        let found: serde_json::Value = serde_json::from_str(&out).unwrap();
+        folder.write("site.toml", format!("{site}\n[controller]\n{keys}\n"));
+        let found = folder.json(0, "check site.toml --json");
         let warnings = found["warnings"].as_array().unwrap().iter();
         let of_cost = warnings.filter(|one| one["code"] == "decision_too_long");
         let all: Vec<_> = of_cost.map(|one| one["help"].to_string()).collect();
-        assert!(!all.is_empty(), "{out}");
+        assert!(!all.is_empty(), "{found}");
         all.concat()
     };
     // What the file already says is not advised.
@@ -1129,9 +990,8 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
     let measured = format!("{few}\ncycles_per_instruction = 2.0");
     assert!(!advice(&site, &measured).contains("cycles_per_instruction"));
     let costly = |keys: &str| {
-        folder.write("site.toml", &format!("{site}\n[controller]\n{keys}\n"));
-        let (out, _) = folder.expect(0, "check site.toml --json");
-        let found: serde_json::Value = serde_json::from_str(&out).unwrap();
+        folder.write("site.toml", format!("{site}\n[controller]\n{keys}\n"));
+        let found = folder.json(0, "check site.toml --json");
         let warnings = found["warnings"].as_array().unwrap().iter();
         let of_cost = warnings.filter(|one| one["code"] == "decision_too_long");
         of_cost
@@ -1139,12 +999,11 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
             .collect::<Vec<_>>()
     };
     folder.expect(0, "table build site.toml --task see-t7 -o t.posegate");
-    let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
+    let bytes = folder.read("t.posegate");
     let table = posegate::table::Table::parse(&bytes).unwrap();
     // The bound of a step with both evaluations, as `table cost` prints it.
     let step = |core: &str| {
-        let (out, _) = folder.expect(0, &format!("table cost t.posegate --core {core} --json"));
-        let cost: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let cost = folder.json(0, &format!("table cost t.posegate --core {core} --json"));
         cost["cycle"]["with_fix"].as_u64().unwrap()
     };
     assert!(step("cortex-m4f") > u64::from(table.worst_case().instructions_m4f()));
@@ -1158,8 +1017,7 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
     }
     // A tracker, and the archive for size, take more.
     let tracker = "--core cortex-m4f --tracker --level s --json";
-    let (out, _) = folder.expect(0, &format!("table cost t.posegate {tracker}"));
-    let cost: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let cost = folder.json(0, &format!("table cost t.posegate {tracker}"));
     let enough = 2 * cost["cycle"]["with_fix"].as_u64().unwrap();
     let with = |cycles: u64| {
         costly(&format!(
@@ -1180,13 +1038,14 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
 
     folder.write(
         "site.toml",
-        &format!("{site}\n[controller]\ncore = \"cortex-m4\"\ncycles_per_decision = 9\n"),
+        format!("{site}\n[controller]\ncore = \"cortex-m4\"\ncycles_per_decision = 9\n"),
     );
-    let (_, err) = folder.expect(2, "check site.toml");
-    assert!(err.contains("cortex-m4f"), "{err}");
+    folder
+        .run("check site.toml")
+        .is_refused_with(&["cortex-m4f"]);
     folder.write(
         "site.toml",
-        &format!("{site}\n[controller]\ncore = \"cortex-m4f\"\ncycles_per_decision = 0\n"),
+        format!("{site}\n[controller]\ncore = \"cortex-m4f\"\ncycles_per_decision = 0\n"),
     );
     folder.expect(2, "check site.toml");
 }
@@ -1194,23 +1053,20 @@ fn check_warns_of_tables_beyond_the_cycle_budget() {
 /// The set is empty because its tag faces away, so finer steps are not the advice.
 #[test]
 fn empty_table_is_refused_with_the_cause() {
-    let folder = Folder::new();
-    let site = std::fs::read_to_string(folder.path().join("site.toml")).unwrap();
+    let folder = sample();
+    let site = folder.text("site.toml");
     let seen = "yaw_deg = 180.0 }";
     assert!(site.contains(seen));
-    folder.write("site.toml", &site.replace(seen, "yaw_deg = 0.0 }"));
-    let (_, err) = folder.expect(2, "table build site.toml --task see-t7 -o t.posegate");
-    let words = err.replace(['\n', '│'], " ");
-    let words: Vec<&str> = words.split_whitespace().collect();
-    let words = words.join(" ");
-    assert!(words.contains("away from every camera"), "{err}");
-    assert!(!words.contains("make the steps finer"), "{err}");
+    folder.write("site.toml", site.replace(seen, "yaw_deg = 0.0 }"));
+    let ended = folder.run("table build site.toml --task see-t7 -o t.posegate");
+    ended.is_refused_with(&["away from every camera"]);
+    assert!(!ended.words().contains("make the steps finer"));
 }
 
 /// `place` prints the pose as the site file has it. A reserve is in metres, and it is also an error of every pose from that tag.
 #[test]
 fn place_prints_the_pose_in_site_file_syntax() {
-    let folder = Folder::new();
+    let folder = sample();
     let place = "place site.toml --task see-t7 --sigma-x 0.05 --sigma-y 0.05 --sigma-yaw-deg 1 --free x=3.9:4 --budget 10";
     let (out, err) = folder.expect(0, &format!("{place} --reserve 0.001,0.1"));
     let pose = out
@@ -1226,6 +1082,7 @@ fn place_prints_the_pose_in_site_file_syntax() {
         err.contains("off by the reserve") && err.contains("task see-t7"),
         "{err}"
     );
-    let (_, err) = folder.expect(2, &format!("{place} --reserve 20,1"));
-    assert!(err.contains("20 m is more than 1 m"), "{err}");
+    folder
+        .run(&format!("{place} --reserve 20,1"))
+        .is_refused_with(&["20 m is more than 1 m"]);
 }

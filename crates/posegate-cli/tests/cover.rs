@@ -7,10 +7,10 @@ use posegate_plan::cover::{
 use posegate_plan::{Options, PlanError, Prepared};
 use posegate_site::Site;
 use rayon::prelude::*;
-use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
+use posegate_testkit::run::Case;
 use posegate_testkit::{counts, warehouse};
 
 use warehouse::warehouse;
@@ -506,39 +506,23 @@ fn unserved_task_is_reported_with_the_reason() {
 
 #[test]
 fn cover_writes_a_site_that_plan_accepts() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (site, out) = (
-        folder.path().join("site.toml"),
-        folder.path().join("out.toml"),
-    );
-    std::fs::write(&site, warehouse(5, 1, 12.0, 2, 30)).expect("a file");
-    let posegate = |arguments: &[&str]| {
-        let program = Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args(arguments)
-            .output()
-            .expect("the program runs");
-        let text = String::from_utf8(program.stdout).expect("UTF-8");
-        (program.status.code(), text)
-    };
-    let (site, out) = (site.to_str().expect("UTF-8"), out.to_str().expect("UTF-8"));
-    let (code, text) = posegate(&["cover", site, "-o", out, "--json"]);
-    assert_eq!(code, Some(0), "{text}");
-    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let site = warehouse(5, 1, 12.0, 2, 30);
+    let folder = Case::new(&[("site.toml", site.as_bytes())]);
+    let report = folder.json(0, "cover site.toml -o out.toml --json");
     assert!(report["success"] == true && report["gap"].as_f64().expect("a gap") <= 0.05);
     for task in ["dock-0", "dock-1"] {
-        assert_eq!(posegate(&["plan", out, "--to", task, "--json"]).0, Some(0));
+        folder.expect(0, &format!("plan out.toml --to {task} --json"));
     }
     // A task that cannot be served: nothing is written.
-    let far = warehouse(5, 1, 12.0, 2, 30).replacen("goal = { x = ", "goal = { x = 10", 1);
-    std::fs::write(site, far).expect("a file");
-    std::fs::remove_file(out).expect("the file was written");
-    let (code, text) = posegate(&["cover", site, "-o", out]);
-    assert_eq!(code, Some(1), "{text}");
+    let far = site.replacen("goal = { x = ", "goal = { x = 10", 1);
+    folder.write("site.toml", far);
+    std::fs::remove_file(folder.path().join("out.toml")).expect("the file was written");
+    let (text, _) = folder.expect(1, "cover site.toml -o out.toml");
     assert!(
         text.contains("dock-0: NOT SERVED: no candidate is in reach"),
         "{text}"
     );
-    assert!(!std::path::Path::new(out).exists());
+    assert_eq!(folder.names(), ["site.toml"]);
 }
 
 /// A search that is stopped after its first choice costs no more than the greedy choice, and its bound holds.

@@ -1,9 +1,9 @@
 //! `posegate demo`: its files, its numbers, the proofs of its tables, and its pictures.
 
 use posegate_testkit::counts;
+use posegate_testkit::run::{Case, run};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
 
 const TASKS: [&str; 3] = ["park", "dock", "see-t7"];
 const PICTURES: [&str; 5] = [
@@ -32,17 +32,6 @@ const GAUSSIAN: [(&str, f64, f64, bool, f64); 3] = [
     ("see-t7", 0.5, 2.0, false, 0.91195),
 ];
 
-fn posegate(arguments: &[&str], folder: &Path) -> Output {
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {words}");
-    output
-}
-
 fn read(folder: &Path, name: &str) -> Vec<u8> {
     std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
@@ -50,9 +39,8 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 #[test]
 fn case_study_reproduces_the_paper() {
     let folder = tempfile::tempdir().unwrap();
-    let output = posegate(&["demo", "-o", "once/more"], folder.path());
+    let summary = run(folder.path(), "demo -o once/more").with(0).out;
     let out = folder.path().join("once/more");
-    let summary = String::from_utf8(output.stdout).unwrap();
     let mut files: Vec<String> = ["site.toml", "numbers.json"].map(String::from).into();
     files.extend(TASKS.map(|task| format!("{task}.posegate")));
     files.extend(PICTURES.map(String::from));
@@ -67,7 +55,7 @@ fn case_study_reproduces_the_paper() {
     check_numbers(&numbers, &out);
     for task in TASKS {
         let table = format!("{task}.posegate");
-        posegate(&["table", "verify", &table, "site.toml"], &out);
+        run(&out, &format!("table verify {table} site.toml")).with(0);
     }
 
     check_figures(&out, &numbers);
@@ -78,7 +66,7 @@ fn case_study_reproduces_the_paper() {
     if !counts::is_deep() {
         return;
     }
-    posegate(&["demo", "-o", "again"], folder.path());
+    run(folder.path(), "demo -o again").with(0);
     let again = folder.path().join("again");
     for file in files.iter().filter(|file| *file != "numbers.json") {
         assert!(read(&out, file) == read(&again, file), "{file} differs");
@@ -235,13 +223,6 @@ fn check_picture(text: &str, name: &str) {
 
 #[test]
 fn folder_that_cannot_be_created_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("file"), "").unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(["demo", "-o", "file/inside"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    assert!(output.stdout.is_empty());
+    let folder = Case::new(&[("file", b"")]);
+    folder.run("demo -o file/inside").is_refused_with(&[]);
 }

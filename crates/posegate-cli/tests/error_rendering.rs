@@ -17,10 +17,11 @@ const HOSTILE: &str =
 const QUOTED: &str =
     "a\\u001B[2J\\u001B]0;x\\u0007\\u0008\\u007F\\u009B31m\\u202E\\u2066\\u200F\\uFEFF\\u0085b";
 
-/// Runs a command, and ends it if it hangs.
-fn run(folder: &Folder, line: &[&str]) -> (Option<i32>, String, String) {
+/// Runs a line that has spaces between its words, and ends it if it hangs.
+fn run(folder: &Folder, line: &str) -> (Option<i32>, String, String) {
+    let words: Vec<&str> = line.split(' ').collect();
     let mut child = folder
-        .command(line)
+        .command(&words)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -50,7 +51,7 @@ fn run(folder: &Folder, line: &[&str]) -> (Option<i32>, String, String) {
 }
 
 /// Runs a command that must fail with a short, printable error and exit code 2. Returns the error.
-fn error(folder: &Folder, line: &[&str]) -> String {
+fn error(folder: &Folder, line: &str) -> String {
     let (code, out, err) = run(folder, line);
     assert_eq!(code, Some(2), "{line:?}: {err:.3000}");
     for text in [&out, &err] {
@@ -80,7 +81,7 @@ fn fault_in_a_long_line_is_shown_with_its_column() {
     let folder = Folder::new();
     for (before, after) in [(10, 10), (70_000, 10), (10, 70_000), (3_000_000, 3_000_000)] {
         folder.write("long.toml", long_line(before, after));
-        let message = error(&folder, &["check", "long.toml"]);
+        let message = error(&folder, "check long.toml");
         let column = 6 + before / 3 * 3;
         let place = format!("long.toml:4:{column}");
         let words = message.split_whitespace().collect::<String>();
@@ -111,28 +112,18 @@ fn error_of_a_huge_input_is_short() {
         format!("[table]\nstep = {{ {} }}\n", "a = 1, ".repeat(300_000)),
     ] {
         folder.write("long.toml", &text);
-        error(&folder, &["check", "long.toml"]);
+        error(&folder, "check long.toml");
     }
     folder.write(
         "hall.json",
         format!("{{\"tags\": [{{\"{long}\": {long}}}]}}"),
     );
-    let message = error(&folder, &["check", "site.toml"]);
+    let message = error(&folder, "check site.toml");
     assert!(message.contains("hall.json:1:"), "{message}");
     folder.write("front.yaml", format!("{long}\n"));
-    error(&folder, &["check", "site.toml"]);
+    error(&folder, "check site.toml");
     folder.write("long.csv", format!("x_m,y_m,yaw_rad\n1,{long},3\n"));
-    error(
-        &folder,
-        &[
-            "contains",
-            "site.toml",
-            "--task",
-            "dock",
-            "--poses",
-            "long.csv",
-        ],
-    );
+    error(&folder, "contains site.toml --task dock --poses long.csv");
 }
 
 /// The caret is below the fault even if the line has escaped characters before the fault.
@@ -140,7 +131,7 @@ fn error_of_a_huge_input_is_short() {
 fn caret_is_below_the_fault_after_escaped_characters() {
     let folder = Folder::new();
     folder.write("bad.toml", "[table]\n\"\u{202e}\u{9b}\" = 1\n# last\n");
-    let message = error(&folder, &["check", "bad.toml"]);
+    let message = error(&folder, "check bad.toml");
     let mut lines = message.lines().skip_while(|line| !line.contains("2 │"));
     let (text, mark) = (lines.next().unwrap(), lines.next().unwrap());
     let column = |line: &str, what: &str| line.find(what).map(|at| line[..at].chars().count());
@@ -169,7 +160,7 @@ fn error_with_hostile_names_is_printable() {
     for (index, site) in sites.iter().enumerate() {
         let name = file(&index.to_string());
         folder.write(&name, site);
-        let message = error(&folder, &["check", &name]);
+        let message = error(&folder, &format!("check {name}"));
         assert!(message.contains("\\u{1b}"), "{message}");
     }
     folder.write(
@@ -186,117 +177,39 @@ fn error_with_hostile_names_is_printable() {
     );
     folder.write("bad.yaml", format!("\"{QUOTED}\": 1\n"));
     for line in [
-        &["contains", "tasks.toml", "--task", "dock", "--poses", "-"][..],
-        &["contains", "site.toml", "--task", HOSTILE, "--poses", "-"],
-        &[
-            "contains",
-            "site.toml",
-            "--task",
-            "dock",
-            "--poses",
-            "bad.csv",
-        ],
-        &["chain", "site.toml", "--name", HOSTILE],
-        &["explain", HOSTILE],
-        &["gate", "dock.posegate", "--estimates", "bad.csv"],
-        &["gate", HOSTILE, "--estimates", "bad.csv"],
-        &["gate", "dock.posegate", "--nonsense", HOSTILE],
-        &["gate", "dock.posegate", "--set", HOSTILE],
-        &["gate", "dock.posegate", "--epsilon", HOSTILE],
-        &["site", "build", "site.toml", "-o", "b", "--shard", HOSTILE],
-        &[HOSTILE],
-        &["import", "bad.json", "--format", "wpilib"],
-        &["import", "bad.yaml", "--format", "nav2_docks"],
-        &[
-            "import",
-            "bad.yaml",
-            "--format",
-            "apriltag_ros",
-            "--convention",
-            "apriltag_ros",
-        ],
-        &[
-            "import",
-            "hall.json",
-            "--format",
-            "wpilib",
-            "--pose",
-            HOSTILE,
-        ],
-        &["predict", "bad.yaml", "--at", "at.csv"],
-        &["metrics", HOSTILE, "truth.tum"],
-        &["metrics", "bad.csv", "truth.tum"],
-        &["learn", "outcomes", "bad.csv", "--epsilon", "0.9"],
-        &[
-            "learn",
-            "inflation",
-            "scored.csv",
-            "--epsilon",
-            "0.9",
-            "--condition",
-            HOSTILE,
-            "-o",
-            "m",
-        ],
-        &[
-            "place",
-            "site.toml",
-            "--task",
-            "see-t7",
-            "--exact",
-            "--free",
-            HOSTILE,
-        ],
-        &[
-            "place",
-            "site.toml",
-            "--task",
-            "see-t7",
-            "--exact",
-            "--wall",
-            HOSTILE,
-        ],
-        &[
-            "place",
-            "site.toml",
-            "--task",
-            "see-t7",
-            "--exact",
-            "--candidates",
-            "bad.csv",
-        ],
-        &["replay", "site.toml", "bad.csv", "--task", "dock"],
-        &[
-            "replay",
-            "site.toml",
-            "estimates.csv",
-            "--task",
-            "dock",
-            "--truth",
-            HOSTILE,
-        ],
-        &[
-            "report",
-            "site.toml",
-            "-o",
-            "out",
-            "--placement",
-            &format!("x={HOSTILE}"),
-        ],
-        &[
-            "table",
-            "build",
-            "site.toml",
-            "--task",
-            "dock",
-            "-o",
-            &format!("nowhere/{HOSTILE}"),
-        ],
-        &["table", "seal", "bad.csv", "-o", HOSTILE],
-        &["site", "merge", HOSTILE],
-        &["init", HOSTILE, "--nonsense"],
+        "contains tasks.toml --task dock --poses -".to_owned(),
+        format!("contains site.toml --task {HOSTILE} --poses -"),
+        "contains site.toml --task dock --poses bad.csv".to_owned(),
+        format!("chain site.toml --name {HOSTILE}"),
+        format!("explain {HOSTILE}"),
+        "gate dock.posegate --estimates bad.csv".to_owned(),
+        format!("gate {HOSTILE} --estimates bad.csv"),
+        format!("gate dock.posegate --nonsense {HOSTILE}"),
+        format!("gate dock.posegate --set {HOSTILE}"),
+        format!("gate dock.posegate --epsilon {HOSTILE}"),
+        format!("site build site.toml -o b --shard {HOSTILE}"),
+        HOSTILE.to_owned(),
+        "import bad.json --format wpilib".to_owned(),
+        "import bad.yaml --format nav2_docks".to_owned(),
+        "import bad.yaml --format apriltag_ros --convention apriltag_ros".to_owned(),
+        format!("import hall.json --format wpilib --pose {HOSTILE}"),
+        "predict bad.yaml --at at.csv".to_owned(),
+        format!("metrics {HOSTILE} truth.tum"),
+        "metrics bad.csv truth.tum".to_owned(),
+        "learn outcomes bad.csv --epsilon 0.9".to_owned(),
+        format!("learn inflation scored.csv --epsilon 0.9 --condition {HOSTILE} -o m"),
+        format!("place site.toml --task see-t7 --exact --free {HOSTILE}"),
+        format!("place site.toml --task see-t7 --exact --wall {HOSTILE}"),
+        "place site.toml --task see-t7 --exact --candidates bad.csv".to_owned(),
+        "replay site.toml bad.csv --task dock".to_owned(),
+        format!("replay site.toml estimates.csv --task dock --truth {HOSTILE}"),
+        format!("report site.toml -o out --placement x={HOSTILE}"),
+        format!("table build site.toml --task dock -o nowhere/{HOSTILE}"),
+        format!("table seal bad.csv -o {HOSTILE}"),
+        format!("site merge {HOSTILE}"),
+        format!("init {HOSTILE} --nonsense"),
     ] {
-        error(&folder, line);
+        error(&folder, &line);
     }
 }
 
@@ -325,58 +238,35 @@ fn answer_with_hostile_names_is_printable_and_valid_json() {
     let site = format!("site{HOSTILE}.toml");
     std::fs::copy(folder.path().join("names.toml"), folder.path().join(&site)).unwrap();
     for (index, line) in [
-        &["check", "names.toml"][..],
-        &["check", &site],
-        &["check", "names.toml", "--draw", "drawn"],
-        &[
-            "table",
-            "build",
-            "names.toml",
-            "--task",
-            &name,
-            "-o",
-            &format!("table{HOSTILE}"),
-        ],
-        &["table", "info", &format!("table{HOSTILE}")],
-        &["table", "verify", &format!("table{HOSTILE}"), "names.toml"],
-        &["import", "docks.yaml", "--format", "nav2_docks"],
-        &["init", &format!("new{HOSTILE}.toml")],
-        &["report", "names.toml", "-o", "page.html"],
-        &["draw", "names.toml", "--task", &name, "-o", "picture.svg"],
-        &[
-            "table",
-            "export",
-            &format!("table{HOSTILE}"),
-            "--format",
-            "c",
-            "-o",
-            "table.h",
-        ],
-        &[
-            "table",
-            "export",
-            &format!("table{HOSTILE}"),
-            "--format",
-            "rust",
-            "-o",
-            "table.rs",
-        ],
+        "check names.toml".to_owned(),
+        format!("check {site}"),
+        "check names.toml --draw drawn".to_owned(),
+        format!("table build names.toml --task {name} -o table{HOSTILE}"),
+        format!("table info table{HOSTILE}"),
+        format!("table verify table{HOSTILE} names.toml"),
+        "import docks.yaml --format nav2_docks".to_owned(),
+        format!("init new{HOSTILE}.toml"),
+        "report names.toml -o page.html".to_owned(),
+        format!("draw names.toml --task {name} -o picture.svg"),
+        format!("table export table{HOSTILE} --format c -o table.h"),
+        format!("table export table{HOSTILE} --format rust -o table.rs"),
     ]
     .into_iter()
     .enumerate()
     {
-        let (code, out, err) = run(&folder, line);
+        let (code, out, err) = run(&folder, &line);
         assert!(matches!(code, Some(0 | 1)), "{line:?}: {err}");
         shown(&out);
         shown(&err);
-        if matches!(line[0], "report" | "draw") {
+        let command = line.split(' ').next();
+        if matches!(command, Some("report" | "draw")) {
             continue;
         }
-        let mut json = line.to_vec();
-        json.push("--json");
-        if line[0] == "init" {
-            json.push("--force");
-        }
+        let force = match command {
+            Some("init") => " --force",
+            _ => "",
+        };
+        let json = format!("{line} --json{force}");
         let (code, out, err) = run(&folder, &json);
         assert!(matches!(code, Some(0 | 1)), "{json:?}: {err}");
         shown(&out);
@@ -386,7 +276,7 @@ fn answer_with_hostile_names_is_printable_and_valid_json() {
         }
     }
     // The imported tables on standard output are parsed again, name by name.
-    let (_, out, _) = run(&folder, &["import", "docks.yaml", "--format", "nav2_docks"]);
+    let (_, out, _) = run(&folder, "import docks.yaml --format nav2_docks");
     let tables: toml::Table = out.parse().unwrap();
     assert!(tables["goal"].get(NAME).is_some(), "{out}");
     // Pictures and pages name tasks and tags, and have no characters that XML forbids.
@@ -436,18 +326,9 @@ fn message_of_several_lines_keeps_its_lines() {
     let folder = Folder::new();
     std::fs::remove_dir_all(folder.path().join("built/parts")).unwrap();
     std::fs::create_dir(folder.path().join("built/parts")).unwrap();
-    let build = [
-        "site",
-        "build",
-        "site.toml",
-        "--tables-only",
-        "--shard",
-        "0/2",
-        "-o",
-        "built",
-    ];
-    assert!(folder.run(&build).status.success());
-    let message = error(&folder, &["site", "merge", "built"]);
+    let build = "site build site.toml --tables-only --shard 0/2 -o built";
+    assert_eq!(run(&folder, build).0, Some(0));
+    let message = error(&folder, "site merge built");
     assert!(
         !message.contains("\\n") && message.lines().count() > 2,
         "{message}"

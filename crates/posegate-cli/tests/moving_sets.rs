@@ -1,30 +1,17 @@
 //! `posegate gate` with movements and with several hypotheses: the contract of the command line.
 
+use posegate_testkit::run::{Case, Ended};
 use serde_json::Value;
-use std::process::{Command, Output, Stdio};
 
 const DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
 const HEADER: &str =
     "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,hypothesis\n";
 
-fn gate(estimates: &str, arguments: &str) -> Output {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("dock.posegate"), DOCK).expect("a table");
-    std::fs::write(folder.path().join("e.csv"), estimates).expect("estimates");
-    Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(["gate", "dock.posegate", "--estimates", "e.csv", "--json"])
-        .args(arguments.split_whitespace())
-        .current_dir(folder.path())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program runs")
-}
-
-fn lines(output: &Output) -> Vec<Value> {
-    let text = String::from_utf8(output.stdout.clone()).expect("text");
-    text.lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"))
-        .collect()
+fn gate(estimates: &str, arguments: &str) -> Ended {
+    let case = Case::new(&[("dock.posegate", DOCK), ("e.csv", estimates.as_bytes())]);
+    case.run(&format!(
+        "gate dock.posegate --estimates e.csv --json {arguments}"
+    ))
 }
 
 /// A movement makes a cylinder wider, exactly.
@@ -47,8 +34,8 @@ fn bounded_set_grows_by_speed_times_time() {
             poses,
             &format!("--set bounded --translation {translation} --yaw-deg {yaw_deg}"),
         );
-        assert_eq!(grown.status.code(), wider.status.code());
-        for (grown, wider) in lines(&grown).iter().zip(lines(&wider)) {
+        assert_eq!(grown.code, wider.code);
+        for (grown, wider) in grown.lines().iter().zip(wider.lines()) {
             assert_eq!(grown["verdict"], wider["verdict"]);
             let margins = [grown, &wider].map(|line| line["margin"].as_f64().expect("a margin"));
             assert!((margins[0] / margins[1] - 1.0).abs() < 2e-3, "{margins:?}");
@@ -61,24 +48,24 @@ fn bounded_set_grows_by_speed_times_time() {
 fn set_grows_in_any_direction() {
     let estimates = format!("{HEADER}0,0,0.045,0,1e-6,0,0,1e-6,0,1e-6,0\n");
     let still = gate(&estimates, "");
-    assert_eq!(still.status.code(), Some(0), "{still:?}");
+    assert_eq!(still.code, 0, "{}", still.err);
     let moving = gate(
         &estimates,
         "--max-speed 0.1 --max-yaw-rate 1 --horizon-ms 200",
     );
-    assert_eq!(moving.status.code(), Some(1), "{moving:?}");
+    assert_eq!(moving.code, 1, "{}", moving.err);
 }
 
 /// The dock ends at 0.08 m: an ellipsoid of 1 cm at 99 % reaches 3.37 cm.
 #[test]
 fn ellipsoid_grows_by_speed_times_time() {
     let estimate = |x: f64| format!("{HEADER}0,{x},0,0,1e-4,0,0,1e-6,0,1e-6,0\n");
-    let code = |x: f64, arguments: &str| gate(&estimate(x), arguments).status.code();
+    let code = |x: f64, arguments: &str| gate(&estimate(x), arguments).code;
     let moving = "--max-speed 0.1 --max-yaw-rate 1 --horizon-ms 200";
-    assert_eq!(code(0.046, ""), Some(0));
-    assert_eq!(code(0.026, moving), Some(0));
-    assert_eq!(code(0.0264, moving), Some(1));
-    let denied = lines(&gate(&estimate(0.03), moving));
+    assert_eq!(code(0.046, ""), 0);
+    assert_eq!(code(0.026, moving), 0);
+    assert_eq!(code(0.0264, moving), 1);
+    let denied = gate(&estimate(0.03), moving).lines();
     assert_eq!(denied[0]["reason"], "not_contained");
     let worst = denied[0]["worst_pose"][0].as_f64().expect("a pose");
     assert!(worst > 0.0795 && worst < 0.0838, "{worst}");
@@ -91,8 +78,8 @@ fn report_is_permitted_if_every_hypothesis_is_inside() {
         "{HEADER}1,0,0,0,{small},0\n1,0.03,0,0,{small},1\n2,0,0,0,{small},0\n2,0.5,0,0,{small},1\n2,0.6,0,0,{small},2\n3,0,0,0,{small},0\n"
     );
     let output = gate(&estimates, "");
-    assert_eq!(output.status.code(), Some(1));
-    let lines = lines(&output);
+    assert_eq!(output.code, 1);
+    let lines = output.lines();
     assert_eq!(lines.len(), 3);
     let verdicts: Vec<&Value> = lines.iter().map(|line| &line["verdict"]).collect();
     assert_eq!(verdicts, ["permit", "deny", "permit"]);
@@ -115,14 +102,8 @@ fn invalid_movement_or_report_is_refused() {
         ("--max-yaw-rate 1e9 --horizon-ms 100", "--max-yaw-rate"),
         ("--max-speed 0.1 --horizon-ms=-1", "--horizon-ms"),
     ] {
-        let output = gate(&good, arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments}");
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(error.contains(expected), "{arguments}: {error}");
+        gate(&good, arguments).is_refused_with(&[expected]);
     }
     let broken = format!("{good}1,0,0,0,{small},2\n");
-    let output = gate(&broken, "");
-    assert_eq!(output.status.code(), Some(2));
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(error.contains("e.csv:3"), "{error}");
+    gate(&broken, "").is_refused_with(&["e.csv:3"]);
 }

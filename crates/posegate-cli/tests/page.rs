@@ -3,9 +3,9 @@
 
 use posegate_show::page::{CORE, Contents, PageError, PageInput, page};
 use posegate_site::{SAMPLE, Site};
+use posegate_testkit::run::Case;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::process::Command;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// A site, and the contents of its page.
@@ -336,36 +336,25 @@ fn page_size_is_independent_of_wall_length() {
 
 #[test]
 fn report_writes_a_page_or_nothing() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = |name: &str| folder.path().join(name);
-    std::fs::write(path("site.toml"), SAMPLE).expect("a file");
-    std::fs::write(path("no.svg"), "text").expect("a file");
-    std::fs::write(path("no.json"), "{").expect("a file");
-    let run = |more: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .current_dir(folder.path())
-            .args(["report", "site.toml", "-o", "report.html"])
-            .args(more)
-            .output()
-            .expect("the program runs");
-        (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )
-    };
+    let folder = Case::new(&[
+        ("site.toml", SAMPLE.as_bytes()),
+        ("no.svg", b"text"),
+        ("no.json", b"{"),
+    ]);
+    let report = "report site.toml -o report.html";
     for (more, what) in [
-        (["--picture", "no.svg"], "is not an SVG picture"),
-        (["--placement", "see-t7=no.json"], "posegate place --json"),
-        (["--placement", "no.json"], "expected TASK=FILE"),
-        (["--picture", "none.svg"], "none.svg"),
+        ("--picture no.svg", "is not an SVG picture"),
+        ("--placement see-t7=no.json", "posegate place --json"),
+        ("--placement no.json", "expected TASK=FILE"),
+        ("--picture none.svg", "none.svg"),
     ] {
-        let (code, error) = run(&more);
-        assert_eq!(code, Some(2), "{error}");
-        assert!(error.contains(what), "{error}");
-        assert!(!path("report.html").exists());
+        folder
+            .run(&format!("{report} {more}"))
+            .is_refused_with(&[what]);
+        assert!(!folder.path().join("report.html").exists());
     }
-    assert_eq!(run(&[]), (Some(0), String::new()));
-    let page = std::fs::read_to_string(path("report.html")).expect("a page");
+    assert_eq!(folder.expect(0, report).1, "");
+    let page = folder.text("report.html");
     assert!(page.contains("<h1>site</h1>"));
 }
 

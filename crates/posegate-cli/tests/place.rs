@@ -1,50 +1,27 @@
 //! `posegate place`: optima that are known, the contract of the command line, and the message for each bad input.
 
 use posegate_testkit::counts;
+use posegate_testkit::run::{Case, Ended, command};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 const SITE: &str = include_str!("../../../tests/data/reference-a.toml");
 
 /// The search space of the paper's Fig. 4.
 const FREE: &str = "--free x=0.3:7,y=-3:3,z=0:2,yaw_deg=0:360";
 
-struct Run {
-    code: i32,
-    out: String,
-    err: String,
-}
-
 /// Runs a line in a folder with this site file.
-fn run_in(folder: &Path, site: &str, line: &str, threads: Option<&str>) -> Run {
+fn run_in(folder: &Path, site: &str, line: &str) -> Ended {
     std::fs::write(folder.join("site.toml"), site).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_posegate"));
-    if let Some(threads) = threads {
-        command.env("RAYON_NUM_THREADS", threads);
-    }
-    let output = command
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Run {
-        code: output.status.code().unwrap(),
-        out: text(output.stdout),
-        err: text(output.stderr),
-    }
+    Ended::of(&mut command(folder, line))
 }
 
-fn run(site: &str, line: &str) -> Run {
-    run_in(tempfile::tempdir().unwrap().path(), site, line, None)
+fn run(site: &str, line: &str) -> Ended {
+    Case::new(&[("site.toml", site.as_bytes())]).run(line)
 }
 
 fn json(site: &str, line: &str, code: i32) -> Value {
-    let output = run(site, &format!("{line} --json"));
-    assert_eq!(output.code, code, "{line}\n{}\n{}", output.out, output.err);
-    serde_json::from_str(&output.out).unwrap()
+    run(site, &format!("{line} --json")).json(code)
 }
 
 fn place(sigma: &str, more: &str) -> String {
@@ -171,13 +148,12 @@ fn proven_margin_agrees_with_the_gate() {
     // The gate's margin on the table of that site is near the proven margin: facets are slightly inside the set.
     let moved = moved(&held);
     let folder = tempfile::tempdir().unwrap();
-    let built = run_in(
+    run_in(
         folder.path(),
         &moved,
         "table build site.toml --task see-t7 -o t.posegate",
-        None,
-    );
-    assert_eq!(built.code, 0, "{}", built.err);
+    )
+    .with(0);
     std::fs::write(
         folder.path().join("e.csv"),
         "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n0,0,0,0,0.01,0,0,0.01,0,0.00030461742\n",
@@ -187,7 +163,6 @@ fn proven_margin_agrees_with_the_gate() {
         folder.path(),
         &moved,
         "gate t.posegate --estimates e.csv --json",
-        None,
     );
     let verdict: Value = serde_json::from_str(gate.out.trim()).unwrap();
     let margin = number(&verdict, "margin");
@@ -296,9 +271,8 @@ fn smallest_tag_is_just_large_enough() {
         let placed = json(&other, &line, 0);
         assert_eq!(placed["contained"], held, "{share}: {placed}");
     }
-    let output = run(SITE, &place("0.1", "--free x=1:4 --objective smallest-tag"));
-    assert_eq!(output.code, 2);
-    assert!(output.err.contains("px_per_bit_min"), "{}", output.err);
+    run(SITE, &place("0.1", "--free x=1:4 --objective smallest-tag"))
+        .is_refused_with(&["px_per_bit_min"]);
 }
 
 const WALL: &str = "\n[wall.north]\nfrom = [4.5, 3.0]\nto = [4.5, -3.0]\nz = [0.0, 2.5]\nkeep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n";
@@ -343,21 +317,14 @@ fn tag_is_placed_on_the_wall_and_outside_the_door() {
     );
     // A wall that consists of a door.
     let doors = site.replace("[2.4, 3.6], z = [0.0, 2.1]", "[0.0, 6.0], z = [0.0, 2.5]");
-    let refused = run(&doors, &place("0.1", "--wall north"));
-    assert_eq!(refused.code, 2);
-    assert!(
-        refused.err.contains("keep-outs leave none"),
-        "{}",
-        refused.err
-    );
+    run(&doors, &place("0.1", "--wall north")).is_refused_with(&["keep-outs leave none"]);
     // A wall that no view reaches.
     let far = site.replace(
         "from = [4.5, 3.0]\nto = [4.5, -3.0]",
         "from = [30.0, 2.0]\nto = [30.0, -2.0]",
     );
     let far = far.replace("keep_out = [{ along = [2.4, 3.6], z = [0.0, 2.1] }]\n", "");
-    let none = run(&far, &place("0.1", "--wall north --budget 300"));
-    assert_eq!(none.code, 1, "{}", none.err);
+    let none = run(&far, &place("0.1", "--wall north --budget 300")).with(1);
     assert!(
         none.err.contains("at no evaluated place is the tag seen"),
         "{}",
@@ -388,19 +355,21 @@ fn wall_with_a_tag_hides_tags_behind_it() {
 
 #[test]
 fn result_is_equal_for_any_number_of_threads() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[("site.toml", SITE.as_bytes())]);
     let budget = if counts::is_deep() { 600 } else { 60 };
     for method in counts::one_a_day(&["bobyqa", "cmaes", "ga"]) {
         let line = place(
             "0.1",
             &format!("{FREE} --budget {budget} --method {method} --seed 5 --json"),
         );
-        let [one, two] =
-            ["1", "3"].map(|threads| run_in(folder.path(), SITE, &line, Some(threads)).out);
+        let [one, two] = ["1", "3"].map(|threads| {
+            let mut command = command(folder.path(), &line);
+            Ended::of(command.env("RAYON_NUM_THREADS", threads)).out
+        });
         assert_eq!(one, two, "{method}");
         // The descents of BOBYQA draw nothing.
         let other = line.replace("--seed 5", "--seed 6");
-        let other = run_in(folder.path(), SITE, &other, None).out;
+        let other = run_in(folder.path(), SITE, &other).out;
         assert_eq!(one == other, method == "bobyqa", "{method}");
     }
 }
@@ -452,7 +421,7 @@ fn margin_holds_for_every_mounting_error_within_the_reserve() {
             }
             std::fs::write(folder.path().join("c.csv"), csv).unwrap();
             let line = place("0.1", "--candidates c.csv --reserve 0,0 --json");
-            let output = run_in(folder.path(), SITE, &line, None);
+            let output = run_in(folder.path(), SITE, &line);
             let compared: Value = serde_json::from_str(&output.out).unwrap();
             for one in compared["candidates"].as_array().unwrap() {
                 // Proofs are tried at 0.9999 of the largest scale.
@@ -487,14 +456,12 @@ fn candidates_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let csv = "name,x,y,z,yaw_deg\nfar,4,0,0.5,180\npost,1.5,0,0.5,180\nbehind,-3,0,0.5,0\n";
     std::fs::write(folder.path().join("c.csv"), csv).unwrap();
-    let output = run_in(
+    let compared = run_in(
         folder.path(),
         SITE,
         &place("0.1", "--candidates c.csv --json"),
-        None,
-    );
-    assert_eq!(output.code, 0, "{}", output.err);
-    let compared: Value = serde_json::from_str(&output.out).unwrap();
+    )
+    .json(0);
     assert_eq!(compared["name"], "post");
     assert_eq!(compared["evaluations"], 3);
     let all = compared["candidates"].as_array().unwrap();
@@ -526,8 +493,7 @@ fn site_with_learnt_model(folder: &Path) -> String {
     std::fs::write(folder.join("views.csv"), csv).unwrap();
     let learn =
         "learn bounds views.csv --quantile 0.95 --camera front --site site.toml -o model.toml";
-    let output = run_in(folder, SITE, learn, None);
-    assert_eq!(output.code, 0, "{}", output.err);
+    run_in(folder, SITE, learn).with(0);
     SITE.to_owned() + "\n[error_model.detector]\nfile = \"model.toml\"\n"
 }
 
@@ -536,8 +502,7 @@ fn model_of_another_camera_mount_or_tag_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let site = site_with_learnt_model(folder.path());
     let line = place("0.05", "--free x=0.8:4 --budget 8 --error-model detector");
-    let output = run_in(folder.path(), &site, &line, None);
-    assert_eq!(output.code, 0, "{}{}", output.out, output.err);
+    run_in(folder.path(), &site, &line).with(0);
     for (from, to) in [
         ("mount = { x = 0.25", "mount = { x = 0.30"),
         ("fx = 615.0", "fx = 800.0"),
@@ -546,8 +511,7 @@ fn model_of_another_camera_mount_or_tag_is_refused() {
     ] {
         assert!(site.contains(from));
         let changed = site.replacen(from, to, 1);
-        let output = run_in(folder.path(), &changed, &line, None);
-        assert_eq!(output.code, 2, "{to}: {}{}", output.out, output.err);
+        let output = run_in(folder.path(), &changed, &line).with(2);
         assert!(
             output.err.contains("was learnt with"),
             "{to}: {}",
@@ -565,9 +529,7 @@ fn learnt_model_turns_the_tag_away_from_head_on() {
         "0.05",
         "--free x=0.8:4,yaw_deg=110:250 --budget 300 --error-model detector --objective contained-cost --json",
     );
-    let output = run_in(folder.path(), &site, &line, None);
-    assert_eq!(output.code, 0, "{}{}", output.out, output.err);
-    let best: Value = serde_json::from_str(&output.out).unwrap();
+    let best = run_in(folder.path(), &site, &line).json(0);
     let tilt = (pose(&best, "yaw_deg") - 180.0).abs();
     assert!((30.0..60.0).contains(&tilt), "{best}");
     assert_eq!(best["contained"], true);
@@ -576,17 +538,8 @@ fn learnt_model_turns_the_tag_away_from_head_on() {
         definition.starts_with("100 times the error model's bound in metres plus"),
         "{definition}"
     );
-    let other = run_in(
-        folder.path(),
-        &site,
-        &line.replace("detector", "other"),
-        None,
-    );
-    assert!(
-        other.code == 2 && other.err.contains("no error model `other`"),
-        "{}",
-        other.err
-    );
+    run_in(folder.path(), &site, &line.replace("detector", "other"))
+        .is_refused_with(&["no error model `other`"]);
 }
 
 /// A formula with the paper's weights gives the paper's cost: a metre counts as 100, a degree as 1.
@@ -604,9 +557,7 @@ fn formula_with_the_weights_of_the_paper_gives_its_cost() {
         + &formula("below", "[0.1, 1.0, 0.5, -1.0]", "[0.0, 0.0, 0.0, 0.0]");
     let mean = |model: &str| {
         let line = place("0.05", "--free x=0.8:4,yaw_deg=110:250 --budget 100 --json");
-        let output = run_in(folder.path(), &site, &format!("{line}{model}"), None);
-        assert_eq!(output.code, 0, "{}{}", output.out, output.err);
-        let best: Value = serde_json::from_str(&output.out).unwrap();
+        let best = run_in(folder.path(), &site, &format!("{line}{model}")).json(0);
         best["mean"].as_f64().unwrap()
     };
     let paper = mean("");
@@ -622,20 +573,8 @@ fn formula_with_the_weights_of_the_paper_gives_its_cost() {
     // Oblique views are better here: the cost is below that of a tag seen head-on.
     let square = mean(" --error-model square");
     assert!(square > 100.0 && square < 100.0 + paper, "{square} {paper}");
-    let output = run_in(
-        folder.path(),
-        &site,
-        &place("0.05", "--error-model below"),
-        None,
-    );
-    assert!(
-        output.code == 2
-            && output
-                .err
-                .contains("has a bound below 0 at a psi of 50 deg"),
-        "{}",
-        output.err
-    );
+    run_in(folder.path(), &site, &place("0.05", "--error-model below"))
+        .is_refused_with(&["has a bound below 0 at a psi of 50 deg"]);
 }
 
 #[test]
@@ -645,8 +584,7 @@ fn pictures_are_drawn() {
         "0.1",
         "--free x=1:4 --budget 200 -o places.svg --sheet sheet.svg",
     );
-    let output = run_in(folder.path(), SITE, &line, None);
-    assert_eq!(output.code, 0, "{}", output.err);
+    let output = run_in(folder.path(), SITE, &line).with(0);
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let places = read("places.svg");
     assert!(
@@ -737,12 +675,7 @@ fn bad_input_is_reported_with_the_reason() {
             "see-t7",
         ),
     ] {
-        let output = run(&site, &line);
-        assert_eq!(output.code, 2, "{line}\n{}{}", output.out, output.err);
-        // The report is wrapped to a width.
-        let plain = output.err.replace(['\n', '│'], " ");
-        let words: Vec<&str> = plain.split_whitespace().collect();
-        assert!(words.join(" ").contains(what), "{line}: {}", output.err);
+        run(&site, &line).is_refused_with(&[what]);
     }
 }
 

@@ -1,47 +1,25 @@
 //! `posegate replay`: faults of a recording are counted, and its verdicts are those of `posegate gate`.
 
-use posegate_testkit::bags;
-
-use bags::{Bag, Compression, Pose};
 use posegate::shape::SuccessSet;
 use posegate_site::Site;
+use posegate_testkit::bags::{Bag, Compression, Pose};
+use posegate_testkit::root;
+use posegate_testkit::run::{Case, Ended, lines, run};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 const SITE: &str = "examples/sites/dock.toml";
 
-fn at_root(path: &str) -> PathBuf {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(path)
-}
-
-fn posegate(arguments: &[&str]) -> Output {
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(arguments)
-        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
-        .output();
-    output.unwrap()
-}
-
-fn words(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn lines(text: &[u8]) -> Vec<Value> {
-    let text = std::str::from_utf8(text).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+/// Runs a line in the repository's folder.
+fn posegate(line: &str) -> Ended {
+    run(&root(), line)
 }
 
 /// A folder with a bag in it.
-struct Folder(tempfile::TempDir);
+struct Folder(Case);
 
 impl Folder {
     fn of(bag: &[u8]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("drive.mcap"), bag).unwrap();
-        Self(folder)
+        Self(Case::new(&[("drive.mcap", bag)]))
     }
 
     fn path(&self, name: &str) -> String {
@@ -49,24 +27,16 @@ impl Folder {
     }
 
     /// Replays the bag. Returns its rows and its summary.
-    fn replay(&self, task: &str, options: &[&str]) -> (Vec<Value>, Value) {
+    fn replay(&self, task: &str, options: &str) -> (Vec<Value>, Value) {
         let (drive, rows) = (self.path("drive.mcap"), self.path("rows.jsonl"));
-        let mut arguments = vec![
-            "replay", SITE, &drive, "--task", task, "--json", "--rows", &rows,
-        ];
-        arguments.extend(options);
-        let output = posegate(&arguments);
-        assert!(
-            output.status.code().is_some_and(|code| code < 2),
-            "{}",
-            words(&output)
-        );
-        let rows = lines(&std::fs::read(rows).unwrap());
-        (rows, lines(&output.stdout).remove(0))
+        let line = format!("replay {SITE} {drive} --task {task} --json --rows {rows} {options}");
+        let ended = posegate(&line);
+        assert!(ended.code < 2, "{}", ended.err);
+        (self.rows(), ended.lines().remove(0))
     }
 
-    fn files(&self) -> usize {
-        std::fs::read_dir(self.0.path()).unwrap().count()
+    fn rows(&self) -> Vec<Value> {
+        lines(&self.0.text("rows.jsonl"))
     }
 }
 
@@ -93,29 +63,18 @@ fn verdicts_equal_those_of_the_gate() {
         ("dock", "examples/tables/dock.posegate"),
         ("see-t7", "examples/tables/see-t7.posegate"),
     ] {
-        for set in [
-            &[][..],
-            &[
-                "--set",
-                "bounded",
-                "--translation",
-                "0.03",
-                "--yaw-deg",
-                "1.5",
-            ],
-        ] {
+        for set in ["", "--set bounded --translation 0.03 --yaw-deg 1.5"] {
             let estimates = "tests/data/estimates.csv";
-            let mut gate = vec!["gate", table, "--estimates", estimates, "--json"];
-            gate.extend(set);
+            let gate = posegate(&format!(
+                "gate {table} --estimates {estimates} --json {set}"
+            ));
             let folder = Folder::of(b"");
             let rows = folder.path("rows.jsonl");
-            let mut replay = vec![
-                "replay", SITE, estimates, "--task", task, "--table", table, "--rows", &rows,
-            ];
-            replay.extend(set);
-            let (gate, replay) = (posegate(&gate), posegate(&replay));
-            assert_eq!(replay.status.code(), Some(0), "{}", words(&replay));
-            let (gate, rows) = (lines(&gate.stdout), lines(&std::fs::read(rows).unwrap()));
+            posegate(&format!(
+                "replay {SITE} {estimates} --task {task} --table {table} --rows {rows} {set}"
+            ))
+            .with(0);
+            let (gate, rows) = (gate.lines(), folder.rows());
             assert!(gate.len() > 500 && gate.len() == rows.len());
             let permits = gate
                 .iter()
@@ -124,7 +83,7 @@ fn verdicts_equal_those_of_the_gate() {
             assert!(permits > 20 && permits < gate.len() - 20, "{permits}");
             for (gate, row) in gate.iter().zip(&rows) {
                 for key in ["index", "verdict", "reason", "margin", "worst_pose"] {
-                    assert_eq!(gate[key], row[key], "{task} {set:?}: {gate} {row}");
+                    assert_eq!(gate[key], row[key], "{task} {set}: {gate} {row}");
                 }
             }
         }
@@ -137,14 +96,15 @@ fn fast_replay_gives_the_same_verdicts() {
     let estimates = "tests/data/estimates.csv";
     let folder = Folder::of(b"");
     for task in ["dock", "see-t7"] {
-        let read = |name: &str, fast: &[&str]| {
-            let rows = folder.path(name);
-            let mut arguments = vec!["replay", SITE, estimates, "--task", task, "--rows", &rows];
-            arguments.extend(fast);
-            assert_eq!(posegate(&arguments).status.code(), Some(0));
-            lines(&std::fs::read(&rows).unwrap())
+        let read = |fast: &str| {
+            let rows = folder.path("rows.jsonl");
+            posegate(&format!(
+                "replay {SITE} {estimates} --task {task} --rows {rows} {fast}"
+            ))
+            .with(0);
+            folder.rows()
         };
-        let (slow, fast) = (read("slow", &[]), read("fast", &["--fast"]));
+        let (slow, fast) = (read(""), read("--fast"));
         assert_eq!(slow.len(), fast.len());
         for (slow, fast) in slow.iter().zip(&fast) {
             for key in ["verdict", "reason", "permitted", "state", "gate_reason"] {
@@ -165,7 +125,7 @@ fn intact_bag_is_read_completely() {
                 bag.pose("/amcl_pose", &pose);
             }
             let folder = Folder::of(&bag.finish());
-            let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+            let (rows, summary) = folder.replay("dock", "--topic /amcl_pose");
             assert_eq!(rows.len(), 100);
             assert_eq!(summary["recording"]["indexed"], index);
             assert!(summary["recording"]["damage"].is_null());
@@ -213,11 +173,11 @@ fn truncated_bag_is_read_up_to_the_break() {
     }
     let whole = bag.finish();
     let folder = Folder::of(&whole);
-    let (all, _) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    let (all, _) = folder.replay("dock", "--topic /amcl_pose");
     for share in [0.3, 0.6, 0.8] {
         let cut = (whole.len() as f64 * share) as usize;
         let folder = Folder::of(&whole[..cut]);
-        let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+        let (rows, summary) = folder.replay("dock", "--topic /amcl_pose");
         let expected = 100.0 * share;
         assert!(
             (rows.len() as f64 - expected).abs() < 15.0,
@@ -233,7 +193,7 @@ fn truncated_bag_is_read_up_to_the_break() {
     let mut damaged = whole.clone();
     let place = whole.len() / 2;
     damaged[place] ^= 1;
-    let (rows, summary) = Folder::of(&damaged).replay("dock", &["--topic", "/amcl_pose"]);
+    let (rows, summary) = Folder::of(&damaged).replay("dock", "--topic /amcl_pose");
     assert!(!rows.is_empty());
     // Only the damaged chunk is skipped.
     assert_eq!(summary["recording"]["bad_chunks"], 1);
@@ -310,7 +270,7 @@ fn faulty_messages_are_counted_and_denied() {
     bag.big_endian("/amcl_pose", &at(1.9));
     bag.other("/map_updates", "map_msgs/msg/Update", 3);
     let folder = Folder::of(&bag.finish());
-    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    let (rows, summary) = folder.replay("dock", "--topic /amcl_pose");
     assert_eq!(rows.len(), poses.len() + 1);
     for (row, (_, fault)) in rows.iter().zip(&poses) {
         match *fault {
@@ -355,76 +315,38 @@ fn unreadable_topic_is_named_with_the_reason() {
     bag.other("/strange", "own_msgs/msg/Estimate", 2);
     bag.with_definition("/changed", "float64 x\n", 2);
     let folder = Folder::of(&bag.finish());
-    let topics = [
-        "--topic",
-        "/amcl_pose",
-        "--topic",
-        "/strange",
-        "--topic",
-        "/changed",
-    ];
-    let (rows, summary) = folder.replay("dock", &topics);
+    let topics = "--topic /amcl_pose --topic /strange --topic /changed";
+    let (rows, summary) = folder.replay("dock", topics);
     assert_eq!(rows.len(), 1);
     let skipped = &summary["recording"]["skipped_topics"];
     assert_eq!(skipped["/strange"]["why"], "unknown_schema");
     assert_eq!(skipped["/strange"]["messages"], 2);
     assert_eq!(skipped["/changed"]["why"], "other_fields");
-    let before = folder.files();
-    let (drive, out, rows) = (
-        folder.path("drive.mcap"),
-        folder.path("o.mcap"),
-        folder.path("r"),
-    );
+    let before = folder.0.names().len();
+    let [drive, out, rows, old] =
+        ["drive.mcap", "o.mcap", "r", "old.db3"].map(|name| folder.path(name));
     for (topic, expected) in [
-        (Some("/strange"), "unknown_schema"),
-        (Some("/changed"), "other_fields"),
-        (Some("/nothing"), "/amcl_pose"),
-        (None, "/amcl_pose"),
+        ("--topic /strange", "unknown_schema"),
+        ("--topic /changed", "other_fields"),
+        ("--topic /nothing", "/amcl_pose"),
+        ("", "/amcl_pose"),
     ] {
-        let mut arguments = vec![
-            "replay", SITE, &drive, "--task", "dock", "--mcap", &out, "--rows", &rows,
-        ];
-        arguments.extend(topic.iter().flat_map(|topic| ["--topic", *topic]));
-        let output = posegate(&arguments);
-        assert_eq!(output.status.code(), Some(2), "{topic:?}");
-        assert!(
-            words(&output).contains(expected),
-            "{topic:?}: {}",
-            words(&output)
-        );
+        let line = format!("replay {SITE} {drive} --task dock --mcap {out} --rows {rows} {topic}");
+        posegate(&line).is_refused_with(&[expected]);
     }
-    std::fs::write(folder.path("old.db3"), b"SQLite format 3\0 and more").unwrap();
-    let output = posegate(&["replay", SITE, &folder.path("old.db3"), "--task", "dock"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        words(&output).contains("not a database"),
-        "{}",
-        words(&output)
-    );
-    let old = folder.path("old.db3");
-    let output = posegate(&[
-        "replay",
-        SITE,
-        &old,
-        "--task",
-        "dock",
-        "--topic",
-        "/amcl_pose",
-    ]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        words(&output).contains("not a database"),
-        "{}",
-        words(&output)
-    );
-    assert_eq!(folder.files(), before + 1);
+    folder.0.write("old.db3", b"SQLite format 3\0 and more");
+    for topic in ["", "--topic /amcl_pose"] {
+        let line = format!("replay {SITE} {old} --task dock {topic}");
+        posegate(&line).is_refused_with(&["not a database"]);
+    }
+    assert_eq!(folder.0.names().len(), before + 1);
 }
 
 /// False permits, false denials, coverage and NEES for a truth that is shifted so that the numbers are known. The truth
 /// is a topic, a TUM file or columns of a CSV.
 #[test]
 fn false_permits_are_counted_with_a_truth() {
-    let site = Site::read(at_root(SITE)).unwrap();
+    let site = Site::read(root().join(SITE)).unwrap();
     let success: &SuccessSet = &site.task("dock").unwrap().success;
     let poses = drive();
     // 2 cm to the side: sigma is 1 cm, so e' P^-1 e = 4; after the 80th, 10 cm, outside of the box.
@@ -463,35 +385,19 @@ fn false_permits_are_counted_with_a_truth() {
         );
     }
     let folder = Folder::of(&bag.finish());
-    std::fs::write(folder.path("truth.txt"), tum).unwrap();
-    std::fs::write(folder.path("drive.csv"), csv).unwrap();
-    let (rows, by_topic) = folder.replay(
-        "dock",
-        &[
-            "--topic",
-            "/amcl_pose",
-            "--truth",
-            "/mocap",
-            "--clock",
-            "stamps",
-        ],
-    );
-    let truth_file = folder.path("truth.txt");
-    let (_, by_file) = folder.replay(
-        "dock",
-        &[
-            "--topic",
-            "/amcl_pose",
-            "--truth",
-            &truth_file,
-            "--clock",
-            "stamps",
-        ],
-    );
+    folder.0.write("truth.txt", tum);
+    folder.0.write("drive.csv", csv);
+    let with_truth = |truth: &str, more: &str| {
+        folder.replay(
+            "dock",
+            &format!("--topic /amcl_pose --truth {truth} {more}"),
+        )
+    };
+    let (rows, by_topic) = with_truth("/mocap", "--clock stamps");
+    let (_, by_file) = with_truth(&folder.path("truth.txt"), "--clock stamps");
     let csv = folder.path("drive.csv");
-    let output = posegate(&["replay", SITE, &csv, "--task", "dock", "--json"]);
-    assert_eq!(output.status.code(), Some(1), "a permit was false");
-    let by_row = lines(&output.stdout).remove(0);
+    // A permit was false.
+    let by_row = posegate(&format!("replay {SITE} {csv} --task dock --json")).json(1);
     for summary in [&by_topic, &by_file, &by_row] {
         let truth = &summary["truth"];
         assert_eq!(truth["estimates"], 100);
@@ -533,17 +439,7 @@ fn false_permits_are_counted_with_a_truth() {
     assert_eq!(by_topic["rules"]["gate"]["false_denials"], denied_inside);
     assert!(denied_inside > 0);
     // Inflated by 10, the sets of sigma 1 cm still contain 10 cm: r2 = 11.3 * 10 is above 100.
-    let (_, grown) = folder.replay(
-        "dock",
-        &[
-            "--topic",
-            "/amcl_pose",
-            "--truth",
-            "/mocap",
-            "--inflation",
-            "10",
-        ],
-    );
+    let (_, grown) = with_truth("/mocap", "--inflation 10");
     assert_eq!(grown["truth"]["in_pose_set"], 100);
     assert_eq!(grown["rules"]["gate"]["false_permits"], 0);
 }
@@ -556,8 +452,8 @@ fn estimates_outside_the_time_range_are_counted() {
         bag.pose("/amcl_pose", &pose);
     }
     let folder = Folder::of(&bag.finish());
-    let range = ["--topic", "/amcl_pose", "--from", "11", "--to", "12.001"];
-    let (rows, summary) = folder.replay("dock", &range);
+    let range = "--topic /amcl_pose --from 11 --to 12.001";
+    let (rows, summary) = folder.replay("dock", range);
     assert_eq!(rows.len(), 21);
     assert_eq!(summary["recording"]["outside_time_range"], 79);
     assert_eq!(rows[0]["t_s"], 11.0);
@@ -579,7 +475,7 @@ fn age_is_log_time_minus_stamp() {
         );
     }
     let folder = Folder::of(&bag.finish());
-    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    let (rows, summary) = folder.replay("dock", "--topic /amcl_pose");
     let reasons: Vec<&Value> = rows.iter().map(|row| &row["reason"]).collect();
     assert_eq!(
         reasons,
@@ -587,7 +483,7 @@ fn age_is_log_time_minus_stamp() {
     );
     let most = summary["ages_s"]["most"].as_f64().unwrap();
     assert!((most - 0.3).abs() < 1e-6, "{most}");
-    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose", "--clock", "stamps"]);
+    let (rows, summary) = folder.replay("dock", "--topic /amcl_pose --clock stamps");
     assert!(rows.iter().all(|row| row["verdict"] == "permit"));
     assert!(summary["ages_s"].is_null());
 }
@@ -601,7 +497,7 @@ fn detections_become_estimates() {
     bag.look("/detections", 1.0, 7, pose);
     bag.look("/detections", 2.0, 99, pose);
     let folder = Folder::of(&bag.finish());
-    let (rows, summary) = folder.replay("see-t7", &["--topic", "/detections", "--sigma-px", "0.1"]);
+    let (rows, summary) = folder.replay("see-t7", "--topic /detections --sigma-px 0.1");
     assert_eq!(rows.len(), 1);
     for (found, real) in rows[0]["pose"].as_array().unwrap().iter().zip(pose) {
         assert!((found.as_f64().unwrap() - real).abs() < 1e-6, "{}", rows[0]);
@@ -617,33 +513,18 @@ fn detections_become_estimates() {
 fn tum_trajectory_is_replayed() {
     let folder = Folder::of(b"");
     let text = "# t x y z q\n1 0 0 0 0 0 0 1\n1.05 0 nan 0 0 0 0 1\n1.1 0 0 0 0 0 0 1.1\n1.15 0 0 0 0 0 0 1\n";
-    std::fs::write(folder.path("drive.mcap"), text).unwrap();
-    let (rows, summary) = folder.replay("dock", &[]);
+    folder.0.write("drive.mcap", text);
+    let (rows, summary) = folder.replay("dock", "");
     assert_eq!(summary["findings"]["without_covariance"], 4);
     assert_eq!(summary["findings"]["pose_not_finite"], 1);
     assert_eq!(summary["findings"]["quaternion_not_unit"], 1);
     assert_eq!(rows[0]["reason"], "covariance_unknown");
-    let (rows, _) = folder.replay(
-        "dock",
-        &[
-            "--set",
-            "bounded",
-            "--translation",
-            "0.02",
-            "--yaw-deg",
-            "1",
-        ],
-    );
+    let (rows, _) = folder.replay("dock", "--set bounded --translation 0.02 --yaw-deg 1");
     let verdicts: Vec<&Value> = rows.iter().map(|row| &row["verdict"]).collect();
     assert_eq!(verdicts, ["permit", "deny", "deny", "permit"]);
-    std::fs::write(folder.path("drive.mcap"), "1 0 0 0 0 0 0\n").unwrap();
-    let output = posegate(&["replay", SITE, &folder.path("drive.mcap"), "--task", "dock"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        words(&output).contains(":1:14: 7 numbers"),
-        "{}",
-        words(&output)
-    );
+    folder.0.write("drive.mcap", "1 0 0 0 0 0 0\n");
+    let drive = folder.path("drive.mcap");
+    posegate(&format!("replay {SITE} {drive} --task dock")).is_refused_with(&[":1:14: 7 numbers"]);
 }
 
 #[test]
@@ -655,18 +536,9 @@ fn replay_is_drawn() {
     }
     let folder = Folder::of(&bag.finish());
     let (out, picture) = (folder.path("out.mcap"), folder.path("out.svg"));
-    let options = [
-        "--topic",
-        "/amcl_pose",
-        "--truth",
-        "/mocap",
-        "--mcap",
-        &out,
-        "-o",
-        &picture,
-    ];
+    let options = format!("--topic /amcl_pose --truth /mocap --mcap {out} -o {picture}");
     let (_, summary) = folder.replay("dock", &options);
-    let picture = std::fs::read_to_string(picture).unwrap();
+    let picture = folder.0.text("out.svg");
     let lanes = "estimates gate interlock reasons distance sigma ellipse margin Stanford";
     for name in lanes.split(' ') {
         assert!(picture.contains(&format!(">{name}")), "{name}");
@@ -689,7 +561,7 @@ fn replay_is_drawn() {
         let colour = patch.split("fill=").nth(1).unwrap().split('/').next();
         assert!(picture.matches(colour.unwrap()).count() > 1, "{reason}");
     }
-    assert_eq!(folder.files(), 4);
+    assert_eq!(folder.0.names().len(), 4);
 }
 
 /// Estimates without a pose-set, or at no place on the floor, leave a picture whose numbers are all numbers.
@@ -700,10 +572,9 @@ fn damaged_estimates_are_drawn() {
     let header = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
     let rows = "1,0,0,0,1e-6,0,0,1e-6,0,1e-6\n2,0,0,0,1e-6,nan,0,1e-6,0,1e-6\n3,0,0,0,1e308,1e308,0,1e308,0,1e308\n\
                 4,1e300,0,0,1e-6,0,0,1e-6,0,1e-6\n5,nan,0,0,1e-6,0,0,1e-6,0,1e-6\n6,0,0,0,-1,0,0,-1,0,-1\n7,0,0,0,inf,0,0,1e-6,0,1e-6\n";
-    std::fs::write(&csv, header.to_owned() + rows).unwrap();
-    let output = posegate(&["replay", SITE, &csv, "--task", "dock", "-o", &picture]);
-    assert_eq!(output.status.code(), Some(0), "{}", words(&output));
-    let picture = std::fs::read_to_string(picture).unwrap();
+    folder.0.write("damaged.csv", header.to_owned() + rows);
+    posegate(&format!("replay {SITE} {csv} --task dock -o {picture}")).with(0);
+    let picture = folder.0.text("damaged.svg");
     assert!(picture.contains(">pose-sets on the floor"));
     assert!(!picture.contains("NaN") && !picture.contains("inf,"));
     // The place that is farthest away has no axis.
@@ -723,14 +594,17 @@ fn now_s_is_used_as_in_the_gate() {
     ] {
         let lines_of = times.iter().map(|time| format!("{time},{set}"));
         let (csv, rows) = (folder.path("times.csv"), folder.path("rows.jsonl"));
-        std::fs::write(&csv, header.to_string() + &lines_of.collect::<String>()).unwrap();
+        folder.0.write(
+            "times.csv",
+            header.to_string() + &lines_of.collect::<String>(),
+        );
         let table = "examples/tables/dock.posegate";
-        let gate = posegate(&["gate", table, "--estimates", &csv, "--json"]);
-        let replay = posegate(&[
-            "replay", SITE, &csv, "--task", "dock", "--table", table, "--rows", &rows,
-        ]);
-        assert_eq!(replay.status.code(), Some(0), "{}", words(&replay));
-        let (gate, rows) = (lines(&gate.stdout), lines(&std::fs::read(&rows).unwrap()));
+        let gate = posegate(&format!("gate {table} --estimates {csv} --json")).lines();
+        posegate(&format!(
+            "replay {SITE} {csv} --task dock --table {table} --rows {rows}"
+        ))
+        .with(0);
+        let rows = folder.rows();
         assert_eq!(gate.len(), rows.len());
         assert!(gate.iter().any(|line| line["reason"] == "stale"));
         assert!(gate.iter().any(|line| line["verdict"] == "permit"));
@@ -763,27 +637,20 @@ fn clock_is_chosen_by_the_majority_of_stamps() {
             logged_s - 5.0
         }
     });
-    let (rows, summary) = late.replay("dock", &["--topic", "/amcl_pose"]);
+    let (rows, summary) = late.replay("dock", "--topic /amcl_pose");
     assert_eq!(summary["clock"], "logged");
     assert_eq!(summary["freshness"], "checked");
     assert!(rows.iter().all(|row| row["reason"] == "stale"));
     let other = bag(&|logged_s| logged_s - 8000.0);
-    let (_, summary) = other.replay("dock", &["--topic", "/amcl_pose"]);
+    let (_, summary) = other.replay("dock", "--topic /amcl_pose");
     assert_eq!(summary["clock"], "stamps");
     let freshness = summary["freshness"].as_str().unwrap();
     assert!(freshness.starts_with("not checked"), "{freshness}");
     let drive = other.path("drive.mcap");
-    let output = posegate(&[
-        "replay",
-        SITE,
-        &drive,
-        "--task",
-        "dock",
-        "--topic",
-        "/amcl_pose",
-    ]);
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains(freshness), "{text}");
+    let output = posegate(&format!(
+        "replay {SITE} {drive} --task dock --topic /amcl_pose"
+    ));
+    assert!(output.out.contains(freshness), "{}", output.out);
 }
 
 /// A requested topic or truth that does not exist is an error.
@@ -812,35 +679,17 @@ fn missing_truth_or_topic_is_refused() {
     let folder = Folder::of(&bag.finish());
     let drive = folder.path("drive.mcap");
     for (options, expected) in [
-        (
-            &["--truth", "/nothing"][..],
-            "/nothing: none of 100 estimates",
-        ),
-        (&["--truth", "/rare"], "5 true poses, at"),
-        (&["--truth", "/lab"], "100 of another frame"),
-        (&["--truth", "/amcl_pose"], "a topic of estimates too"),
-        (&["--topic", "/none"], "no topic /none"),
-        (&["--from", "nan"], "--from"),
+        ("--truth /nothing", "/nothing: none of 100 estimates"),
+        ("--truth /rare", "5 true poses, at"),
+        ("--truth /lab", "100 of another frame"),
+        ("--truth /amcl_pose", "a topic of estimates too"),
+        ("--topic /none", "no topic /none"),
+        ("--from nan", "--from"),
     ] {
-        let mut arguments = vec![
-            "replay",
-            SITE,
-            &drive,
-            "--task",
-            "dock",
-            "--topic",
-            "/amcl_pose",
-        ];
-        arguments.extend(options);
-        let output = posegate(&arguments);
-        assert_eq!(output.status.code(), Some(2), "{options:?}");
-        assert!(
-            words(&output).contains(expected),
-            "{options:?}: {}",
-            words(&output)
-        );
+        let line = format!("replay {SITE} {drive} --task dock --topic /amcl_pose {options}");
+        posegate(&line).is_refused_with(&[expected]);
     }
-    let (_, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    let (_, summary) = folder.replay("dock", "--topic /amcl_pose");
     assert_eq!(summary["truth"]["estimates"], 0);
     assert_eq!(summary["truth"]["without"], 100);
 }
@@ -879,15 +728,8 @@ fn true_pose_in_another_frame_or_tilted_is_rejected() {
         );
     }
     let folder = Folder::of(&bag.finish());
-    let options = [
-        "--topic",
-        "/amcl_pose",
-        "--truth",
-        "/mocap",
-        "--truth-gap",
-        "0.06",
-    ];
-    let (rows, summary) = folder.replay("dock", &options);
+    let options = "--topic /amcl_pose --truth /mocap --truth-gap 0.06";
+    let (rows, summary) = folder.replay("dock", options);
     assert_eq!(rows[60]["reason"], "stale");
     let truth = &summary["truth"];
     for (name, count) in [
@@ -925,8 +767,7 @@ fn stamp_far_ahead_does_not_take_the_truth_of_other_rows() {
         bag.truth("/mocap", &pose);
     }
     let folder = Folder::of(&bag.finish());
-    let options = ["--topic", "/amcl_pose", "--truth", "/mocap", "--fast"];
-    let (rows, summary) = folder.replay("dock", &options);
+    let (rows, summary) = folder.replay("dock", "--topic /amcl_pose --truth /mocap --fast");
     assert_eq!(rows.len(), 150);
     assert_eq!(summary["truth"]["estimates"], 149, "{}", summary["truth"]);
     assert_eq!(summary["truth"]["without"], 1);
@@ -939,24 +780,17 @@ fn detections_of_two_cameras_are_refused() {
     let pose = [1.7, 0.7, -0.25];
     bag.look("/detections", 1.0, 7, pose);
     let one = Folder::of(&bag.finish());
-    let (_, summary) = one.replay("see-t7", &["--topic", "/detections", "--sigma-px", "0.1"]);
+    let (_, summary) = one.replay("see-t7", "--topic /detections --sigma-px 0.1");
     assert_eq!(summary["looks"]["frame"], "camera");
     let mut bag = Bag::new(None, true);
     bag.look("/detections", 1.0, 7, pose);
     bag.look_in("rear_camera", "/detections", 2.0, 7, pose);
     let two = Folder::of(&bag.finish());
     let drive = two.path("drive.mcap");
-    let output = posegate(&[
-        "replay",
-        SITE,
-        &drive,
-        "--task",
-        "see-t7",
-        "--topic",
-        "/detections",
-    ]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(words(&output).contains("rear_camera"), "{}", words(&output));
+    let output = posegate(&format!(
+        "replay {SITE} {drive} --task see-t7 --topic /detections"
+    ));
+    output.is_refused_with(&["rear_camera"]);
 }
 
 /// The age is 0 for equal times of the present date, because nanoseconds are not rounded before the conversion to milliseconds.
@@ -968,7 +802,7 @@ fn age_is_zero_when_stamp_equals_log_time() {
         bag.pose_at("/amcl_pose", nanoseconds, &Pose::AT_DOCK);
     }
     let folder = Folder::of(&bag.finish());
-    let (rows, summary) = folder.replay("dock", &["--topic", "/amcl_pose"]);
+    let (rows, summary) = folder.replay("dock", "--topic /amcl_pose");
     assert_eq!(summary["clock"], "logged");
     for row in &rows {
         assert_eq!(row["verdict"], "permit", "{row}");
@@ -985,25 +819,16 @@ fn rules_use_the_recorded_estimate() {
         bag.pose("/amcl_pose", &pose);
     }
     let folder = Folder::of(&bag.finish());
-    let bounded = [
-        "--set",
-        "bounded",
-        "--translation",
-        "0.02",
-        "--yaw-deg",
-        "1",
-    ];
-    let mut options = vec!["--topic", "/amcl_pose"];
-    let (_, plain) = folder.replay("dock", &options);
-    options.extend(bounded);
-    let (_, with_bound) = folder.replay("dock", &options);
+    let bounded = "--set bounded --translation 0.02 --yaw-deg 1";
+    let (_, plain) = folder.replay("dock", "--topic /amcl_pose");
+    let (_, with_bound) = folder.replay("dock", &format!("--topic /amcl_pose {bounded}"));
     for rule in ["distance", "sigma", "ellipse"] {
         assert_eq!(plain["rules"][rule], with_bound["rules"][rule], "{rule}");
     }
     assert_eq!(plain["rules"]["sigma"]["permits"], 100);
     assert!(plain["rules"]["ate"].is_null(), "no truth");
-    std::fs::write(folder.path("drive.mcap"), "1 0 0 0 0 0 0 1\n").unwrap();
-    let (rows, summary) = folder.replay("dock", &bounded);
+    folder.0.write("drive.mcap", "1 0 0 0 0 0 0 1\n");
+    let (rows, summary) = folder.replay("dock", bounded);
     assert_eq!(rows[0]["distance"], true);
     for rule in ["sigma", "ellipse"] {
         assert!(rows[0][rule].is_null() && summary["rules"][rule].is_null());

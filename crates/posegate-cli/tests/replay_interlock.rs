@@ -1,30 +1,20 @@
 //! `posegate replay`: the reasons of a shut interlock, and the setting that opens it.
 
+use posegate_testkit::run::Case;
 use serde_json::Value;
-use std::process::{Command, Stdio};
 
 const SITE: &str = include_str!("../../../examples/sites/dock.toml");
 
 /// Replays estimates at the dock: one line `t_s x_m` each, with a standard deviation of 1 mm and 0.001 rad.
 fn replay(estimates: &[(f64, f64)], arguments: &str) -> Value {
-    let folder = tempfile::tempdir().expect("a folder");
     let header = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
     let rows = estimates
         .iter()
         .map(|(t, x)| format!("{t},{x},0,0,1e-6,0,0,1e-6,0,1e-6\n"));
     let text = header.to_string() + &rows.collect::<String>();
-    std::fs::write(folder.path().join("site.toml"), SITE).expect("a site");
-    std::fs::write(folder.path().join("log.csv"), text).expect("a recording");
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(["replay", "site.toml", "log.csv", "--task", "dock", "--json"])
-        .args(arguments.split_whitespace())
-        .current_dir(folder.path())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program runs");
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{error}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
+    let case = Case::new(&[("site.toml", SITE.as_bytes()), ("log.csv", text.as_bytes())]);
+    let line = format!("replay site.toml log.csv --task dock --json {arguments}");
+    case.json(0, &line)
 }
 
 fn every(period_s: f64, count: u32, x: f64) -> Vec<(f64, f64)> {

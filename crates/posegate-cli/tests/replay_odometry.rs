@@ -1,7 +1,7 @@
 //! `posegate replay --odom FILE`: fixes that come twice a second are carried along an odometry, and a faulty file is refused with its line.
 
+use posegate_testkit::run::{Case, Ended, cases};
 use serde_json::Value;
-use std::process::{Command, Output, Stdio};
 
 const SITE: &str = include_str!("../../../examples/sites/dock.toml");
 const ESTIMATES: &str = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw\n";
@@ -9,28 +9,19 @@ const ODOMETRY: &str = "t_s,x_m,y_m,yaw_rad\n";
 const MOVING: &str = "--odom odom.csv --max-speed 0.1 --max-yaw-rate 5";
 
 /// Replays fixes with a standard deviation of 1 mm and 0.001 rad, one `t_s x_m` each, and an odometry.
-fn replay(fixes: &[(f64, f64)], odometry: &[u8], arguments: &str) -> Output {
-    let folder = tempfile::tempdir().expect("a folder");
+fn replay(fixes: &[(f64, f64)], odometry: &[u8], arguments: &str) -> Ended {
     let rows = fixes
         .iter()
         .map(|(t, x)| format!("{t},{x},0,0,1e-6,0,0,1e-6,0,1e-6\n"));
     let text = ESTIMATES.to_string() + &rows.collect::<String>();
-    std::fs::write(folder.path().join("site.toml"), SITE).expect("a site");
-    std::fs::write(folder.path().join("log.csv"), text).expect("a recording");
-    std::fs::write(folder.path().join("odom.csv"), odometry).expect("an odometry");
-    Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(["replay", "site.toml", "log.csv", "--task", "dock", "--json"])
-        .args(arguments.split_whitespace())
-        .current_dir(folder.path())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program runs")
-}
-
-fn summary(output: &Output) -> Value {
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{error}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
+    let case = Case::new(&[
+        ("site.toml", SITE.as_bytes()),
+        ("log.csv", text.as_bytes()),
+        ("odom.csv", odometry),
+    ]);
+    case.run(&format!(
+        "replay site.toml log.csv --task dock --json {arguments}"
+    ))
 }
 
 /// The place of a robot that drives at 0.05 m/s through the middle of the dock.
@@ -76,15 +67,15 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn odometry_file_keeps_the_interlock_open_between_fixes() {
-    let without = summary(&replay(&fixes(), b"", "--max-speed 0.1 --max-yaw-rate 5"));
+    let without = replay(&fixes(), b"", "--max-speed 0.1 --max-yaw-rate 5").json(0);
     assert_eq!(without["interlock"]["openings"], 0, "{without}");
-    let with = summary(&replay(&fixes(), csv(&driven()).as_bytes(), MOVING));
+    let with = replay(&fixes(), csv(&driven()).as_bytes(), MOVING).json(0);
     let interlock = &with["interlock"];
     assert_eq!(interlock["openings"], 1, "{interlock}");
     // The dock is 16 cm long: 3.2 s, less the sets, the slip and the allowed drive until a permission ends.
     assert!(number(&interlock["open_s"]) > 1.5, "{interlock}");
     assert!(number(&interlock["open_s"]) < 3.1, "{interlock}");
-    let of_tum = summary(&replay(&fixes(), tum(&driven()).as_bytes(), MOVING));
+    let of_tum = replay(&fixes(), tum(&driven()).as_bytes(), MOVING).json(0);
     let differ = number(&of_tum["interlock"]["open_s"]) - number(&interlock["open_s"]);
     assert!(differ.abs() < 0.05, "{differ}");
 }
@@ -102,7 +93,7 @@ fn interlock_closes_when_the_odometry_leaves_the_dock() {
         })
         .collect();
     let open = |poses: &[(f64, [f64; 3])]| {
-        let summary = summary(&replay(&fixes, csv(poses).as_bytes(), MOVING));
+        let summary = replay(&fixes, csv(poses).as_bytes(), MOVING).json(0);
         let interlock = &summary["interlock"];
         assert!(
             interlock["shut_s_by"]["not_contained"].is_f64(),
@@ -187,42 +178,20 @@ fn faulty_odometry_is_refused_with_its_line() {
             ],
         ),
     ] {
-        let output = replay(&fixes(), &odometry, MOVING);
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{words:?}: {error}");
-        assert!(output.stdout.is_empty());
-        // Messages are wrapped into lines.
-        let joined: Vec<&str> = error
-            .split_whitespace()
-            .filter(|word| *word != "│")
-            .collect();
-        let error = joined.join(" ");
-        for word in words {
-            assert!(error.contains(word), "{word}: {error}");
-        }
+        replay(&fixes(), &odometry, MOVING).is_refused_with(words);
     }
 }
 
 #[test]
 fn odometry_needs_an_existing_file_and_a_speed() {
-    for (arguments, words) in [
-        (
-            "--odom other.csv --max-speed 0.1",
-            "other.csv: there is no such file",
-        ),
-        ("--odom odom.csv", "--max-speed"),
-        (
-            "--odom odom.csv --max-speed 0.1 --odom-noise 0.1,0.1",
-            "--odom-noise 0.1,0.1 is not three numbers",
-        ),
-        (
-            "--odom odom.csv --max-speed 0.1 --odom-slip -1",
-            "--odom-slip",
-        ),
-    ] {
-        let output = replay(&fixes(), csv(&driven()).as_bytes(), arguments);
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments}: {error}");
-        assert!(error.contains(words), "{words}: {error}");
+    for [arguments, words] in cases(
+        "
+        --odom other.csv --max-speed 0.1 => other.csv: there is no such file
+        --odom odom.csv => --max-speed
+        --odom odom.csv --max-speed 0.1 --odom-noise 0.1,0.1 => --odom-noise 0.1,0.1 is not three numbers
+        --odom odom.csv --max-speed 0.1 --odom-slip -1 => --odom-slip
+        ",
+    ) {
+        replay(&fixes(), csv(&driven()).as_bytes(), arguments).is_refused_with(&[words]);
     }
 }

@@ -1,8 +1,8 @@
 //! `posegate replay` on a bag without `/odom`: `/tf` is the odometry, or the source of poses; and a frame that does not match is named.
 
 use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::run::{Case, Ended, lines};
 use serde_json::Value;
-use std::process::{Command, Output, Stdio};
 
 const SITE: &str = include_str!("../../../examples/sites/dock.toml");
 /// The odometry's frame in the world: turned and displaced.
@@ -48,35 +48,12 @@ fn drive(frame: &'static str, base: &str) -> Vec<u8> {
     bag.finish()
 }
 
-fn replay(bag: &[u8], arguments: &str) -> (Output, Vec<Value>) {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("site.toml"), SITE).expect("a site");
-    std::fs::write(folder.path().join("drive.mcap"), bag).expect("a recording");
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(["replay", "site.toml", "drive.mcap", "--task", "dock"])
-        .args(["--rows", "rows.jsonl"])
-        .args(arguments.split_whitespace())
-        .current_dir(folder.path())
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program runs");
-    let rows = std::fs::read_to_string(folder.path().join("rows.jsonl")).unwrap_or_default();
-    let rows = rows
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"));
-    (output, rows.collect())
-}
-
-fn summary(output: &Output) -> Value {
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{error}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-fn refused(output: &Output) -> String {
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    error.split_whitespace().collect::<Vec<_>>().join(" ")
+fn replay(bag: &[u8], arguments: &str) -> (Ended, Vec<Value>) {
+    let case = Case::new(&[("site.toml", SITE.as_bytes()), ("drive.mcap", bag)]);
+    let line = format!("replay site.toml drive.mcap --task dock --rows rows.jsonl {arguments}");
+    let ended = case.run(&line);
+    let rows = std::fs::read_to_string(case.path().join("rows.jsonl")).unwrap_or_default();
+    (ended, lines(&rows))
 }
 
 #[test]
@@ -85,9 +62,9 @@ fn transforms_replace_a_missing_odometry_topic() {
         let bag = drive("map", base);
         let fixes = format!("--json --topic /amcl_pose {MOVING}");
         let (output, _) = replay(&bag, &fixes);
-        assert_eq!(summary(&output)["interlock"]["openings"], 0);
+        assert_eq!(output.json(0)["interlock"]["openings"], 0);
         let (output, _) = replay(&bag, &format!("{fixes} --odom /tf"));
-        let summary = summary(&output);
+        let summary = output.json(0);
         // The correction and the odometry, not the wheel.
         let driven = &summary["odometry"];
         assert_eq!(driven["poses"], 400);
@@ -115,12 +92,12 @@ fn too_fast_odometry_is_reported_with_the_sufficient_speed() {
     let bag = drive("map", "base_link");
     let slow = "--topic /amcl_pose --odom /tf --max-speed 0.03 --max-yaw-rate 5";
     let (output, _) = replay(&bag, slow);
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let text = output.out;
     assert!(text.contains("odometry_jump"), "{text}");
     assert!(text.contains("up to 0.050 m/s"), "{text}");
     assert!(text.contains("give --max-speed 0.051 or more"), "{text}");
     let (output, _) = replay(&bag, &slow.replace("0.03", "0.051"));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let text = output.out;
     assert!(
         !text.contains("odometry_jump") && !text.contains("or more"),
         "{text}"
@@ -141,17 +118,17 @@ fn pose_is_the_correction_composed_with_the_odometry() {
             assert!((found - wanted).abs() < 1e-9, "{row}");
         }
     }
-    assert_eq!(summary(&output)["interlock"]["openings"], 1);
+    assert_eq!(output.json(0)["interlock"]["openings"], 1);
     // Without a bound there is no uncertainty.
     let (output, _) = replay(&drive("map", "base_link"), "--json --topic /tf");
-    assert_eq!(summary(&output)["reasons"]["covariance_unknown"], 350);
+    assert_eq!(output.json(0)["reasons"]["covariance_unknown"], 350);
 }
 
 #[test]
 fn missing_odometry_or_frame_is_named() {
     let bag = drive("map", "base_link");
     let (output, _) = replay(&bag, &format!("--topic /amcl_pose --odom /odom {MOVING}"));
-    let error = refused(&output);
+    let error = output.with(2).words();
     assert!(error.contains("drive.mcap has no topic /odom"), "{error}");
     assert!(error.contains("--odom /tf"), "{error}");
     let robot = drive("map", "robot");
@@ -160,7 +137,7 @@ fn missing_odometry_or_frame_is_named() {
         "--topic /tf --set bounded --translation 0.01 --yaw-deg 0.5".into(),
     ] {
         let (output, _) = replay(&robot, &arguments);
-        let error = refused(&output);
+        let error = output.with(2).words();
         for words in [
             "map -> odom, 80 times",
             "odom -> robot, 400 times",
@@ -171,7 +148,7 @@ fn missing_odometry_or_frame_is_named() {
             assert!(error.contains(words), "{arguments}: {words}: {error}");
         }
         let (output, _) = replay(&robot, &format!("{arguments} --base-frame robot --json"));
-        summary(&output);
+        output.json(0);
     }
 }
 
@@ -179,19 +156,19 @@ fn missing_odometry_or_frame_is_named() {
 fn mismatched_frame_is_named() {
     let bag = drive("odom", "base_link");
     let (output, _) = replay(&bag, "--json --topic /amcl_pose");
-    let summary = summary(&output);
+    let summary = output.json(0);
     assert_eq!(summary["reasons"]["frame_mismatch"], 16);
     let mismatch = &summary["frame_mismatch"];
     assert_eq!(mismatch["expected"], "map");
     assert_eq!(mismatch["saw"]["odom"], 16, "{mismatch}");
     let (output, _) = replay(&bag, "--topic /amcl_pose");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let text = output.out;
     assert!(
         text.contains("the frames seen are `odom` (16); expected `map`"),
         "{text}"
     );
     // The text has it also if the fixes are carried along an odometry.
     let (output, _) = replay(&bag, &format!("--topic /amcl_pose --odom /tf {MOVING}"));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let text = output.out;
     assert!(text.contains("the frames seen are `odom` (16)"), "{text}");
 }

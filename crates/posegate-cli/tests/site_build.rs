@@ -9,9 +9,9 @@ mod forged;
 mod merging;
 #[path = "site_build/mixed.rs"]
 mod mixed;
-#[allow(dead_code)]
 use posegate_testkit::plant;
-
+use posegate_testkit::run::{self, Ended, cases};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -36,13 +36,10 @@ impl Folder {
     }
 
     fn command(&self, line: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_posegate"));
+        let mut command = run::command(self.path(), line);
         command
-            .args(line.split_whitespace())
-            .current_dir(self.path())
             .env_remove("POSEGATE_SHARD_INDEX")
             .env_remove("POSEGATE_SHARD_COUNT")
-            .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         command
@@ -50,6 +47,10 @@ impl Folder {
 
     fn expect(&self, code: i32, line: &str) -> (String, String) {
         checked(code, line, self.command(line).output().unwrap())
+    }
+
+    fn run(&self, line: &str) -> Ended {
+        Ended::of(&mut self.command(line))
     }
 
     /// Finished pieces of a build: names that are keys.
@@ -97,6 +98,13 @@ impl Folder {
     }
 }
 
+/// Checks the exit code. Returns stdout, and the words of stderr.
+fn checked(code: i32, line: &str, output: Output) -> (String, String) {
+    let ended = Ended::new(output, line.to_owned()).with(code);
+    let words = ended.words();
+    (ended.out, words)
+}
+
 /// Results of a merge: all files outside of `parts`.
 type Results = BTreeMap<String, Vec<u8>>;
 
@@ -118,21 +126,6 @@ fn gather(root: &Path, folder: &Path, results: &mut Results) {
             results.insert(name, std::fs::read(&path).unwrap());
         }
     }
-}
-
-fn checked(code: i32, line: &str, output: Output) -> (String, String) {
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    // Errors are wrapped into lines.
-    let joined = |text: String| {
-        let words = text.split(|c: char| c.is_whitespace() || c == '\u{2502}');
-        words
-            .filter(|word| !word.is_empty())
-            .collect::<Vec<_>>()
-            .join(" ")
-    };
-    let (out, err) = (text(&output.stdout), joined(text(&output.stderr)));
-    assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
-    (out, err)
 }
 
 /// Four endpoints: eight tables, four plans.
@@ -161,13 +154,12 @@ fn two_shards() -> Folder {
 fn bytes_are_equal_for_any_number_of_shards_and_threads() {
     let folder = Folder::with(&PLANT);
     folder.expect(0, "site build site.toml --threads 1 -o one");
-    let (out, _) = folder.expect(0, "site merge one --json");
-    let merged: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let merged = folder.run("site merge one --json").json(0);
     assert_eq!(
         (&merged["tables"], &merged["plans"]),
         (&8.into(), &4.into())
     );
-    assert_eq!(merged["without_plan"], serde_json::json!([]));
+    assert_eq!(merged["without_plan"], json!([]));
     let one = folder.results("one");
     assert_eq!(one.len(), 8 + 8 + 4 + 1);
 
@@ -225,7 +217,7 @@ fn bytes_are_equal_for_any_number_of_shards_and_threads() {
     // A disc and a dotted line of sight for each look, and one of each in the legend.
     let plans = one.iter().filter(|(name, _)| name.starts_with("plans/"));
     let looks = plans.map(|(_, bytes)| {
-        let plan: serde_json::Value = serde_json::from_slice(bytes).unwrap();
+        let plan: Value = serde_json::from_slice(bytes).unwrap();
         let steps = plan["steps"].as_array().unwrap().iter();
         steps.filter(|step| step["type"] == "localization").count()
     });
@@ -237,7 +229,7 @@ fn bytes_are_equal_for_any_number_of_shards_and_threads() {
     );
 
     // The manifest is of exactly these files.
-    let manifest: serde_json::Value = serde_json::from_slice(&one["manifest.json"]).unwrap();
+    let manifest: Value = serde_json::from_slice(&one["manifest.json"]).unwrap();
     let listed = manifest["files"].as_array().unwrap();
     assert_eq!(listed.len(), 20);
     for file in listed {
@@ -284,7 +276,7 @@ fn flip(piece: &Path) {
 fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
     let bytes = std::fs::read(piece).unwrap();
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
-    let mut head: serde_json::Value = serde_json::from_slice(&bytes[..end]).unwrap();
+    let mut head: Value = serde_json::from_slice(&bytes[..end]).unwrap();
     let mut rest = &bytes[end + 1..];
     let mut files = Vec::new();
     for listed in head["files"].as_array().unwrap() {
@@ -293,9 +285,9 @@ fn rewrite(piece: &Path, change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) {
         rest = others;
     }
     change(&mut files);
-    let listed = files.iter().map(|(path, bytes)| {
-        serde_json::json!({"path": path, "bytes": bytes.len(), "sha256": sha256(bytes)})
-    });
+    let listed = files
+        .iter()
+        .map(|(path, bytes)| json!({"path": path, "bytes": bytes.len(), "sha256": sha256(bytes)}));
     head["files"] = listed.collect();
     let mut bytes = format!("{head}\n").into_bytes();
     for (_, file) in &files {
@@ -384,48 +376,33 @@ fn site_without_tasks_is_refused() {
 #[test]
 fn invalid_usage_is_refused() {
     let folder = Folder::with(&boxes());
-    for (line, expected) in [
-        ("--shard 3/2 -o out", "counted from 0, the last of 2 is 1/2"),
-        ("--shard 0/0 -o out", "one shard at least"),
-        ("--shard half -o out", "`half` is no shard"),
-        (
-            "--shard-index 2 --shard-count 2 -o out",
-            "the last of 2 is 1/2",
-        ),
-        ("--shard-index 1 -o out", "--shard-count"),
-        ("--shard +1/2 -o out", "`+1/2` is no shard"),
-        ("--shard 1/+2 -o out", "`1/+2` is no shard"),
-        (
-            "--shard-index +1 --shard-count 2 -o out",
-            "`+1` is no number of shards",
-        ),
-        (
-            "--shard 0/1000001 -o out",
-            "a site is cut into 1000000 shards at most",
-        ),
-        (
-            "--shard 0/2 --shard-index 1 --shard-count 2 -o out",
-            "--shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX",
-        ),
-        (
-            "--shard 1/2 --shard-index 2 --shard-count 2 -o out",
-            "the last of 2 is 1/2",
-        ),
-        ("--threads 0 -o out", "--threads 0 does no work"),
-        ("--most-risk nan -o out", "not a probability"),
-        (
-            "-o site.toml",
-            "site.toml: is a file, and a folder is needed",
-        ),
-    ] {
-        let (_, err) = folder.expect(2, &format!("site build site.toml {line}"));
-        assert!(err.contains(expected), "{line}: {err}");
+    for [line, expected] in cases(
+        "
+        --shard 3/2 -o out => counted from 0, the last of 2 is 1/2
+        --shard 0/0 -o out => one shard at least
+        --shard half -o out => `half` is no shard
+        --shard-index 2 --shard-count 2 -o out => the last of 2 is 1/2
+        --shard-index 1 -o out => --shard-count
+        --shard +1/2 -o out => `+1/2` is no shard
+        --shard 1/+2 -o out => `1/+2` is no shard
+        --shard-index +1 --shard-count 2 -o out => `+1` is no number of shards
+        --shard 0/1000001 -o out => a site is cut into 1000000 shards at most
+        --shard 0/2 --shard-index 1 --shard-count 2 -o out => --shard 0/2, and 1/2 by POSEGATE_SHARD_INDEX
+        --shard 1/2 --shard-index 2 --shard-count 2 -o out => the last of 2 is 1/2
+        --threads 0 -o out => --threads 0 does no work
+        --most-risk nan -o out => not a probability
+        -o site.toml => site.toml: is a file, and a folder is needed
+        ",
+    ) {
+        folder.run(&format!("site build site.toml {line}")).is_refused_with(&[expected]);
     }
     assert!(!folder.path().join("out").exists());
-    let (_, err) = folder.expect(2, "site merge site.toml");
-    assert!(err.contains("is a file"), "{err}");
-    let (_, err) = folder.expect(2, "site merge out --prove");
-    assert!(err.contains("--site"), "{err}");
+    folder
+        .run("site merge site.toml")
+        .is_refused_with(&["is a file"]);
+    folder
+        .run("site merge out --prove")
+        .is_refused_with(&["--site"]);
     // The same shard by both options.
     folder.expect(
         0,
@@ -434,10 +411,8 @@ fn invalid_usage_is_refused() {
     // A folder with foreign tables is left unchanged.
     std::fs::create_dir_all(folder.path().join("own/tables")).unwrap();
     folder.write("own/tables/mine", "1");
-    let (_, err) = folder.expect(2, "site build site.toml -o own");
-    assert!(
-        err.contains("own: there is a `tables` already that is of no site build"),
-        "{err}"
-    );
+    folder
+        .run("site build site.toml -o own")
+        .is_refused_with(&["own: there is a `tables` already that is of no site build"]);
     assert!(folder.path().join("own/tables/mine").exists());
 }

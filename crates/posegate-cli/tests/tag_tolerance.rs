@@ -13,7 +13,6 @@ use posegate_testkit::nature::{Random, Vector, World};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
 /// Largest allowed ratio of the bound to the largest error that is found.
@@ -396,18 +395,8 @@ fn cost_of_a_view_includes_the_tolerances() {
 }
 
 fn run(folder: &Path, line: &str) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (
-        output.status.code().unwrap(),
-        text(output.stdout),
-        text(output.stderr),
-    )
+    let ended = posegate_testkit::run::run(folder, line);
+    (ended.code, ended.out, ended.err)
 }
 
 const CHAIN: &str = "

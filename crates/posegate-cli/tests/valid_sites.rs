@@ -2,19 +2,10 @@
 //! the reason.
 
 use posegate_testkit::counts;
-use std::path::Path;
-use std::process::{Command, Output};
+use posegate_testkit::run::Case;
 
 /// The two that there are: `auto` and `both` are other words for facets.
 const LAYOUTS: [&str; 2] = ["facets", "grid"];
-
-fn posegate(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 fn site(success: &str, goal_yaw_deg: f64, table: &str) -> String {
     format!(
@@ -31,27 +22,14 @@ fn table(x: [f64; 2], y: [f64; 2], yaw_deg: [f64; 2], [xy, step_deg]: [f64; 2]) 
 
 /// Builds a site in every layout and returns the exit codes, none of which is 3. Built tables are proven again.
 fn built(text: &str) -> [i32; 2] {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    std::fs::write(folder.join("site.toml"), text).unwrap();
-    let check = posegate(folder, &["check", "site.toml"]);
-    assert!(check.status.success(), "{text}\n{check:?}");
+    let folder = Case::new(&[("site.toml", text.as_bytes())]);
+    folder.expect(0, "check site.toml");
     LAYOUTS.map(|layout| {
         let file = format!("{layout}.posegate");
-        let build = [
-            "table",
-            "build",
-            "site.toml",
-            "--task",
-            "t",
-            "--layout",
-            layout,
-            "-o",
-            &file,
-        ];
-        let output = posegate(folder, &build);
-        let code = output.status.code().unwrap();
-        let error = String::from_utf8_lossy(&output.stderr);
+        let built = folder.run(&format!(
+            "table build site.toml --task t --layout {layout} -o {file}"
+        ));
+        let (code, error) = (built.code, built.err);
         assert!(
             code == 0 || code == 2,
             "{layout}: exit code {code}: {error}\n{text}"
@@ -62,8 +40,7 @@ fn built(text: &str) -> [i32; 2] {
                 "{layout}: {error}"
             );
         } else {
-            let verify = posegate(folder, &["table", "verify", &file, "site.toml"]);
-            assert!(verify.status.success(), "{layout}: {verify:?}\n{text}");
+            folder.expect(0, &format!("table verify {file} site.toml"));
         }
         code
     })
@@ -99,24 +76,14 @@ fn arc_of_nearly_a_full_turn_is_built() {
 /// A table of an arc is never a table of a full turn.
 #[test]
 fn arc_below_a_full_turn_is_not_a_full_turn() {
-    let folder = tempfile::tempdir().unwrap();
     let shape =
         "{ shape = \"box\", x = [-0.08, 0.08], y = [-0.06, 0.06], yaw_deg = [0.0, 359.99999999] }";
     let table = table([-0.2, 0.2], [-0.2, 0.2], [-180.0, 180.0], [0.05, 5.0]);
-    std::fs::write(folder.path().join("site.toml"), site(shape, 0.0, &table)).unwrap();
-    let build = [
-        "table",
-        "build",
-        "site.toml",
-        "--task",
-        "t",
-        "--layout",
-        "facets",
-        "-o",
-        "t.posegate",
-    ];
-    assert!(posegate(folder.path(), &build).status.success());
-    let bytes = std::fs::read(folder.path().join("t.posegate")).unwrap();
+    let site = site(shape, 0.0, &table);
+    let folder = Case::new(&[("site.toml", site.as_bytes())]);
+    let line = "table build site.toml --task t --layout facets -o t.posegate";
+    folder.expect(0, line);
+    let bytes = folder.read("t.posegate");
     let table = posegate::table::Table::parse(&bytes).unwrap();
     let pieces: Vec<_> = table.facets().unwrap().pieces().collect();
     assert!(!pieces.is_empty() && pieces.iter().all(|piece| !piece.is_whole_circle()));
@@ -206,26 +173,12 @@ fn goal_outside_of_all_regions_is_valid() {
     let table = table([-2.1, 2.1], [-1.1, 1.1], [-10.0, 10.0], [0.1, 5.0]);
     assert_eq!(built(&site(&set, 30.0, &table)), [0; 2]);
     // The answer about a pose names no obstacle either.
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("site.toml"), site(&set, 0.0, &table)).unwrap();
-    std::fs::write(
-        folder.path().join("poses.csv"),
-        "x_m,y_m,yaw_rad\n1.0,-2.0,0.0\n2.5,-2.0,0.0\n",
-    )
-    .unwrap();
-    let output = posegate(
-        folder.path(),
-        &[
-            "contains",
-            "site.toml",
-            "--task",
-            "t",
-            "--poses",
-            "poses.csv",
-            "--json",
-        ],
-    );
-    let lines = String::from_utf8(output.stdout).unwrap();
+    let folder = Case::new(&[]);
+    folder.write("site.toml", site(&set, 0.0, &table));
+    let poses = "x_m,y_m,yaw_rad\n1.0,-2.0,0.0\n2.5,-2.0,0.0\n";
+    folder.write("poses.csv", poses);
+    let line = "contains site.toml --task t --poses poses.csv --json";
+    let lines = folder.run(line).out;
     let lines: Vec<&str> = lines.lines().collect();
     assert!(
         lines[0].contains("\"inside\":false") && lines[1].contains("\"inside\":true"),
@@ -241,8 +194,7 @@ fn goal_outside_of_all_regions_is_valid() {
     let clear = format!(
         "{{ all = [{set}, {{ shape = \"clear\", footprint = {robot}, obstacle = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]] }}] }}"
     );
-    std::fs::write(folder.path().join("site.toml"), site(&clear, 0.0, &table)).unwrap();
-    let output = posegate(folder.path(), &["check", "site.toml"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("an obstacle covers the goal"));
+    folder.write("site.toml", site(&clear, 0.0, &table));
+    let check = folder.run("check site.toml");
+    check.is_refused_with(&["an obstacle covers the goal"]);
 }

@@ -430,19 +430,21 @@ fn fixture() -> Folder {
 
 /// An ELF file of one segment with the record of a seal in it.
 fn firmware() -> Vec<u8> {
-    let image = [
-        &[7; 100][..],
-        &posegate::gate::Seal::MAGIC,
-        &[0xff; 12],
-        &[7; 60],
-    ]
-    .concat();
+    let magic = &posegate::gate::Seal::MAGIC;
+    elf(
+        0x0800_0000,
+        &[&[7; 100][..], magic, &[0xff; 12], &[7; 60]].concat(),
+    )
+}
+
+/// Returns an ELF file of one segment at an address.
+pub fn elf(address: u32, image: &[u8]) -> Vec<u8> {
     let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0\x02\0\x28\0".to_vec();
     let mut words =
         |values: &[u32]| file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     words(&[1, 0, 52, 0, 0, 52 | 32 << 16, 1 | 40 << 16, 0]);
     let length = image.len() as u32;
-    words(&[1, 84, 0x0800_0000, 0x0800_0000, length, length, 5, 4]);
+    words(&[1, 84, address, address, length, length, 5, 4]);
     file.extend(image);
     file
 }

@@ -23,6 +23,7 @@ pub mod oracle;
 pub mod planning_sites;
 pub mod plant;
 pub mod replay;
+pub mod run;
 #[cfg(feature = "host")]
 pub mod sites;
 pub mod stepped;

@@ -5,7 +5,6 @@ use crate::site_input::{Failure, site, warn};
 use posegate::confidence::radius_squared;
 use posegate_files::files::{Files, Input};
 use posegate_replay::KnownTags;
-use posegate_replay::corners::MountedCamera;
 use posegate_replay::recording::{format_of, is_folder};
 use posegate_replay::tables::{Played, Table};
 use posegate_site::Site;
@@ -74,25 +73,15 @@ pub fn views(
     let Some((played, recorded, site)) = open(files, log, arguments, rig, EPSILON)? else {
         return Ok(None);
     };
-    let camera = match rig.1 {
-        Some(name) => site.cameras.get(name),
-        None => site.cameras.values().next(),
-    };
-    let camera = camera.filter(|_| recorded.part.looks.is_some());
-    let camera = camera.ok_or_else(|| {
+    let camera = recorded.camera.ok_or_else(|| {
         Failure::usage(
             "detections need a camera: the site has none, or several".into(),
             "name it: --site site.toml --camera front",
         )
     })?;
-    let mounted = MountedCamera {
-        camera: camera.camera,
-        mount: camera.mount,
-        mount_tolerance: camera.mount_tolerance,
-    };
     let radius = radius_squared(EPSILON).unwrap_or(f64::NAN);
     let sigma = arguments.options.sigma_px;
-    let table = played.views(&mounted, &KnownTags::of(&site), sigma, radius);
+    let table = played.views(&camera, &KnownTags::of(&site), sigma, radius);
     table_of(table, &recorded, "have no true pose").map(Some)
 }
 

@@ -17,8 +17,9 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 
+type Reader = BufReader<Box<dyn Read + Send>>;
 /// A CSV that is read as a stream.
-pub type CsvText = Text<BufReader<Box<dyn Read + Send>>>;
+pub type CsvText = Text<Reader>;
 
 /// An open recording, with the truth, the time range and the camera that it is replayed with.
 pub struct Recorded {
@@ -27,6 +28,8 @@ pub struct Recorded {
     pub length: u64,
     pub track: Option<Trajectory>,
     pub part: Part,
+    /// The camera of a bag's detections.
+    pub camera: Option<MountedCamera>,
     /// The gate's clock, if the recording's format defines it.
     pub clock: Option<Clock>,
     /// The places of frames on the robot.
@@ -43,7 +46,7 @@ impl Recorded {
         since_fix: impl FnOnce(&mut CsvText, &str),
     ) -> Result<Self, Failure> {
         let Source {
-            mut input,
+            mut reader,
             format,
             name,
             length,
@@ -51,7 +54,7 @@ impl Recorded {
         let is_bag = format.is_bag();
         if is_bag == reading.topics.is_empty() {
             return Err(if is_bag {
-                which_topic(Bag::of_files(input.parts(reading, files)?, &[]), &name)?
+                which_topic(Bag::of_files(parts(reader, reading, files)?, &[]), &name)?
             } else {
                 Failure::usage(
                     format!("{name} is not a bag: it has no topics"),
@@ -64,11 +67,11 @@ impl Recorded {
             topic: truth_topic,
             duplicates,
         } = truth(reading, files, is_bag)?;
-        let looks = if is_bag {
-            looks(reading, radius_squared)?
-        } else {
-            None
-        };
+        let camera = if is_bag { camera(reading)? } else { None };
+        let looks = camera.map(|camera| {
+            let (tags, sigma_px) = (KnownTags::of(reading.site), reading.options.sigma_px);
+            TagLocalizer::new(camera, tags, sigma_px, radius_squared)
+        });
         let mut clock = None;
         let body;
         let recording: Box<dyn Recording + Send> = match format {
@@ -85,13 +88,13 @@ impl Recorded {
                     role: Role::Truth,
                 }));
                 body = bag::body(reading, files, &wanted)?;
-                let bag = Bag::of_files(input.parts(reading, files)?, &wanted);
+                let bag = Bag::of_files(parts(reader, reading, files)?, &wanted);
                 let bag = bag.with_frames(reading.options.frames());
                 Box::new(bag.with_body(body.clone()))
             }
             Format::Csv => {
                 let mut text =
-                    Text::csv(input.reader, &name, reading.is_gaussian).map_err(Failure::input)?;
+                    Text::csv(reader, &name, reading.is_gaussian).map_err(Failure::input)?;
                 since_fix(&mut text, &name);
                 body = bag::of_site(reading)?;
                 // A recorded time of use is the clock, however far it is from the stamps.
@@ -104,7 +107,7 @@ impl Recorded {
             }
             Format::Tum => {
                 body = bag::of_site(reading)?;
-                Box::new(Text::tum(input.reader, &name).with_body(body.clone()))
+                Box::new(Text::tum(reader, &name).with_body(body.clone()))
             }
             Format::Euroc | Format::Kitti => {
                 body = bag::of_site(reading)?;
@@ -113,8 +116,7 @@ impl Recorded {
                 let times = times
                     .as_ref()
                     .map(|(text, name)| (text.as_slice(), name.as_str()));
-                input
-                    .reader
+                reader
                     .read_to_end(&mut text)
                     .map_err(|cause| FileError::Unread {
                         name: name.clone(),
@@ -138,6 +140,7 @@ impl Recorded {
                 looks,
                 outside: 0,
             },
+            camera,
             clock,
             body,
             duplicates,
@@ -154,16 +157,12 @@ impl Recorded {
 
 /// The recording, open or to be opened.
 struct Source {
-    input: Beginning,
+    /// The bytes of a stream or a text; those of a bag at a path are read again from the path.
+    reader: Reader,
     format: Format,
     name: String,
     /// Bytes; 0 if it is not known.
     length: u64,
-}
-
-/// The bytes of a recording that is a stream or a text; for a bag at a path they are read again from the path.
-struct Beginning {
-    reader: BufReader<Box<dyn Read + Send>>,
 }
 
 impl Source {
@@ -174,9 +173,7 @@ impl Source {
                 files_of(log.as_path()).map_err(|fault| Failure::usage(fault, BAD_FOLDER))?;
             let lengths = paths.iter().filter_map(|path| path.metadata().ok());
             return Ok(Self {
-                input: Beginning {
-                    reader: BufReader::new(Box::new(std::io::empty())),
-                },
+                reader: BufReader::new(Box::new(std::io::empty())),
                 format: Format::Mcap,
                 name: log.display().to_string(),
                 length: lengths.map(|data| data.len()).sum(),
@@ -195,7 +192,7 @@ impl Source {
         refuse_other(start, &name)?;
         Ok(Self {
             format: format_of(start),
-            input: Beginning { reader },
+            reader,
             name,
             length,
         })
@@ -220,17 +217,19 @@ fn refuse_other(start: &[u8], name: &str) -> Result<(), Failure> {
     Err(Failure::usage(format!("{} {what}", printable(name)), help))
 }
 
-impl Beginning {
-    /// Returns the files of a bag.
-    fn parts(self, reading: &Reading<'_>, files: &Files) -> Result<Vec<BagFile<'static>>, Failure> {
-        let log = reading.log;
-        // A pipe gives its bytes once.
-        if log.as_path().is_file() || log.as_path().is_dir() {
-            return bag::parts(files, log);
-        }
-        let name = log.display().to_string();
-        Ok(vec![BagFile::Stream(Box::new(self.reader), name)])
+/// Returns the files of a bag.
+fn parts(
+    reader: Reader,
+    reading: &Reading<'_>,
+    files: &Files,
+) -> Result<Vec<BagFile<'static>>, Failure> {
+    let log = reading.log;
+    // A pipe gives its bytes once.
+    if log.as_path().is_file() || log.as_path().is_dir() {
+        return bag::parts(files, log);
     }
+    let name = log.display().to_string();
+    Ok(vec![BagFile::Stream(Box::new(reader), name)])
 }
 
 /// Lists the topics of a bag, one line each.
@@ -376,9 +375,8 @@ fn times(reading: &Reading<'_>, files: &Files) -> Result<Option<(Vec<u8>, String
     Ok(times.map(|times| files.read(times)).transpose()?)
 }
 
-/// Returns the localizer for detections, with the camera and the tags. `None` if the site has no camera, or has several and
-/// --camera is missing.
-fn looks(reading: &Reading<'_>, radius_squared: f64) -> Result<Option<TagLocalizer>, Failure> {
+/// Returns the camera of detections. `None` if the site has no camera, or has several and --camera is missing.
+fn camera(reading: &Reading<'_>) -> Result<Option<MountedCamera>, Failure> {
     let camera = match reading.camera {
         Some(name) => Some(reading.site.cameras.get(name).ok_or_else(|| {
             let names: Vec<&str> = reading.site.cameras.keys().map(String::as_str).collect();
@@ -403,17 +401,9 @@ fn looks(reading: &Reading<'_>, radius_squared: f64) -> Result<Option<TagLocaliz
             "give pixels above 0, like 0.3",
         ));
     }
-    Ok(camera.map(|camera| {
-        let eye = MountedCamera {
-            camera: camera.camera,
-            mount: camera.mount,
-            mount_tolerance: camera.mount_tolerance,
-        };
-        TagLocalizer::new(
-            eye,
-            KnownTags::of(reading.site),
-            reading.options.sigma_px,
-            radius_squared,
-        )
+    Ok(camera.map(|camera| MountedCamera {
+        camera: camera.camera,
+        mount: camera.mount,
+        mount_tolerance: camera.mount_tolerance,
     }))
 }

@@ -1,5 +1,7 @@
 //! The arguments of `posegate replay`.
 
+use crate::arguments::{choice, numbers};
+use crate::belief::SetArgs;
 use crate::gate::motion;
 use crate::recording::{Options, Reading};
 use crate::site_input::Failure;
@@ -46,17 +48,10 @@ pub struct Arguments {
     #[arg(long, value_name = "MODEL", conflicts_with = "inflation")]
     pub inflation_model: Option<Input>,
     /// Which terms of their covariance the sources fill (AMCL: yaw-unknown)
-    #[arg(long, value_enum, default_value = "filled")]
-    pub cross_terms: Terms,
-    /// Kind of pose-set: Gaussian by each estimate's covariance, or bounded by the same bound for all estimates
-    #[arg(long, value_enum, default_value = "gaussian")]
-    pub set: Kind,
-    /// Bounded sets: largest error of the position, metres
-    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
-    pub translation: Option<f64>,
-    /// Bounded sets: largest error of the heading, degrees
-    #[arg(long, required_if_eq("set", "bounded"), allow_negative_numbers = true)]
-    pub yaw_deg: Option<f64>,
+    #[arg(long, value_parser = choice(TERMS), default_value = "filled")]
+    pub cross_terms: CrossTerms,
+    #[command(flatten)]
+    pub set: SetArgs,
     /// The gate's clock. logged: recorded times (now_s, log times); stamps: stamps only; auto: now_s if a CSV has it,
     /// else log times, unless nearly all stamps are of another clock
     #[arg(long, value_enum, default_value = "auto")]
@@ -133,18 +128,11 @@ pub struct Arguments {
     pub mcap: Option<Output>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Kind {
-    Gaussian,
-    Bounded,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Terms {
-    Filled,
-    YawUnknown,
-    AllUnknown,
-}
+const TERMS: [(&str, CrossTerms); 3] = [
+    ("filled", CrossTerms::Filled),
+    ("yaw-unknown", CrossTerms::YawUnknown(SplitWeight::HALF)),
+    ("all-unknown", CrossTerms::AllUnknown(SplitWeight::HALF)),
+];
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum ClockName {
@@ -154,43 +142,27 @@ pub enum ClockName {
 }
 
 impl Arguments {
-    /// Returns which terms of the covariance the sources fill.
-    pub fn terms(&self) -> CrossTerms {
-        match self.cross_terms {
-            Terms::Filled => CrossTerms::Filled,
-            Terms::YawUnknown => CrossTerms::YawUnknown(SplitWeight::HALF),
-            Terms::AllUnknown => CrossTerms::AllUnknown(SplitWeight::HALF),
-        }
-    }
-
     /// Returns the deviations of the odometry.
     pub fn odom_noise(&self) -> Result<[f64; 3], Failure> {
-        let numbers: Option<Vec<f64>> = self
-            .odom_noise
-            .split(',')
-            .map(|part| part.trim().parse().ok())
-            .collect();
-        numbers
-            .and_then(|numbers| <[f64; 3]>::try_from(numbers).ok())
-            .ok_or_else(|| {
-                Failure::usage(
-                    format!("--odom-noise {} is not three numbers", self.odom_noise),
-                    "give three deviations, for example --odom-noise 0.02,0.05,0.02",
-                )
-            })
+        numbers(&self.odom_noise, |_| true).ok_or_else(|| {
+            Failure::usage(
+                format!("--odom-noise {} is not three numbers", self.odom_noise),
+                "give three deviations, for example --odom-noise 0.02,0.05,0.02",
+            )
+        })
     }
 
     /// Returns the trust in the sources, with this inflation.
     pub fn trust(&self, inflation: Inflation) -> Trust {
         Trust {
             inflation,
-            cross_terms: self.terms(),
+            cross_terms: self.cross_terms,
         }
     }
 
     /// Returns how the recording is read.
     pub fn reading<'a>(&'a self, site: &'a Site) -> Reading<'a> {
-        let is_gaussian = self.set == Kind::Gaussian;
+        let is_gaussian = self.set.bounded().is_none();
         Reading {
             log: &self.log,
             options: &self.recorded,
@@ -198,7 +170,7 @@ impl Arguments {
             camera: self.camera.as_deref(),
             site,
             is_gaussian,
-            is_partial: is_gaussian && self.cross_terms != Terms::Filled,
+            is_partial: is_gaussian && self.cross_terms != CrossTerms::Filled,
             most_true: MOST_TRUE,
         }
     }
@@ -206,17 +178,6 @@ impl Arguments {
     /// Returns the bounds of the robot's movement.
     pub fn motion(&self) -> Result<MotionBounds, Failure> {
         motion(self.max_speed, self.max_yaw_rate)
-    }
-
-    /// Returns the bound of bounded pose-sets: metres, radians.
-    pub fn bounded(&self) -> Option<[f64; 2]> {
-        match self.set {
-            Kind::Gaussian => None,
-            Kind::Bounded => Some([
-                self.translation.unwrap_or(f64::NAN),
-                self.yaw_deg.unwrap_or(f64::NAN).to_radians(),
-            ]),
-        }
     }
 
     /// Returns the gate's clock; `defined` is the clock that the recording's format defines.

@@ -1,6 +1,6 @@
 //! The factors of the covariances: one, or those of a learnt model.
 
-use super::arguments::{Arguments, Kind};
+use super::Arguments;
 use super::parameter;
 use crate::learn::{refused, young_age_warning};
 use crate::site_input::{Failure, warn};
@@ -36,7 +36,7 @@ impl Inflated {
                 column: None,
             });
         };
-        if arguments.set == Kind::Bounded {
+        if arguments.set.bounded().is_some() {
             return Err(Failure::usage(
                 "--inflation-model is learnt for covariances, not for --set bounded".into(),
                 "leave one of them out",

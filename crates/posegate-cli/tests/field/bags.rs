@@ -1,7 +1,7 @@
 //! Recordings of rosbag2 and ROS 1 in every storage: the same drive gives the same summary.
 
-use crate::run::Case;
 use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::run::Case;
 use posegate_testkit::storages::{ros1, sqlite, zstd};
 use serde_json::Value;
 
@@ -142,16 +142,8 @@ fn missing_topic_names_the_topics_one_a_line() {
     ]);
     for log in ["a.mcap", "a.db3", "a.bag"] {
         for wrong in ["/pose", "/pose --topic /amcl_pose"] {
-            let output = std::process::Command::new(env!("CARGO_BIN_EXE_posegate"))
-                .args(
-                    format!("replay site.toml {log} --task dock --topic {wrong}")
-                        .split_whitespace(),
-                )
-                .current_dir(case.path())
-                .output()
-                .expect("the program runs");
-            assert_eq!(output.status.code(), Some(2));
-            let text = String::from_utf8_lossy(&output.stderr);
+            let line = format!("replay site.toml {log} --task dock --topic {wrong}");
+            let text = case.run(&line).with(2).err;
             for topic in ["/amcl_pose (", "/camera ("] {
                 let found = text.lines().filter(|line| line.contains(topic)).count();
                 assert_eq!(found, 1, "{text}");
@@ -212,7 +204,7 @@ fn faults_of_bags_are_named() {
         let ended = case.run(&format!(
             "replay site.toml {log} --task dock --topic {TOPIC}"
         ));
-        assert!(matches!(ended.code, Some(0 | 2)), "{}", ended.err);
-        assert!(ended.err.contains(log), "{log}: {}", ended.err);
+        assert!(matches!(ended.code, 0 | 2), "{}", ended.words());
+        assert!(ended.words().contains(log), "{log}: {}", ended.words());
     }
 }

@@ -1,7 +1,7 @@
 //! Poses of a frame that is not the robot's base.
 
-use crate::run::Case;
 use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::run::Case;
 
 const SITE: &str = include_str!("../../../../examples/sites/dock.toml");
 /// The antenna's place on the robot.
@@ -73,7 +73,7 @@ fn unknown_child_frame_is_refused_with_advice() {
             "{fixes} --set bounded --translation 0.01 --yaw-deg 1"
         ))
         .code,
-        Some(0)
+        0
     );
 }
 

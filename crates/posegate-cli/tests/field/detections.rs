@@ -1,7 +1,7 @@
 //! Detections of tags that give no single pose: each cause has its own reason and advice.
 
-use crate::run::Case;
 use posegate_testkit::bags::Bag;
+use posegate_testkit::run::Case;
 use serde_json::{Value, json};
 
 const SITE: &str = include_str!("../../../../examples/sites/dock.toml");

@@ -1,6 +1,6 @@
 //! Docks of Nav2: databases, and the parameters of the docking server.
 
-use crate::run::Case;
+use posegate_testkit::run::{Case, cases};
 use serde_json::{Value, json};
 
 const DATABASE: &str = "docks:\n  a: {type: t, frame: map, pose: [1.0, 2.0, 1.0]}\n";
@@ -67,7 +67,7 @@ fn direction_is_asked_for_and_turns_the_heading() {
     let case = Case::new(&[("d.yaml", DATABASE.as_bytes())]);
     let ended = case.run("import d.yaml --format nav2_docks");
     assert!(
-        ended.out.contains("# Remark: ") && ended.err.contains("--dock-direction"),
+        ended.out.contains("# Remark: ") && ended.words().contains("--dock-direction"),
         "{}",
         ended.out
     );
@@ -103,9 +103,9 @@ fn parameters_give_goals_tasks_and_remarks() {
     // The tables are those of a site.
     let case = Case::new(&[("d.yaml", PARAMETERS.as_bytes())]);
     let written = case.run("import d.yaml --format nav2_docks -o site.toml");
-    assert_eq!(written.code, Some(0), "{}", written.err);
+    written.with(0);
     let built = case.run("table build site.toml --task home -o home.posegate");
-    assert_eq!(built.code, Some(0), "{}", built.err);
+    built.with(0);
     // The server's old key, with dots, and the namespace of a robot.
     let old = "robot1:\n  docking_server:\n    ros__parameters:\n      dock_backwards: true\n      docks: [x]\n      x.pose: [1.0, 0.0, 0.0]\n";
     let old = import(old, "");
@@ -176,29 +176,15 @@ fn directions_that_differ_are_refused() {
 
 #[test]
 fn faults_of_parameters_are_named() {
-    for (from, to, words) in [
-        (
-            "docking_threshold: 0.03",
-            "docking_threshold: 0",
-            "docking_threshold is 0",
-        ),
-        ("\"backward\"", "\"back\"", "the dock direction is `back`"),
-        (
-            "pose: [2.0, 1.0, 0.0]",
-            "pose: [2.0, 1.0]",
-            "home.pose has 2 numbers",
-        ),
-        (
-            "docks: [\"home\", \"01\"]",
-            "docks: [\"homes\"]",
-            "`homes.pose` is missing",
-        ),
-        (
-            "docks: [\"home\", \"01\"]",
-            "dock_database: docks.yaml",
-            "no `docks`",
-        ),
-    ] {
+    for [from, to, words] in cases(
+        "
+        docking_threshold: 0.03 => docking_threshold: 0 => docking_threshold is 0
+        \"backward\" => \"back\" => the dock direction is `back`
+        pose: [2.0, 1.0, 0.0] => pose: [2.0, 1.0] => home.pose has 2 numbers
+        docks: [\"home\", \"01\"] => docks: [\"homes\"] => `homes.pose` is missing
+        docks: [\"home\", \"01\"] => dock_database: docks.yaml => no `docks`
+        ",
+    ) {
         let changed = PARAMETERS.replace(from, to);
         assert_ne!(changed, PARAMETERS, "{from}");
         refused(&changed, "", &["d.yaml", words]);

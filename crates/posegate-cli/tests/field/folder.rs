@@ -1,6 +1,6 @@
 //! The right answers to a folder of files as people have them, by the number of each case. `ci.sh field DIR` names the folder in `POSEGATE_FIELD`.
 
-use crate::run::{Case, Ended};
+use posegate_testkit::run::{Case, Ended};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -43,7 +43,7 @@ fn gate(case: &Case, site: &str, arguments: &str, code: i32) -> Value {
     let built = case.run(&format!(
         "table build {site} --task dock -o {site}.posegate {arguments}"
     ));
-    assert_eq!(built.code, Some(0), "{}", built.err);
+    built.with(0);
     case.run(&format!(
         "gate {site}.posegate --estimates estimate.csv --json"
     ))
@@ -72,7 +72,7 @@ fn worst_pose_is_outside_of_the_set() {
 fn calibrations_are_read() {
     for number in ["02", "04", "09", "10"] {
         let checked = case(number).run("check site.toml");
-        assert_eq!(checked.code, Some(0), "{number}: {}", checked.err);
+        checked.with(0);
     }
     let checked = case("06").run("check site.toml --json").json(0);
     assert_eq!(
@@ -103,9 +103,9 @@ fn tags_and_docks_are_imported() {
     let (docks, ended) = import("17", "docks.yaml --format nav2_docks");
     assert_eq!(docks["goals"][0]["yaw_deg"], 0.0);
     assert!(
-        ended.err.contains("--dock-direction backward"),
+        ended.words().contains("--dock-direction backward"),
         "{}",
-        ended.err
+        ended.words()
     );
     let backward = "docks.yaml --format nav2_docks --dock-direction backward";
     let (docks, _) = import("17", backward);
@@ -136,7 +136,7 @@ fn far_origin_is_advised() {
     let origin = "[origin]\nx = 89571.0\ny = 43301.0\n";
     std::fs::write(&path, format!("{origin}{site}")).expect("the site");
     let checked = case.run("check site.toml");
-    assert_eq!(checked.code, Some(0), "{}", checked.err);
+    checked.with(0);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Models from recordings: `replay --csv` writes what `learn` reads, and `learn` reads recordings themselves.
 
-use crate::run::Case;
 use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::run::Case;
 use serde_json::Value;
 
 const SITE: &str = include_str!("../../../../examples/sites/dock.toml");
@@ -68,20 +68,20 @@ fn table_of_a_replay_and_its_recording_give_one_model() {
     assert_eq!(
         case.run("contains site.toml --task dock --poses rows.csv")
             .code,
-        Some(0)
+        0
     );
 
     let learn = "learn inflation --epsilon 0.8 --json -o";
     let of_table = case.run(&format!("{learn} table.toml rows.csv"));
     assert!(
-        of_table.err.contains("20 rows have no true pose"),
+        of_table.words().contains("20 rows have no true pose"),
         "{}",
-        of_table.err
+        of_table.words()
     );
     let of_bag = case.run(&format!(
         "{learn} bag.toml drive.mcap --topic /amcl_pose --truth /mocap"
     ));
-    assert!(of_bag.err.contains("20 of 400"), "{}", of_bag.err);
+    assert!(of_bag.words().contains("20 of 400"), "{}", of_bag.words());
     let [of_table, of_bag] = [of_table, of_bag].map(|ended| ended.json(0));
     assert_eq!(of_bag["rows"], 380);
     assert_eq!(of_table, of_bag);
@@ -158,17 +158,19 @@ fn bounds_are_learnt_from_detections_and_truth() {
     ));
     assert!(
         tight
-            .err
+            .words()
             .contains("wider than the success set of the task `dock`"),
         "{}",
-        tight.err
+        tight.words()
     );
     assert_eq!(tight.json(0)["wider_than"], serde_json::json!(["dock"]));
     let check = case.run(&format!("learn check m.toml {recorded} --json"));
     assert!(
-        check.err.contains("the model was learnt from these data"),
+        check
+            .words()
+            .contains("the model was learnt from these data"),
         "{}",
-        check.err
+        check.words()
     );
     let check = check.json(0);
     assert_eq!(check["verdict"], "holds", "{check:#}");

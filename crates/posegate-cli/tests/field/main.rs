@@ -9,6 +9,5 @@ mod folder;
 mod learning;
 mod origins;
 mod rounds;
-mod run;
 mod tag_maps;
 mod trajectories;

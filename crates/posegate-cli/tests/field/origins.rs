@@ -1,7 +1,7 @@
 //! Maps whose origin is kilometres away: `[origin]` is subtracted from everything in the map's numbers.
 
-use crate::run::Case;
 use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::run::Case;
 use serde_json::json;
 
 const EAST: f64 = 448_012.5;
@@ -89,7 +89,7 @@ fn poses_of_the_map_are_relative_to_the_origin() {
         let built = case.run(&format!(
             "table build site.toml --task {task} -o {task}.posegate"
         ));
-        assert_eq!(built.code, Some(0), "{}", built.err);
+        built.with(0);
     }
     let ended = case.run("gate dock.posegate --estimates e.csv --json --origin 448000,5412345");
     let lines: Vec<serde_json::Value> = ended
@@ -102,7 +102,7 @@ fn poses_of_the_map_are_relative_to_the_origin() {
         (&json!("permit"), &json!("deny"))
     );
     let drawn = case.run("draw site.toml --task dock -o dock.svg");
-    assert_eq!(drawn.code, Some(0), "{}", drawn.err);
+    drawn.with(0);
     case.run("gate dock.posegate --estimates e.csv --origin 5")
         .is_refused_with(&["two numbers in metres"]);
 }

@@ -1,6 +1,6 @@
 //! Distance limits as success sets: discs and ellipses.
 
-use crate::run::Case;
+use posegate_testkit::run::{Case, cases};
 use serde_json::{Value, json};
 
 const TABLE: &str = "[table]\nextent = { x = [-0.1, 0.1], y = [-0.1, 0.1], yaw_deg = [-20.0, 20.0] }\nstep = { xy = 0.01, yaw_deg = 0.5 }\n";
@@ -25,7 +25,7 @@ fn verdicts(success: &str, poses: &[[f64; 3]]) -> Vec<[bool; 2]> {
         ("e.csv", csv.as_bytes()),
     ]);
     let built = case.run("table build site.toml --task dock -o t.posegate");
-    assert_eq!(built.code, Some(0), "{}", built.err);
+    built.with(0);
     let lines = |arguments: &str, key: &str, yes: Value| -> Vec<bool> {
         let ended = case.run(arguments);
         let lines = ended.out.lines();
@@ -115,23 +115,16 @@ fn disc_is_a_set_of_unions_drawings_and_errors() {
     let disc = site("{ shape = \"disc\", radius = 0.03, yaw_deg = [-4.0, 4.0] }");
     let case = Case::new(&[("site.toml", disc.as_bytes())]);
     let drawn = case.run("draw site.toml --task dock -o dock.svg");
-    assert_eq!(drawn.code, Some(0), "{}", drawn.err);
+    drawn.with(0);
     let checked = case.run("check site.toml --json").json(0);
     assert_eq!(checked["tasks"][0]["shape"], "disc");
-    for (success, words) in [
-        (
-            "{ shape = \"disc\", radius = 0.0, yaw_deg = [-4.0, 4.0] }",
-            "above 0",
-        ),
-        (
-            "{ shape = \"disc\", radius = 0.03, a = 1.0, yaw_deg = [-4.0, 4.0] }",
-            "unknown key `a`",
-        ),
-        (
-            "{ shape = \"ellipse\", a = 1e9, b = 0.03, yaw_deg = [-4.0, 4.0] }",
-            "too thin",
-        ),
-    ] {
+    for [success, words] in cases(
+        "
+        { shape = \"disc\", radius = 0.0, yaw_deg = [-4.0, 4.0] } => above 0
+        { shape = \"disc\", radius = 0.03, a = 1.0, yaw_deg = [-4.0, 4.0] } => unknown key `a`
+        { shape = \"ellipse\", a = 1e9, b = 0.03, yaw_deg = [-4.0, 4.0] } => too thin
+        ",
+    ) {
         let case = Case::new(&[("site.toml", site(success).as_bytes())]);
         case.run("check site.toml")
             .is_refused_with(&["site.toml:4", words]);

@@ -1,6 +1,6 @@
 //! Maps of tags: field layouts of any year, and Limelight's.
 
-use crate::run::Case;
+use posegate_testkit::run::{Case, cases};
 use serde_json::{Value, json};
 
 fn layout(tags: &str, field: &str) -> String {
@@ -61,18 +61,16 @@ fn limelight_map_is_read_with_its_own_sizes() {
         let named = map.replace("apriltag3_16h5_classic", written);
         assert_eq!(import(&named, "--format fmap")["tags"][0]["family"], family);
     }
-    for (from, to, words) in [
-        (
-            "apriltag3_16h5_classic",
-            "aruco_4x4",
-            "`fiducials[0].family` is not a known family",
-        ),
-        ("152.4", "0.1524", "millimetres"),
-        ("0,-1,0,-2.5", "0,-2,0,-2.5", "has no rotation"),
-        ("0,0,0,1]", "0,0,0,2]", "last row"),
-        ("0,0,0,1]", "0,0,0]", "16 numbers"),
-        ("\"fiducials\"", "\"tags\"", "`fiducials` is missing"),
-    ] {
+    for [from, to, words] in cases(
+        "
+        apriltag3_16h5_classic => aruco_4x4 => `fiducials[0].family` is not a known family
+        152.4 => 0.1524 => millimetres
+        0,-1,0,-2.5 => 0,-2,0,-2.5 => has no rotation
+        0,0,0,1] => 0,0,0,2] => last row
+        0,0,0,1] => 0,0,0] => 16 numbers
+        \"fiducials\" => \"tags\" => `fiducials` is missing
+        ",
+    ) {
         let case = Case::new(&[("map", map.replace(from, to).as_bytes())]);
         case.run("import map --format fmap")
             .is_refused_with(&["map:", words]);

@@ -1,7 +1,7 @@
 //! Trajectories of public data.
 
-use crate::run::Case;
 use posegate_testkit::bags::{Bag, Pose};
+use posegate_testkit::run::Case;
 
 const TUM: &str = "# \u{e9}t\u{e9}\n1.0 0 0 0 0 0 0 1\n1.5 0.5 0 0 0 0 0 1\n1.5 0.5001 0 0 0 0 0 1\n2.0 1 0 0 0 0 0 1\n";
 const EUROC: &str = "#timestamp [ns],p_x [m],p_y,p_z,q_w,q_x,q_y,q_z,v_x\n1000000000,0,0,0,1,0,0,0,9\n1500000000,0.5,0,0,1,0,0,0,9\n2000000000,1,0,0,1,0,0,0,9\n";

@@ -39,12 +39,10 @@ fn replayed(bytes: &[u8]) -> Result<serde_json::Value, String> {
     if run.end == End::Exit(2) {
         return Err(words(&run.stderr));
     }
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(format!("replay dock.toml a.mcap {rest} --json").split(' '))
-        .current_dir(folder.0.path())
-        .output()
-        .unwrap();
-    Ok(serde_json::from_slice(&output.stdout).unwrap())
+    let line = format!("replay dock.toml a.mcap {rest} --json");
+    Ok(posegate_testkit::run::run(folder.0.path(), &line)
+        .lines()
+        .remove(0))
 }
 
 /// Returns the records of a bag: where each begins, its opcode and its length.

@@ -3,10 +3,10 @@
 use crate::bags::{Bag, Compression, Pose};
 use crate::mutate::Kind;
 use posegate_testkit::mcap::{MAGIC, op};
+use posegate_testkit::run::command;
 use posegate_testkit::storages::{ros1, sqlite, zstd};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 /// A format.
 pub struct Format {
@@ -438,7 +438,7 @@ pub fn all(folder: &Path, recorded: Option<&[u8]>) -> Vec<Format> {
             "firmware ELF",
             Binary,
             "mutant.elf",
-            vec![elf()],
+            vec![firmware()],
             &["table seal {} -o out.elf", "table seal {} --json"],
         ),
         format(
@@ -460,12 +460,8 @@ fn program(folder: &Path, arguments: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
     for (name, bytes) in files {
         std::fs::write(folder.join(name), bytes).expect("a file");
     }
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(arguments.split(' '))
-        .current_dir(folder)
-        .stdin(Stdio::null())
-        .output()
-        .expect("the program starts");
+    let output = command(folder, arguments).output();
+    let output = output.expect("the program starts");
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments}: {stderr}");
     output.stdout
@@ -555,25 +551,10 @@ fn scored() -> String {
 }
 
 /// Returns a linked firmware with a record to fill in.
-fn elf() -> Vec<u8> {
+fn firmware() -> Vec<u8> {
     let mut image = b"code before ".to_vec();
     image.extend(posegate::gate::Seal::MAGIC);
     image.extend([0xff; 12]);
     image.extend([7; 300]);
-    let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
-    for half in [2_u16, 40] {
-        file.extend(half.to_le_bytes());
-    }
-    for word in [1_u32, 0, 52, 0, 0] {
-        file.extend(word.to_le_bytes());
-    }
-    for half in [52_u16, 32, 1, 40, 0, 0] {
-        file.extend(half.to_le_bytes());
-    }
-    let length = image.len() as u32;
-    for word in [1_u32, 84, 0x0800_0000, 0x0800_0000, length, length, 5, 4] {
-        file.extend(word.to_le_bytes());
-    }
-    file.extend(image);
-    file
+    posegate_testkit::commands::elf(0x0800_0000, &image)
 }

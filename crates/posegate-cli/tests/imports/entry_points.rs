@@ -2,57 +2,22 @@
 
 use super::{OFFSET, TURN, bundle_file, field_file};
 use posegate_site::Site;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use posegate_testkit::run::{Case, cases};
 
-struct Folder(tempfile::TempDir);
+fn folder() -> Case {
+    Case::new(&[
+        ("field.json", field_file(OFFSET, TURN).as_bytes()),
+        ("tags.yaml", bundle_file(OFFSET, TURN, 0.2).as_bytes()),
+        ("docks.yaml", DOCKS.as_bytes()),
+    ])
+}
 
-impl Folder {
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        folder.write("field.json", &field_file(OFFSET, TURN));
-        folder.write("tags.yaml", &bundle_file(OFFSET, TURN, 0.2));
-        folder.write("docks.yaml", DOCKS);
-        folder
-    }
-
-    fn path(&self) -> &Path {
-        self.0.path()
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path().join(name), text).unwrap();
-    }
-
-    fn site(&self, text: &str) -> Site {
-        self.write("site.toml", text);
-        match Site::read(self.path().join("site.toml")) {
-            Ok(site) => site,
-            Err(error) => panic!("{error}\n{text}"),
-        }
-    }
-
-    fn run(&self, line: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_posegate"))
-            .args(line.split_whitespace())
-            .current_dir(self.path())
-            .stdin(Stdio::null())
-            .output()
-            .unwrap()
-    }
-
-    /// Runs a line and expects an exit code. Returns stdout, and the words of stderr.
-    fn expect(&self, code: i32, line: &str) -> (String, String) {
-        let output = self.run(line);
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{line}\n{out}\n{err}");
-        let words: Vec<&str> = err.split_whitespace().filter(|word| *word != "│").collect();
-        (out, words.join(" "))
-    }
-
-    fn names(&self) -> usize {
-        std::fs::read_dir(self.path()).unwrap().count()
+/// Reads the text as the site file of a folder.
+fn site(folder: &Case, text: &str) -> Site {
+    folder.write("site.toml", text);
+    match Site::read(folder.path().join("site.toml")) {
+        Ok(site) => site,
+        Err(error) => panic!("{error}\n{text}"),
     }
 }
 
@@ -82,8 +47,8 @@ const IMPORTS: [(&str, &str); 3] = [
 #[test]
 fn printed_tables_equal_the_import() {
     for (arguments, table) in IMPORTS {
-        let folder = Folder::new();
-        let direct = folder.site(&format!("[import.a]\n{table}"));
+        let folder = folder();
+        let direct = site(&folder, &format!("[import.a]\n{table}"));
         assert_eq!(
             direct.tags.len() + direct.goals.len(),
             if table.contains("docks") { 2 } else { 1 }
@@ -92,13 +57,13 @@ fn printed_tables_equal_the_import() {
         let (printed, _) = folder.expect(0, &format!("import {arguments}"));
         let (message, _) = folder.expect(0, &format!("import {arguments} -o out.toml"));
         assert!(message.starts_with("wrote out.toml"), "{message}");
-        assert_eq!(
-            printed,
-            std::fs::read_to_string(folder.path().join("out.toml")).unwrap()
-        );
+        assert_eq!(printed, folder.text("out.toml"));
 
-        let named = folder.site("[import.a]\nfile = 'out.toml'\nformat = 'posegate'\n");
-        let pasted = folder.site(&printed);
+        let named = site(
+            &folder,
+            "[import.a]\nfile = 'out.toml'\nformat = 'posegate'\n",
+        );
+        let pasted = site(&folder, &printed);
         for site in [&named, &pasted] {
             assert_eq!(
                 (&site.tags, &site.goals),
@@ -107,8 +72,7 @@ fn printed_tables_equal_the_import() {
             );
         }
 
-        let (out, _) = folder.expect(0, &format!("import {arguments} --json"));
-        let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let json = folder.json(0, &format!("import {arguments} --json"));
         for (name, tag) in &direct.tags {
             let printed_tag = &json["tags"][0];
             assert_eq!(
@@ -132,16 +96,16 @@ fn printed_tables_equal_the_import() {
 /// after any change of the imported file, even of a space.
 #[test]
 fn table_of_imported_tags_covers_the_imported_files() {
-    let folder = Folder::new();
+    let folder = folder();
     let c = std::f64::consts::FRAC_1_SQRT_2;
     folder.write(
         "wall.json",
-        &field_file([4.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]),
+        field_file([4.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]),
     );
     // The lower left corner of the map is at (1, 2), its x axis is the world's y axis.
     folder.write(
         "turned.json",
-        &field_file([-2.0, -3.0, 0.5], [c, 0.0, 0.0, c]),
+        field_file([-2.0, -3.0, 0.5], [c, 0.0, 0.0, c]),
     );
     folder.write(
         "docks.yaml",
@@ -167,12 +131,12 @@ fn table_of_imported_tags_covers_the_imported_files() {
             "pose = { x = 1, y = 2, z = 0, roll_deg = 0, pitch_deg = 0, yaw_deg = 90 }",
         ),
     ] {
-        let site = folder.site(&imported(file, pose));
+        let site = site(&folder, &imported(file, pose));
         assert_eq!(site.tasks, wanted.tasks, "{file}");
         assert_ne!(site.digest, wanted.digest);
     }
 
-    folder.write("site.toml", &imported("wall.json", ""));
+    folder.write("site.toml", imported("wall.json", ""));
     folder.expect(0, "check site.toml");
     folder.expect(0, "table build site.toml --task see-t7 -o see.posegate");
     folder.expect(0, "table verify see.posegate site.toml");
@@ -194,7 +158,7 @@ fn table_of_imported_tags_covers_the_imported_files() {
             1,
         ),
     ] {
-        let before = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let before = folder.text(file);
         folder.write(file, text);
         let (out, _) = folder.expect(code, "table verify see.posegate site.toml");
         assert_eq!(out.contains("NOT proven"), code == 1, "{file}: {out}");
@@ -206,10 +170,10 @@ fn table_of_imported_tags_covers_the_imported_files() {
 /// The imports shown in the page of the host and in the sample are valid.
 #[test]
 fn documented_imports_are_valid() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.write(
         "tags.yaml",
-        &bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
+        bundle_file(OFFSET, TURN, 0.2).replace("name: b", "name: dock"),
     );
     let lines = posegate_site::SAMPLE.lines();
     let sample: Vec<&str> = lines.filter_map(|line| line.strip_prefix("#   ")).collect();
@@ -221,192 +185,71 @@ fn documented_imports_are_valid() {
         .filter_map(|rest| rest.split("```").next());
     let shown = blocks.find(|block| block.contains("[import.")).unwrap();
     for text in [sample.join("\n").as_str(), shown] {
-        assert_eq!(folder.site(text).tags.len(), 1, "{text}");
+        assert_eq!(site(&folder, text).tags.len(), 1, "{text}");
     }
 }
 
 /// Site files and `posegate import` both refuse bad input, with the file, the line and what to do. Nothing is written.
 #[test]
 fn bad_input_is_refused_by_site_files_and_the_command() {
-    let (wpilib, bundle, docks) = (IMPORTS[0], IMPORTS[1], IMPORTS[2]);
-    let rows = [
-        (
-            wpilib,
-            "field.json",
-            "\"W\": 0.8",
-            "\"W\": 0.9",
-            "field.json:1:",
-            "a unit quaternion",
-        ),
-        (
-            wpilib,
-            "field.json",
-            "\"x\": 0.35",
-            "\"x\": NaN",
-            "field.json:1:",
-            "JSON has no NaN",
-        ),
-        (
-            wpilib,
-            "field.json",
-            "}]}",
-            "}]",
-            "field.json:",
-            "not valid JSON",
-        ),
-        (
-            wpilib,
-            "field.json",
-            "}]}",
-            "}, {\"ID\": 7, \"pose\": {\"translation\": {\"x\": 0, \"y\": 0, \"z\": 0}, \"rotation\": {\"quaternion\": {\"W\": 1, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]}",
-            "field.json:1:",
-            "tag 7 is there twice",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "qw: 0.8",
-            "qw: 0.1",
-            "tags.yaml:4:",
-            "the quaternion of tag 7",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "  - {",
-            "\t- {",
-            "tags.yaml:4:1",
-            "indented by a tab",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "x: 0.35",
-            "x: .nan",
-            "tags.yaml:4:",
-            "x of tag 7 is NaN",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "size: 0.2, ",
-            "",
-            "tags.yaml:4:",
-            "`size` is missing",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "size: 0.2",
-            "size: 200",
-            "tags.yaml:4:",
-            "165 mm are 0.165",
-        ),
-        (
-            bundle,
-            "tags.yaml",
-            "name: b",
-            "name: c",
-            "tags.yaml:1:1",
-            "no bundle and no tag `b`",
-        ),
-        (
-            docks,
-            "docks.yaml",
-            "frame: map",
-            "frame: odom",
-            "docks.yaml:2:",
-            "in the frame `odom`",
-        ),
-        (
-            docks,
-            "docks.yaml",
-            ", 1.5]",
-            ", 90]",
-            "docks.yaml:2:",
-            "90 degrees are 1.5708",
-        ),
-        (
-            docks,
-            "docks.yaml",
-            ", 1.5]",
-            "]",
-            "docks.yaml:2:",
-            "has 2 numbers",
-        ),
-    ];
-    for ((arguments, table), file, from, to, place, expected) in rows {
-        let folder = Folder::new();
-        let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
+    let of = |format: &str| match format {
+        "wpilib" => IMPORTS[0],
+        "bundle" => IMPORTS[1],
+        _ => IMPORTS[2],
+    };
+    let rows = "
+        wpilib => field.json => \"W\": 0.8 => \"W\": 0.9 => field.json:1: => a unit quaternion
+        wpilib => field.json => \"x\": 0.35 => \"x\": NaN => field.json:1: => JSON has no NaN
+        wpilib => field.json => }]} => }] => field.json: => not valid JSON
+        wpilib => field.json => }]} => }, {\"ID\": 7, \"pose\": {\"translation\": {\"x\": 0, \"y\": 0, \"z\": 0}, \"rotation\": {\"quaternion\": {\"W\": 1, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]} => field.json:1: => tag 7 is there twice
+        bundle => tags.yaml => qw: 0.8 => qw: 0.1 => tags.yaml:4: => the quaternion of tag 7
+        bundle => tags.yaml =>   - { => \t- { => tags.yaml:4:1 => indented by a tab
+        bundle => tags.yaml => x: 0.35 => x: .nan => tags.yaml:4: => x of tag 7 is NaN
+        bundle => tags.yaml => size: 0.2,  =>  => tags.yaml:4: => `size` is missing
+        bundle => tags.yaml => size: 0.2 => size: 200 => tags.yaml:4: => 165 mm are 0.165
+        bundle => tags.yaml => name: b => name: c => tags.yaml:1:1 => no bundle and no tag `b`
+        docks => docks.yaml => frame: map => frame: odom => docks.yaml:2: => in the frame `odom`
+        docks => docks.yaml => , 1.5] => , 90] => docks.yaml:2: => 90 degrees are 1.5708
+        docks => docks.yaml => , 1.5] => ] => docks.yaml:2: => has 2 numbers";
+    for [format, file, from, to, place, expected] in cases(rows) {
+        let (arguments, table) = of(format);
+        let folder = folder();
+        let text = folder.text(file);
         assert!(text.contains(from), "{from}");
-        folder.write(file, &text.replacen(from, to, 1));
-        folder.write("site.toml", &format!("[import.a]\n{table}"));
+        folder.write(file, text.replacen(from, to, 1));
+        folder.write("site.toml", format!("[import.a]\n{table}"));
         let before = folder.names();
         for line in [
             format!("import {arguments} -o out.toml"),
             "check site.toml".into(),
         ] {
-            let (_, err) = folder.expect(2, &line);
-            assert!(
-                err.contains(place) && err.contains(expected),
-                "{line}, {to}: {err}"
-            );
+            folder.run(&line).is_refused_with(&[place, expected]);
         }
         assert_eq!(folder.names(), before);
     }
-    let settings = [
-        (wpilib.0, " --size 0.1651", "", "`size` is missing"),
-        (
-            wpilib.0,
-            "--size 0.1651",
-            "--size nan",
-            "the tags' size is NaN",
-        ),
-        (wpilib.0, "--size 0.1651", "--size 165.1", "in metres"),
-        (wpilib.0, " --family tag36h11", "", "`family` is missing"),
-        (
-            wpilib.0,
-            "wpilib",
-            "wpilib --convention opencv",
-            "has its own",
-        ),
-        (wpilib.0, "wpilib", "frc", "possible values: wpilib"),
-        (wpilib.0, "x=4.25", "x=4.25,x=4", "twice"),
-        (wpilib.0, "x=4.25", "u=4.25", "is not a part of"),
-        (wpilib.0, "x=4.25", "x=inf", "not a finite number"),
-        (wpilib.0, "field.json", "other.json", "check the path"),
-        (
-            bundle.0,
-            " --convention apriltag",
-            "",
-            "\"apriltag\" (AprilTag 3's library: x right, y down, z into the tag)",
-        ),
-        (
-            bundle.0,
-            "--convention apriltag",
-            "--convention april",
-            "apriltag",
-        ),
-        (
-            bundle.0,
-            " --pose x=4,z=0.5,yaw_deg=180",
-            "",
-            "`pose` is missing",
-        ),
-        (
-            docks.0,
-            "nav2_docks",
-            "nav2_docks --size 1",
-            "docks are no tags",
-        ),
-    ];
-    for (arguments, from, to, expected) in settings {
-        let folder = Folder::new();
+    let settings = "
+        wpilib =>  --size 0.1651 =>  => `size` is missing
+        wpilib => --size 0.1651 => --size nan => the tags' size is NaN
+        wpilib => --size 0.1651 => --size 165.1 => in metres
+        wpilib =>  --family tag36h11 =>  => `family` is missing
+        wpilib => wpilib => wpilib --convention opencv => has its own
+        wpilib => wpilib => frc => possible values: wpilib
+        wpilib => x=4.25 => x=4.25,x=4 => twice
+        wpilib => x=4.25 => u=4.25 => is not a part of
+        wpilib => x=4.25 => x=inf => not a finite number
+        wpilib => field.json => other.json => check the path
+        bundle =>  --convention apriltag =>  => \"apriltag\" (AprilTag 3's library: x right, y down, z into the tag)
+        bundle => --convention apriltag => --convention april => apriltag
+        bundle =>  --pose x=4,z=0.5,yaw_deg=180 =>  => `pose` is missing
+        docks => nav2_docks => nav2_docks --size 1 => docks are no tags";
+    for [format, from, to, expected] in cases(settings) {
+        let (arguments, _) = of(format);
+        let folder = folder();
         let before = folder.names();
         assert!(arguments.contains(from), "{from}");
         let arguments = arguments.replacen(from, to, 1);
-        let (_, err) = folder.expect(2, &format!("import {arguments} -o out.toml"));
-        assert!(err.contains(expected), "{arguments}: {err}");
+        let line = format!("import {arguments} -o out.toml");
+        folder.run(&line).is_refused_with(&[expected]);
         assert_eq!(folder.names(), before);
     }
 }

@@ -1,6 +1,6 @@
 //! Factors by the time since the last fix, from rows to the gate.
 
-use crate::command::{lines, run, write};
+use crate::command::{Case, lines, run};
 use crate::distribution::Random;
 use std::fmt::Write;
 
@@ -33,13 +33,13 @@ fn estimates_from(youngest: f64, count: u32, seed: u64) -> String {
 
 #[test]
 fn replay_uses_the_factor_of_the_age_of_each_estimate() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let site = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../examples/sites/dock.toml"
     );
-    write(&folder, "e.csv", &estimates(6000, 3));
-    write(&folder, "new.csv", &estimates(500, 4));
+    folder.write("e.csv", estimates(6000, 3));
+    folder.write("new.csv", estimates(500, 4));
     let learn = |epsilon: &str| {
         run(
             &folder,
@@ -82,7 +82,7 @@ fn replay_uses_the_factor_of_the_age_of_each_estimate() {
     assert!(permits == 500 && coverage < 0.93, "{permits} {coverage}");
     // Without the column each estimate has the largest factor.
     let without = estimates(500, 4).replace("since_fix_s", "since");
-    write(&folder, "without.csv", &without);
+    folder.write("without.csv", &without);
     let (permits, _, _, err) = replay("without.csv", "--inflation-model m.toml");
     assert!(
         permits == 0 && err.contains("no column `since_fix_s`"),
@@ -98,36 +98,32 @@ fn replay_uses_the_factor_of_the_age_of_each_estimate() {
             "--set bounded",
         ),
     ] {
-        let (code, _, err) = run(&folder, &format!("{line}{more}"));
-        assert!(code == 2 && err.contains(message), "{more}: {err}");
+        folder
+            .run(&format!("{line}{more}"))
+            .is_refused_with(&[message]);
     }
 }
 
 /// Rows from 2 s after a fix contain no information about fresh estimates.
 #[test]
 fn age_below_the_data_has_the_largest_factor() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let site = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../examples/sites/dock.toml"
     );
-    write(&folder, "e.csv", &estimates_from(2.0, 6000, 3));
-    let (code, out, err) = run(&folder, "learn inflation e.csv --epsilon 0.99 -o m.toml");
-    assert_eq!(code, 0, "{err}");
+    folder.write("e.csv", estimates_from(2.0, 6000, 3));
+    let (out, _err) = folder.expect(0, "learn inflation e.csv --epsilon 0.99 -o m.toml");
     assert!(
         out.contains("the data begin 2 s after a fix") && !out.contains("up to"),
         "{out}"
     );
-    let (code, out, err) = run(
-        &folder,
-        "learn inflation e.csv --epsilon 0.99 -o m.toml --json",
-    );
-    assert_eq!(code, 0, "{err}");
+    let (out, _err) = folder.expect(0, "learn inflation e.csv --epsilon 0.99 -o m.toml --json");
     let source = &lines(&out)[0]["source"];
     assert_eq!(source["ages"], serde_json::json!([]));
     assert!(source["inflation"].as_f64().unwrap() > 80.0, "{source}");
 
-    write(&folder, "fresh.csv", &estimates(500, 4));
+    folder.write("fresh.csv", estimates(500, 4));
     let (code, out, err) = run(
         &folder,
         &format!("replay {site} fresh.csv --task dock --json --fast --inflation-model m.toml"),
@@ -139,10 +135,9 @@ fn age_below_the_data_has_the_largest_factor() {
     const COVARIANCE: &str = "cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw";
     let numbers = "1.6e-5,0,0,1.6e-5,0,1.6e-5";
     // A prediction below the data is refused, not extrapolated.
-    write(
-        &folder,
+    folder.write(
         "at.csv",
-        &format!("{COVARIANCE},since_fix_s\n{numbers},1.9\n{numbers},2.1\n"),
+        format!("{COVARIANCE},since_fix_s\n{numbers},1.9\n{numbers},2.1\n"),
     );
     let (_, out, err) = run(&folder, "predict m.toml --at at.csv --json");
     let predicted = lines(&out);

@@ -1,37 +1,19 @@
 //! The command line: `learn` and `predict`.
 
 use crate::distribution::{Random, SQUARES};
-use serde_json::Value;
+pub use posegate_testkit::run::{Case, lines};
 use std::fmt::Write;
-use std::process::Command;
 
-pub fn run(folder: &tempfile::TempDir, line: &str) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_posegate"))
-        .args(line.split_whitespace())
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (
-        output.status.code().unwrap(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
-}
-
-pub fn write(folder: &tempfile::TempDir, name: &str, text: &str) {
-    std::fs::write(folder.path().join(name), text).unwrap();
-}
-
-pub fn lines(text: &str) -> Vec<Value> {
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+/// Runs a line. Returns the exit code, stdout, and the words of stderr.
+pub fn run(folder: &Case, line: &str) -> (i32, String, String) {
+    let ended = folder.run(line);
+    let words = ended.words();
+    (ended.code, ended.out, words)
 }
 
 #[test]
 fn learn_bounds_gives_a_model_that_predict_evaluates() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n";
     let mut text = header.to_owned();
     for row in SQUARES.views(1500, 7, |_| true).rows {
@@ -41,20 +23,11 @@ fn learn_bounds_gives_a_model_that_predict_evaluates() {
             None => writeln!(text, "{d},{phi},{psi},0,,").unwrap(),
         }
     }
-    write(&folder, "d.csv", &text);
-    let (code, out, err) = run(
-        &folder,
-        "learn bounds d.csv --quantile 0.9 -o m.toml --json",
-    );
-    assert_eq!(code, 0, "{err}");
+    folder.write("d.csv", &text);
+    let (out, _err) = folder.expect(0, "learn bounds d.csv --quantile 0.9 -o m.toml --json");
     assert_eq!(lines(&out)[0]["views"], 1500);
-    write(
-        &folder,
-        "at.csv",
-        "psi_deg,d_m,phi_deg\n30,3,10\n30,9,10\n0,3,0\n",
-    );
-    let (code, out, err) = run(&folder, "predict m.toml --at at.csv --json");
-    assert_eq!(code, 0, "{err}");
+    folder.write("at.csv", "psi_deg,d_m,phi_deg\n30,3,10\n30,9,10\n0,3,0\n");
+    let (out, _err) = folder.expect(0, "predict m.toml --at at.csv --json");
     let rows = lines(&out);
     assert_eq!(rows.len(), 3);
     assert_eq!(
@@ -74,44 +47,40 @@ fn learn_bounds_gives_a_model_that_predict_evaluates() {
         ("1,1,1,0,0.1,", "bad.csv:1502:5"),
         ("1,1,1", "bad.csv:1502:4"),
     ] {
-        write(&folder, "bad.csv", &format!("{text}{row}\n"));
-        let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
-        assert!(code == 2 && err.contains(place), "{row}: {err}");
+        folder.write("bad.csv", format!("{text}{row}\n"));
+        folder
+            .run("learn bounds bad.csv --quantile 0.9 -o never.toml")
+            .is_refused_with(&[place]);
     }
     // An unclosed quote hides no rows, and rows are never comments.
     for row in ["1,1,1,1,0.1,\"0.1", "#1,1,1,1,0.1,0.1"] {
-        write(
-            &folder,
-            "bad.csv",
-            &format!("{text}{row}\n1,1,1,1,0.1,0.1\n"),
-        );
-        let (code, _, err) = run(&folder, "learn bounds bad.csv --quantile 0.9 -o never.toml");
-        assert!(code == 2 && err.contains("bad.csv:1502:"), "{row}: {err}");
+        folder.write("bad.csv", format!("{text}{row}\n1,1,1,1,0.1,0.1\n"));
+        folder
+            .run("learn bounds bad.csv --quantile 0.9 -o never.toml")
+            .is_refused_with(&["bad.csv:1502:"]);
     }
     let (code, out, _) = run(&folder, "learn bounds d.csv --quantile 0.9 -o - --json");
     assert!(code == 2 && out.is_empty());
-    let (code, _, err) = run(&folder, "learn bounds d.csv --quantile 1.5 -o never.toml");
-    assert!(code == 2 && err.contains("no share"), "{err}");
-    let (code, _, err) = run(
-        &folder,
-        "learn bounds d.csv --quantile 0.9999 -o never.toml",
-    );
-    assert!(code == 2 && err.contains("too few"), "{err}");
+    folder
+        .run("learn bounds d.csv --quantile 1.5 -o never.toml")
+        .is_refused_with(&["no share"]);
+    folder
+        .run("learn bounds d.csv --quantile 0.9999 -o never.toml")
+        .is_refused_with(&["too few"]);
     assert!(!folder.path().join("never.toml").exists());
-    write(&folder, "at.csv", "d_m,phi_deg,psi_deg\n1,2,x\n");
-    let (code, out, err) = run(&folder, "predict m.toml --at at.csv --json");
-    assert!(
-        code == 2 && out.is_empty() && err.contains("at.csv:2:3"),
-        "{err}"
-    );
-    let (code, _, err) = run(&folder, "predict d.csv --at at.csv --json");
-    assert!(code == 2 && err.contains("d.csv:1:"), "{err}");
+    folder.write("at.csv", "d_m,phi_deg,psi_deg\n1,2,x\n");
+    folder
+        .run("predict m.toml --at at.csv --json")
+        .is_refused_with(&["at.csv:2:3"]);
+    folder
+        .run("predict d.csv --at at.csv --json")
+        .is_refused_with(&["d.csv:1:"]);
 }
 
 /// Frames of approaches: named in `run`, or cut at gaps with a warning. One long video is refused.
 #[test]
 fn dependent_frames_count_as_fewer_rows() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let detections = SQUARES.approaches(60, 0.9, 0.0, 4);
     let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad";
     let rows = |more: &dyn Fn(usize) -> String| {
@@ -124,11 +93,11 @@ fn dependent_frames_count_as_fewer_rows() {
         text
     };
     let named = rows(&|k| format!("drive {}", k / 100));
-    write(&folder, "named.csv", &format!("{header},run\n{named}"));
+    folder.write("named.csv", format!("{header},run\n{named}"));
     let timed = rows(&|k| format!("{:.2}", 0.1 * k as f64 + 5.0 * (k / 100) as f64));
-    write(&folder, "timed.csv", &format!("{header},t_s\n{timed}"));
+    folder.write("timed.csv", format!("{header},t_s\n{timed}"));
     let video = rows(&|k| format!("{:.2}", 0.1 * k as f64));
-    write(&folder, "video.csv", &format!("{header},t_s\n{video}"));
+    folder.write("video.csv", format!("{header},t_s\n{video}"));
 
     let learn = |file: &str| {
         run(
@@ -159,14 +128,14 @@ fn dependent_frames_count_as_fewer_rows() {
     assert!(!folder.path().join("m.toml").exists());
 
     let unnamed = rows(&|k| if k == 7 { String::new() } else { "a".into() });
-    write(&folder, "bad.csv", &format!("{header},run\n{unnamed}"));
+    folder.write("bad.csv", format!("{header},run\n{unnamed}"));
     let (code, _, err) = learn("bad.csv");
     assert!(code == 2 && err.contains("bad.csv:9:7"), "{err}");
 }
 
 #[test]
 fn learn_inflation_gives_a_model_that_predict_evaluates() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let mut random = Random(9);
     let mut text = "t_s,x_m,y_m,yaw_rad,cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,true_x_m,true_y_m,true_yaw_rad\n".to_owned();
     // Deviations of 2 cm and 0.02 rad, stated as half of them: a factor of 4.
@@ -176,7 +145,7 @@ fn learn_inflation_gives_a_model_that_predict_evaluates() {
         writeln!(text, "{t},{x},{y},{yaw},{p},0,0,{p},0,{p},0,0,0").unwrap();
     }
     text.push_str("3000,0,0,0,1,2,0,1,0,1,0,0,0\n");
-    write(&folder, "e.csv", &text);
+    folder.write("e.csv", &text);
     let (code, out, err) = run(
         &folder,
         "learn inflation e.csv --epsilon 0.95 -o m.toml --json",
@@ -192,7 +161,7 @@ fn learn_inflation_gives_a_model_that_predict_evaluates() {
     assert_eq!(rows[5]["accepted"], true);
     assert!(rows[5]["inflation"].as_f64().unwrap() >= 1.0);
     assert_eq!(rows[3000]["accepted"], false);
-    write(&folder, "e.csv", &text.replace("1,0.", "1,x."));
+    folder.write("e.csv", text.replace("1,0.", "1,x."));
     let (code, _, err) = run(
         &folder,
         "learn inflation e.csv --epsilon 0.95 -o never.toml",
@@ -202,13 +171,13 @@ fn learn_inflation_gives_a_model_that_predict_evaluates() {
 
 #[test]
 fn learn_outcomes_returns_1_if_the_claim_is_contradicted() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let fleet = |bad: usize| {
         let rows = (0..1000).map(|k| if k % 1000 < bad { "0\n" } else { "1\n" });
         format!("success\n{}", rows.collect::<String>())
     };
-    write(&folder, "good.csv", &fleet(8));
-    write(&folder, "bad.csv", &fleet(40));
+    folder.write("good.csv", fleet(8));
+    folder.write("bad.csv", fleet(40));
     let (code, out, err) = run(&folder, "learn outcomes bad.csv --epsilon 0.99 --json");
     let report = &lines(&out)[0];
     assert!(code == 1 && report["contradicted"] == true, "{out}{err}");
@@ -218,17 +187,15 @@ fn learn_outcomes_returns_1_if_the_claim_is_contradicted() {
     for k in 0..1000u32 {
         writeln!(mixed, "{},{}", 1000 - k, u8::from(k % 125 != 0)).unwrap();
     }
-    write(&folder, "good.csv", &mixed);
+    folder.write("good.csv", &mixed);
     let (code, out, err) = run(&folder, "learn outcomes good.csv --epsilon 0.99 --json");
     assert!(
         code == 0 && lines(&out)[0]["contradicted"] == false,
         "{out}{err}"
     );
     assert_eq!(lines(&out)[0]["successes"], 992);
-    write(&folder, "bad.csv", "success\n1\nyes\n");
-    let (code, out, err) = run(&folder, "learn outcomes bad.csv --epsilon 0.99 --json");
-    assert!(
-        code == 2 && out.is_empty() && err.contains("bad.csv:3:1"),
-        "{err}"
-    );
+    folder.write("bad.csv", "success\n1\nyes\n");
+    folder
+        .run("learn outcomes bad.csv --epsilon 0.99 --json")
+        .is_refused_with(&["bad.csv:3:1"]);
 }

@@ -1,6 +1,6 @@
 //! Bounds for tags that flip: the quantile of the errors jumps from the size of noise to that of a mirrored solution.
 
-use crate::command::{lines, run, write};
+use crate::command::{Case, lines, run};
 use crate::distribution::{Distribution, Random};
 use crate::in_regions;
 use posegate_learn::{BoundsSettings, ErrorModel, learn_bounds};
@@ -100,7 +100,7 @@ fn of_both_poses(seed: u64, rows: u32) -> Vec<([f64; 3], [[f64; 2]; 2])> {
 /// With both poses as hypotheses a bound is as tight as if no tag flipped, and one of the two is within it.
 #[test]
 fn bounds_for_both_poses_ignore_flips() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let mut both =
         "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad,second_err_translation_m,second_err_yaw_rad\n"
             .to_owned();
@@ -112,15 +112,14 @@ fn bounds_for_both_poses_ignore_flips() {
     }
     let site = SAMPLE.to_owned()
         + "[error_model.m]\nfile = \"both.toml\"\n\n[task.look]\nkind = \"localization\"\ngoal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }\nsuccess = { shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 5.5, phi_max_deg = 25.0, psi_max_deg = 60.0, error_model = \"m\", r = { translation = 0.1, yaw_deg = 5.0 } }\n";
-    write(&folder, "both.csv", &both);
-    write(&folder, "one.csv", &one);
-    write(&folder, "site.toml", &site);
+    folder.write("both.csv", &both);
+    folder.write("one.csv", &one);
+    folder.write("site.toml", &site);
     let model = |name: &str| {
         let line = format!("learn bounds {name}.csv --quantile 0.99 -o {name}.toml --json");
-        let (code, out, err) = run(&folder, &line);
-        assert_eq!(code, 0, "{err}");
+        let (out, _err) = folder.expect(0, &line);
         assert_eq!(lines(&out)[0]["of_better_pose"], name == "both", "{out}");
-        let text = std::fs::read_to_string(folder.path().join(format!("{name}.toml"))).unwrap();
+        let text = folder.text(&format!("{name}.toml"));
         ErrorModel::parse(&text, name).unwrap()
     };
     let (of_both, of_one) = (model("both"), model("one"));
@@ -154,21 +153,19 @@ fn bounds_for_both_poses_ignore_flips() {
         "{held} of {tried}"
     );
     // `predict` reports for which pose its bounds hold.
-    write(&folder, "at.csv", "d_m,phi_deg,psi_deg\n3,5,30\n");
+    folder.write("at.csv", "d_m,phi_deg,psi_deg\n3,5,30\n");
     for (name, warns) in [("both", true), ("one", false)] {
         let (code, _, err) = run(&folder, &format!("predict {name}.toml --at at.csv --json"));
         assert_eq!((code, err.contains("better one")), (0, warns), "{err}");
     }
     // A look gives one pose, so a site cannot use such a model. Rows of one pose cannot test it.
-    let (code, _, err) = run(&folder, "check site.toml");
-    assert!(code == 2 && err.contains("better one"), "{code}: {err}");
+    folder
+        .run("check site.toml")
+        .is_refused_with(&["better one"]);
     for (name, data) in [("both", "one"), ("one", "both")] {
-        let (code, _, err) = run(&folder, &format!("learn check {name}.toml {data}.csv"));
-        assert!(
-            code == 2 && err.contains("second_err_yaw_rad"),
-            "{code}: {err}"
-        );
-        let (code, _, err) = run(&folder, &format!("learn check {name}.toml {name}.csv"));
-        assert_eq!(code, 0, "{err}");
+        folder
+            .run(&format!("learn check {name}.toml {data}.csv"))
+            .is_refused_with(&["second_err_yaw_rad"]);
+        let (_, _err) = folder.expect(0, &format!("learn check {name}.toml {name}.csv"));
     }
 }

@@ -1,6 +1,6 @@
 //! A learnt model records what its detections were taken with, and a site with another camera, mount or tag refuses it by name.
 
-use crate::command::{lines, run, write};
+use crate::command::{Case, lines, run};
 use crate::distribution::SQUARES;
 use posegate_site::SAMPLE;
 use serde_json::json;
@@ -16,8 +16,8 @@ goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
 success = { shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 8.0, phi_max_deg = 25.0, psi_max_deg = 60.0, error_model = \"learnt\", r = { translation = 0.04, yaw_deg = 1.0 } }
 ";
 
-fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
+fn folder() -> Case {
+    let folder = Case::new(&[]);
     let header = "d_m,phi_deg,psi_deg,detected,err_translation_m,err_yaw_rad\n";
     let mut text = header.to_owned();
     for row in SQUARES.views(3000, 7, |_| true).rows {
@@ -27,15 +27,9 @@ fn folder() -> tempfile::TempDir {
             None => writeln!(text, "{d},{phi},{psi},0,,").unwrap(),
         }
     }
-    write(&folder, "d.csv", &text);
-    write(&folder, "site.toml", SAMPLE);
+    folder.write("d.csv", &text);
+    folder.write("site.toml", SAMPLE);
     folder
-}
-
-/// An error on one line.
-fn joined(err: &str) -> String {
-    let words = err.split_whitespace().filter(|word| *word != "│");
-    words.collect::<Vec<_>>().join(" ")
 }
 
 fn changed(key: &str, from: &str, to: &str) -> String {
@@ -47,20 +41,18 @@ fn changed(key: &str, from: &str, to: &str) -> String {
 #[test]
 fn site_with_another_camera_or_tag_is_refused() {
     let folder = folder();
-    let (code, out, err) = run(
-        &folder,
+    let (out, _err) = folder.expect(
+        0,
         "learn bounds d.csv --quantile 0.9 -o m.toml --camera front --site site.toml --json",
     );
-    assert_eq!(code, 0, "{err}");
     let taken = &lines(&out)[0]["taken_with"];
     assert_eq!(taken["camera"], "front", "{out}");
     assert_eq!(taken["family"], "tag36h11", "{out}");
     let number = |key: &str| taken[key].as_f64().unwrap();
     let (fx, size) = (number("fx"), number("tag_size"));
     // The same site, and one whose calibration differs as much as another calibration of the same camera.
-    write(&folder, "here.toml", &format!("{SAMPLE}{LOOK}"));
-    let (code, _, err) = run(&folder, "check here.toml");
-    assert_eq!(code, 0, "{err}");
+    folder.write("here.toml", format!("{SAMPLE}{LOOK}"));
+    let (_, _err) = folder.expect(0, "check here.toml");
     let key = |name: &str, value: f64| {
         let text = [format!("{name} = {value:?}"), format!("{name} = {value}")];
         let found = text.into_iter().find(|text| SAMPLE.contains(text));
@@ -72,10 +64,10 @@ fn site_with_another_camera_or_tag_is_refused() {
         ("size", size, 1.05, true),
     ] {
         let to = format!("{name} = {:?}", from * factor);
-        write(&folder, "there.toml", &changed(name, &key(name, from), &to));
+        folder.write("there.toml", changed(name, &key(name, from), &to));
         let (code, _, err) = run(&folder, "check there.toml");
         assert_eq!(code, if refused { 2 } else { 0 }, "{name} {factor}: {err}");
-        assert_eq!(joined(&err).contains("was learnt with"), refused, "{err}");
+        assert_eq!(err.contains("was learnt with"), refused, "{err}");
         assert!(!refused || err.contains("there.toml"), "{err}");
     }
     // Larger tags are seen from farther away; the model is scaled if the site asks for it.
@@ -85,33 +77,18 @@ fn site_with_another_camera_or_tag_is_refused() {
         "file = \"m.toml\"\ntag_size = {:?}\nlean_deg = 0.0",
         size * 1.5
     );
-    write(
-        &folder,
-        "there.toml",
-        &larger.replace("file = \"m.toml\"", &scaled),
-    );
-    let (code, _, err) = run(&folder, "check there.toml");
-    assert_eq!(code, 0, "{err}");
+    folder.write("there.toml", larger.replace("file = \"m.toml\"", &scaled));
+    let (_, _err) = folder.expect(0, "check there.toml");
     let formula = "translation = [0, 0, 0, 0]\nyaw_deg = [0, 0, 0, 0]\ntag_size = 0.3";
-    write(
-        &folder,
-        "there.toml",
-        &larger.replace("file = \"m.toml\"", formula),
-    );
-    let (code, _, err) = run(&folder, "check there.toml");
-    assert_eq!(code, 2, "{err}");
-    assert!(
-        joined(&err).contains("is a formula and has a `tag_size`"),
-        "{err}"
-    );
+    folder.write("there.toml", larger.replace("file = \"m.toml\"", formula));
+    folder
+        .run("check there.toml")
+        .is_refused_with(&["is a formula and has a `tag_size`"]);
     let other = changed("family", "tag36h11", "tag25h9");
-    write(&folder, "there.toml", &other);
-    let (code, _, err) = run(&folder, "check there.toml");
-    assert_eq!(code, 2, "{err}");
-    assert!(
-        joined(&err).contains("tags of the family tag36h11, not tag25h9"),
-        "{err}"
-    );
+    folder.write("there.toml", &other);
+    folder
+        .run("check there.toml")
+        .is_refused_with(&["tags of the family tag36h11, not tag25h9"]);
 }
 
 /// The errors are those of the robot's reference point, so a model is for one mount of the camera.
@@ -120,8 +97,7 @@ fn site_with_another_mount_is_refused() {
     let folder = folder();
     let learn =
         "learn bounds d.csv --quantile 0.9 -o m.toml --camera front --site site.toml --json";
-    let (code, out, err) = run(&folder, learn);
-    assert_eq!(code, 0, "{err}");
+    let (out, _err) = folder.expect(0, learn);
     let mount =
         json!({"x": 0.25, "y": 0.0, "z": 0.5, "roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0});
     assert_eq!(lines(&out)[0]["taken_with"]["mount"], mount, "{out}");
@@ -138,13 +114,9 @@ fn site_with_another_mount_is_refused() {
         let numbers = format!("x = {x:?}, y = 0.0, z = 0.5, roll_deg = 0.0, pitch_deg = 0.0");
         let to = format!("mount = {{ {numbers}, yaw_deg = {yaw:?} }}{tolerance}");
         assert!(SAMPLE.contains(from));
-        write(
-            &folder,
-            "there.toml",
-            &(SAMPLE.replacen(from, &to, 1) + &look),
-        );
+        folder.write("there.toml", &(SAMPLE.replacen(from, &to, 1) + &look));
         let (code, _, err) = run(&folder, "check there.toml");
-        (code, joined(&err))
+        (code, err)
     };
     for (x, yaw, tolerance, accepted) in [
         (0.25, 0.0, "", true),
@@ -167,20 +139,16 @@ fn site_with_another_mount_is_refused() {
         assert_eq!(err.contains(named), !accepted, "{x} {yaw}: {err}");
     }
     // Models without a mount are read as before, and their mount is not compared.
-    let text = std::fs::read_to_string(folder.path().join("m.toml")).unwrap();
+    let text = folder.text("m.toml");
     let start = text.find("[taken_with.mount]").unwrap();
     let end = start + text[start + 1..].find("\n[").unwrap() + 2;
-    write(
-        &folder,
-        "m.toml",
-        &format!("{}{}", &text[..start], &text[end..]),
-    );
+    folder.write("m.toml", format!("{}{}", &text[..start], &text[end..]));
     let (code, err) = at(-0.25, 180.0, "");
     assert_eq!(code, 0, "{err}");
     // An impossible mount is refused.
     let impossible = text.replacen("\nx = 0.25", "\nx = nan", 1);
     assert_ne!(impossible, text);
-    write(&folder, "m.toml", &impossible);
+    folder.write("m.toml", &impossible);
     let (code, err) = at(0.25, 0.0, "");
     assert!(
         code == 2 && err.contains("mount has finite numbers"),
@@ -191,34 +159,23 @@ fn site_with_another_mount_is_refused() {
 #[test]
 fn options_state_camera_and_tag_without_a_site() {
     let folder = folder();
-    let (code, out, err) = run(
-        &folder,
-        "learn bounds d.csv --quantile 0.9 -o m.toml --fx 1234.5 --tag-size 0.31 --family tag36h11 --json",
-    );
-    assert_eq!(code, 0, "{err}");
+    let (out, _err) = folder.expect(0, "learn bounds d.csv --quantile 0.9 -o m.toml --fx 1234.5 --tag-size 0.31 --family tag36h11 --json");
     let taken = &lines(&out)[0]["taken_with"];
     assert_eq!(taken["fx"], 1234.5);
     assert_eq!(taken["tag_size"], 0.31);
-    write(&folder, "here.toml", &format!("{SAMPLE}{LOOK}"));
+    folder.write("here.toml", format!("{SAMPLE}{LOOK}"));
     let (code, _, err) = run(&folder, "check here.toml");
     assert_eq!(code, 2);
-    assert!(joined(&err).contains("fx 1234.5 px"), "{err}");
+    assert!(err.contains("fx 1234.5 px"), "{err}");
     // If nothing is stated, nothing is compared.
-    let (code, out, err) = run(
-        &folder,
-        "learn bounds d.csv --quantile 0.9 -o m.toml --json",
-    );
-    assert_eq!(code, 0, "{err}");
+    let (out, _err) = folder.expect(0, "learn bounds d.csv --quantile 0.9 -o m.toml --json");
     assert!(lines(&out)[0]["taken_with"].is_null());
     // A model of tags of an unknown size is not scaled.
     let scaled = LOOK.replace("m.toml\"", "m.toml\"\ntag_size = 0.3");
-    write(&folder, "there.toml", &format!("{SAMPLE}{scaled}"));
-    let (code, _, err) = run(&folder, "check there.toml");
-    assert_eq!(code, 2, "{err}");
-    assert!(
-        joined(&err).contains("does not record the size of its tags"),
-        "{err}"
-    );
+    folder.write("there.toml", format!("{SAMPLE}{scaled}"));
+    folder
+        .run("check there.toml")
+        .is_refused_with(&["does not record the size of its tags"]);
     assert_eq!(run(&folder, "check here.toml").0, 0);
     for (options, words) in [
         ("--camera front", "--site"),
@@ -229,9 +186,7 @@ fn options_state_camera_and_tag_without_a_site() {
         ("--fx 3 --camera front --site site.toml", "--camera"),
     ] {
         let line = format!("learn bounds d.csv --quantile 0.9 -o other.toml {options}");
-        let (code, _, err) = run(&folder, &line);
-        assert_eq!(code, 2, "{options}: {err}");
-        assert!(joined(&err).contains(words), "{options}: {err}");
+        folder.run(&line).is_refused_with(&[words]);
         assert!(!folder.path().join("other.toml").exists());
     }
 }

@@ -1,5 +1,6 @@
 //! Learnt error models in site files.
 
+use crate::command::Case;
 use crate::distribution::{Distribution, Random, SQUARES};
 use posegate_learn::{BoundsSettings, ErrorModel, learn_bounds};
 use posegate_site::{SAMPLE, Site};
@@ -22,7 +23,7 @@ goal = { x = 0.0, y = 0.0, yaw_deg = 0.0 }
 success = { shape = \"visibility\", camera = \"front\", tag = \"t7\", d_max = 8.0, phi_max_deg = 25.0, psi_max_deg = 60.0, error_model = \"learnt\", r = { translation = 0.04, yaw_deg = 1.0 } }
 ";
 
-fn site(folder: &tempfile::TempDir, text: &str) -> Result<Site, String> {
+fn site(folder: &Case, text: &str) -> Result<Site, String> {
     let path = folder.path().join("site.toml");
     std::fs::write(&path, text).unwrap();
     Site::read(&path).map_err(|error| error.to_string())
@@ -31,7 +32,7 @@ fn site(folder: &tempfile::TempDir, text: &str) -> Result<Site, String> {
 /// Every pose of the set has both bounds within r; nearly all poses with both bounds within r are in the set.
 #[test]
 fn learnt_model_defines_a_success_set() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let model = model();
     let text = model.write().unwrap();
     std::fs::write(folder.path().join("model.toml"), &text).unwrap();
@@ -85,7 +86,7 @@ fn learnt_model_defines_a_success_set() {
 
 #[test]
 fn contradicting_error_bound_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     std::fs::write(folder.path().join("model.toml"), model().write().unwrap()).unwrap();
     let with = |line: &str| site(&folder, &format!("{SAMPLE}{LOOK}{line}\n"));
     assert!(with("").is_ok());

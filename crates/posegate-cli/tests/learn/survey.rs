@@ -1,6 +1,6 @@
 //! Docks and tags that are not where the site file places them are found and named. Others are not reported.
 
-use crate::command::{lines, run, write};
+use crate::command::{Case, lines, run};
 use crate::distribution::Random;
 use posegate_learn::{Look, OffsetReport, Surveyed, SurveyedSite, acceptance, survey};
 use std::fmt::Write;
@@ -161,7 +161,7 @@ fn dock_and_tag_seen_only_together_are_both_named() {
 
 #[test]
 fn survey_command_names_a_displaced_dock() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Case::new(&[]);
     let site = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../examples/sites/dock.toml"
@@ -175,9 +175,8 @@ fn survey_command_names_a_displaced_dock() {
         }
         text
     };
-    write(&folder, "off.csv", &rows(3.6f64.to_radians()));
-    let (code, out, err) = run(&folder, &format!("learn survey {site} off.csv"));
-    assert_eq!(code, 1, "{err}");
+    folder.write("off.csv", rows(3.6f64.to_radians()));
+    let (out, _err) = folder.expect(1, &format!("learn survey {site} off.csv"));
     assert!(
         out.contains("re-survey dock or tag t7: 3.") && out.contains("cm off"),
         "{out}"
@@ -203,7 +202,7 @@ fn survey_command_names_a_displaced_dock() {
         )
         .unwrap();
     }
-    write(&folder, "constant.csv", &constant);
+    folder.write("constant.csv", &constant);
     let (code, out, err) = run(&folder, &format!("learn survey {site} constant.csv"));
     assert!(
         code == 0 && out.matches("do not scatter").count() == 2 && !out.contains("re-survey"),
@@ -221,12 +220,12 @@ fn survey_command_names_a_displaced_dock() {
         ("3,dock,t7", "3,dock,t8", "bad.csv:5:3"),
         ("3,dock,t7", ",dock,t7", "bad.csv:5:1"),
     ] {
-        write(
-            &folder,
+        folder.write(
             "bad.csv",
-            &good.replacen(&format!("\n{from}"), &format!("\n{to}"), 1),
+            good.replacen(&format!("\n{from}"), &format!("\n{to}"), 1),
         );
-        let (code, out, err) = run(&folder, &format!("learn survey {site} bad.csv"));
-        assert!(code == 2 && out.is_empty() && err.contains(place), "{err}");
+        folder
+            .run(&format!("learn survey {site} bad.csv"))
+            .is_refused_with(&[place]);
     }
 }

@@ -35,11 +35,10 @@ fn killed_shard_loses_no_finished_piece() {
     assert_eq!(output.status.signal(), Some(SIGXFSZ), "{output:?}");
     let finished = folder.pieces("out").len();
     assert!((3..18).contains(&finished), "{finished}");
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(
-        err.contains("pieces that are missing or damaged: ") && err.contains(": shard 0/1, parts/"),
-        "{err}"
-    );
+    folder.run("site merge out").is_refused_with(&[
+        "pieces that are missing or damaged: ",
+        ": shard 0/1, parts/",
+    ]);
     // The rest of a killed write, which looks like the file of another process, and the damage of a bad disk.
     folder.write("out/parts/.posegate-1-1.tmp", "half");
     folder.write("out/parts/.posegate-1-2.tmp", "half");
@@ -54,8 +53,9 @@ fn killed_shard_loses_no_finished_piece() {
     let damaged = std::fs::read(&pieces[0]).unwrap();
     std::fs::write(&pieces[0], &damaged[..damaged.len() - 1]).unwrap();
     flip(&pieces[1]);
-    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let built = folder
+        .run("site build site.toml --resume --json -o out")
+        .json(0);
     assert_eq!(built["pieces"], 18);
     let kept = built["kept"].as_u64().unwrap() as usize;
     assert!(kept >= finished - 2 && kept < 18, "{kept} of {finished}");
@@ -72,8 +72,9 @@ fn killed_shard_loses_no_finished_piece() {
     assert!(drafts.contains(&".posegate-1-2.tmp"), "{drafts:?}");
     assert!(!drafts.contains(&".posegate-1-1.tmp"), "{drafts:?}");
     // The second run has nothing to build.
-    let (out, _) = folder.expect(0, "site build site.toml --resume --json -o out");
-    let built: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let built = folder
+        .run("site build site.toml --resume --json -o out")
+        .json(0);
     assert_eq!(built["kept"], 18);
 }
 

@@ -96,16 +96,13 @@ fn mismatched_table_and_proof_are_neither_kept_nor_merged() {
         let copy = format!("copy-{number}");
         folder.copied("out", &copy);
         mismatched(&piece_of(&folder, &copy, "dock-0"), how);
-        let (_, err) = folder.expect(2, &format!("site merge {copy}"));
-        assert!(
-            err.contains("pieces that are missing or damaged: 1 the table of `dock-0`"),
-            "{how}: {err}"
-        );
+        folder
+            .run(&format!("site merge {copy}"))
+            .is_refused_with(&["pieces that are missing or damaged: 1 the table of `dock-0`"]);
         let mut kept = 0;
         for shard in 0..2 {
             let line = format!("site build site.toml --shard {shard}/2 --resume --json -o {copy}");
-            let (out, _) = folder.expect(0, &line);
-            let built: Value = serde_json::from_str(&out).unwrap();
+            let built = folder.run(&line).json(0);
             kept += built["kept"].as_u64().unwrap();
         }
         assert_eq!(kept, 4, "{how}");
@@ -121,8 +118,9 @@ fn proving_merge_finds_a_forgery_with_a_matching_proof_file() {
     folder.copied("out", "honest");
     folder.expect(0, "site merge honest");
     let honest = folder.results("honest");
-    let (out, _) = folder.expect(0, "site merge honest --site site.toml --prove --json");
-    let merged: Value = serde_json::from_str(&out).unwrap();
+    let merged = folder
+        .run("site merge honest --site site.toml --prove --json")
+        .json(0);
     assert_eq!(
         (&merged["tables"], &merged["proven_again"]),
         (&json!(5), &json!(true))
@@ -187,11 +185,9 @@ fn incomplete_inventory_is_refused_if_the_site_is_given() {
         record["inventory"] = digest.clone().into();
         std::fs::write(parts.join(&name), record.to_string()).unwrap();
     }
-    let (_, err) = folder.expect(2, "site merge out --site site.toml");
-    assert!(
-        err.contains("does not list the pieces of the site that is named"),
-        "{err}"
-    );
+    folder
+        .run("site merge out --site site.toml")
+        .is_refused_with(&["does not list the pieces of the site that is named"]);
     let (out, _) = folder.expect(0, "site merge out");
     assert!(out.contains("4 proven tables"), "{out}");
 }
@@ -216,19 +212,15 @@ fn parts_of_another_program_are_neither_kept_nor_mixed() {
     let (out, _) = by_other(0, "site build site.toml --shard 1/2 --resume --json -o out");
     let built: Value = serde_json::from_str(&out).unwrap();
     assert_eq!((&built["pieces"], &built["kept"]), (&json!(2), &json!(0)));
-    let (_, err) = folder.expect(2, "site merge out --any-program");
-    assert!(
-        err.contains("shards are of different sites, programs or options"),
-        "{err}"
-    );
+    folder
+        .run("site merge out --any-program")
+        .is_refused_with(&["shards are of different sites, programs or options"]);
     by_other(0, "site build site.toml --shard 0/2 -o out");
     by_other(0, "site merge out");
     let theirs = folder.results("out");
-    let (_, err) = folder.expect(2, "site merge out --site site.toml --prove");
-    assert!(
-        err.contains("the parts are by the program 0.1.0") && err.contains("--any-program"),
-        "{err}"
-    );
+    folder
+        .run("site merge out --site site.toml --prove")
+        .is_refused_with(&["the parts are by the program 0.1.0", "--any-program"]);
     folder.expect(0, "site merge out --site site.toml --prove --any-program");
     assert!(folder.results("out") == theirs);
     // Only the manifest depends on the program.

@@ -10,11 +10,9 @@ fn second_merge_at_the_same_time_is_refused() {
     let before = folder.results("out");
     let parts = std::fs::File::open(folder.path().join("out/parts")).unwrap();
     parts.try_lock().unwrap();
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(
-        err.contains("out/parts: another merge is at work here"),
-        "{err}"
-    );
+    folder
+        .run("site merge out")
+        .is_refused_with(&["out/parts: another merge is at work here"]);
     // The end of a process releases its locks.
     drop(parts);
     super::flip(&folder.pieces("out")[0]);
@@ -33,8 +31,9 @@ fn merged_results_survive_the_removal_of_parts() {
     folder.expect(0, "site merge out");
     let before = folder.results("out");
     std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(err.contains("no shard was built here"), "{err}");
+    folder
+        .run("site merge out")
+        .is_refused_with(&["no shard was built here"]);
     folder.expect(0, "site build site.toml -o out");
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == before);
@@ -57,8 +56,9 @@ fn merged_results_survive_the_removal_of_parts() {
     // A folder with a manifest of another kind is refused.
     std::fs::remove_dir_all(folder.path().join("out/parts")).unwrap();
     folder.write("out/manifest.json", "{\"name\": \"a page\"}");
-    let (_, err) = folder.expect(2, "site build site.toml -o out");
-    assert!(err.contains("already that is of no site build"), "{err}");
+    folder
+        .run("site build site.toml -o out")
+        .is_refused_with(&["already that is of no site build"]);
 }
 
 #[test]
@@ -86,11 +86,9 @@ fn foreign_file_among_the_results_is_not_removed() {
     }
     folder.copied("out", "page");
     folder.write("page/manifest.json", "{\"name\": \"a page\"}");
-    let (_, err) = folder.expect(2, "site merge page");
-    assert!(
-        err.contains("page: there is a `manifest.json` already that is of no site build"),
-        "{err}"
-    );
+    folder
+        .run("site merge page")
+        .is_refused_with(&["page: there is a `manifest.json` already that is of no site build"]);
     folder.expect(0, "site merge out");
     assert!(folder.results("out") == before);
 }
@@ -163,14 +161,13 @@ fn stale_records_are_left_out_if_the_site_is_given() {
     folder.expect(0, "site build site.toml --tables-only --shard 1/3 -o out");
     folder.expect(2, "site merge out --site site.toml");
     folder.write("third.toml", &boxes().replace("0.1]", "0.12]"));
-    let (_, err) = folder.expect(2, "site merge out --site third.toml");
-    assert!(err.contains("the parts are of the site "), "{err}");
+    folder
+        .run("site merge out --site third.toml")
+        .is_refused_with(&["the parts are of the site "]);
     folder.expect(0, "site build third.toml --shard 0/2 -o out");
-    let (_, err) = folder.expect(2, "site merge out --site third.toml");
-    assert!(
-        err.contains("pieces that are missing or damaged: 2 the table of"),
-        "{err}"
-    );
+    folder
+        .run("site merge out --site third.toml")
+        .is_refused_with(&["pieces that are missing or damaged: 2 the table of"]);
 }
 
 /// The largest number of shards is a million: a record of more is refused.
@@ -178,17 +175,16 @@ fn stale_records_are_left_out_if_the_site_is_given() {
 fn record_of_more_than_a_million_shards_is_refused() {
     let folder = Folder::with(&boxes());
     folder.expect(0, "site build site.toml --shard 3/1000000 -o out");
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(err.contains("shard 2/1000000, parts/"), "{err}");
+    folder
+        .run("site merge out")
+        .is_refused_with(&["shard 2/1000000, parts/"]);
     let record = |count: u32| {
         folder
             .path()
             .join(format!("out/parts/shard-3-of-{count}.json"))
     };
     std::fs::rename(record(1_000_000), record(20_000_000)).unwrap();
-    let (_, err) = folder.expect(2, "site merge out");
-    assert!(
-        err.contains("is not what a shard of this name writes"),
-        "{err}"
-    );
+    folder
+        .run("site merge out")
+        .is_refused_with(&["is not what a shard of this name writes"]);
 }
