@@ -1,6 +1,7 @@
 //! A source's estimate of the robot's pose.
 
-use super::memory::{Plain, answer, read};
+use super::call::answer;
+use super::memory::{Plain, read};
 use super::posegate_status;
 use posegate::report::{Heading, PoseEstimate, mavlink, ros};
 use posegate::set::Uncertainty;
@@ -118,7 +119,7 @@ pub struct posegate_compact {
     pub yaw_yaw: f32,
 }
 
-// SAFETY: numbers.
+// SAFETY: numbers. The zero has no form, so every function refuses it.
 unsafe impl Plain for posegate_belief {}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_ros_pose {}
@@ -130,16 +131,6 @@ unsafe impl Plain for posegate_mavlink_vision {}
 unsafe impl Plain for posegate_compact {}
 
 impl posegate_belief {
-    /// An estimate of no form, which every function refuses.
-    pub(super) const NONE: Self = Self {
-        x_m: 0.0,
-        y_m: 0.0,
-        heading: [0.0; 4],
-        spread: [0.0; 9],
-        heading_kind: 0,
-        spread_kind: 0,
-    };
-
     pub(super) const fn of(belief: &PoseEstimate) -> Self {
         let (heading_kind, heading) = match belief.heading {
             Heading::Radians(yaw) => (posegate_heading::Yaw, [yaw, 0.0, 0.0, 0.0]),
@@ -215,18 +206,14 @@ const fn axes(axes: u32) -> Result<mavlink::Axes, posegate_status> {
 /// Converts a message. After an error the estimate has no form.
 ///
 /// # Safety
-/// As for [`read`] and [`write`].
+/// As for [`read`] and [`answer`].
 unsafe fn convert<T: Plain>(
     message: *const T,
     belief: *mut posegate_belief,
     of: impl FnOnce(&T) -> Result<PoseEstimate, posegate_status>,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let made = read(message).and_then(|message| of(&message));
-        let made = made.map(|made| posegate_belief::of(&made));
-        answer(belief, made, posegate_belief::NONE)
-    })
+    unsafe { answer(belief, || Ok(posegate_belief::of(&of(&read(message)?)?))) }
 }
 
 /// Converts a ROS message to an estimate: its marginal over x, y and yaw.

@@ -52,30 +52,14 @@
 extern crate std;
 
 // A page in a browser evaluates single estimates and drives nothing: it has no gate.
-pub use self::belief::*;
+pub use self::{
+    belief::*, judge::*, permission::*, reason::*, report::*, status::*, table::*, wire::*,
+};
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::clock::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::evidence::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::gate::*;
-pub use self::judge::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::monitor::*;
-pub use self::permission::*;
-pub use self::reason::*;
-pub use self::report::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::sequencer::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::settings::*;
-pub use self::status::*;
-pub use self::table::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::tracker::*;
-pub use self::wire::*;
+pub use self::{clock::*, evidence::*, gate::*, monitor::*, sequencer::*, settings::*, tracker::*};
 
 mod belief;
+mod call;
 #[cfg(not(target_arch = "wasm32"))]
 mod clock;
 #[cfg(not(target_arch = "wasm32"))]

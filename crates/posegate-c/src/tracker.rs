@@ -1,8 +1,9 @@
 //! The tracker: a fix carried forward by odometry, in caller-owned storage.
 
+use super::call::{act, answer, answer_or, init};
 use super::evidence::posegate_evidence;
 use super::gate::{held, posegate_gate, posegate_step};
-use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
+use super::memory::{Plain, Storage, bytes_apart, object, read, separate};
 use super::report::no_report;
 use super::{posegate_belief, posegate_report, posegate_source, posegate_status};
 use posegate::gate::Reason;
@@ -102,11 +103,23 @@ pub struct posegate_tracked {
 }
 
 // SAFETY: numbers.
-unsafe impl Plain for posegate_tracked {}
+unsafe impl Plain for posegate_tracked {
+    const DENIED: Self = Self::without(Reason::Silent);
+}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_tracker_settings {}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_increment {}
+
+impl posegate_tracked {
+    const fn without(reason: Reason) -> Self {
+        Self {
+            evidence: posegate_evidence::NONE,
+            reason: reason.code() as u32,
+            reserved: 0,
+        }
+    }
+}
 
 impl posegate_odometry_errors {
     const fn errors(&self) -> OdometryErrors {
@@ -169,35 +182,27 @@ pub unsafe extern "C" fn posegate_tracker_init(
     settings: *const posegate_tracker_settings,
 ) -> posegate_status {
     // SAFETY: the caller's promise. The table is not borrowed for longer than the call.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, settings).and(disjoint(
-            tracker,
-            size_of::<posegate_tracker>(),
-            table,
-            length,
-        ));
-        let given = read(settings);
-        let held = take(tracker);
-        let (held, given) = (held?, given?);
-        apart?;
-        let table = Table::parse(bytes(table, length)?)?;
-        let source = given.source.source()?;
-        // Odometry without any error does not exist: the errors were forgotten.
-        if given.errors.errors() == OdometryErrors::NONE {
-            return Err(posegate_status::Odometry);
-        }
-        let made = Tracker::new(TrackerSettings {
-            errors: given.errors.errors(),
-            bounds: source.motion,
-            trust: source.trust,
-            radius_squared: table.radius_squared(),
-            maximum_gap_ms: given.maximum_gap_ms,
-            maximum_fix_age_ms: given.maximum_fix_age_ms,
-        });
-        held.write(made.ok_or(posegate_status::Odometry)?);
-        close(tracker);
-        Ok(())
-    })
+    unsafe {
+        init(tracker, || {
+            let given = read(settings)?;
+            separate(tracker, settings)?;
+            let table = Table::parse(bytes_apart(tracker, table, length)?)?;
+            let source = given.source.source()?;
+            // Odometry without any error does not exist: the errors were forgotten.
+            if given.errors.errors() == OdometryErrors::NONE {
+                return Err(posegate_status::Odometry);
+            }
+            let made = Tracker::new(TrackerSettings {
+                errors: given.errors.errors(),
+                bounds: source.motion,
+                trust: source.trust,
+                radius_squared: table.radius_squared(),
+                maximum_gap_ms: given.maximum_gap_ms,
+                maximum_fix_age_ms: given.maximum_fix_age_ms,
+            });
+            made.ok_or(posegate_status::Odometry)
+        })
+    }
 }
 
 /// Takes an increment of the odometry. Writes 0, or the `posegate_reason` that breaks the path:
@@ -216,31 +221,21 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     reason: *mut u32,
 ) -> posegate_status {
     const JUMP: u32 = Reason::OdometryJump.code() as u32;
-    // SAFETY: the caller's promise; sealed storage has been written.
+    // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, increment).and(separate(tracker, reason));
-        let given = read(increment);
-        let written = write(reason, JUMP);
-        apart?;
-        let held = &mut *open(tracker)?;
-        let of = |given: posegate_increment| {
-            Increment::of(
-                given.ahead_m,
-                given.left_m,
-                given.turn_rad,
-                [given.begins_ms, given.stamp_ms],
-            )
-            .ok_or(posegate_status::BadValue)
-        };
-        let taken = match given.and_then(of) {
-            Ok(increment) => held.odometry(increment),
-            Err(status) => {
-                held.forget();
-                return Err(status);
+        let given = read(increment).and_then(|given| {
+            let times = [given.begins_ms, given.stamp_ms];
+            Increment::of(given.ahead_m, given.left_m, given.turn_rad, times)
+                .ok_or(posegate_status::BadValue)
+        });
+        act(apart, reason, JUMP, || {
+            let tracker = object(tracker)?;
+            if given.is_err() {
+                tracker.forget();
             }
-        };
-        written?;
-        write(reason, code(taken))
+            Ok(code(tracker.odometry(given?)))
+        })
     })
 }
 
@@ -254,13 +249,13 @@ pub unsafe extern "C" fn posegate_tracker_reach(
     tracker: *mut posegate_tracker,
     reach_ms: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, reach_ms);
-        write(reach_ms, 0)?;
-        apart?;
-        write(reach_ms, (*open(tracker)?).reach_ms())
-    })
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer(reach_ms, || {
+            separate(tracker, reach_ms)?;
+            Ok(object(tracker)?.reach_ms())
+        })
+    }
 }
 
 /// Takes a fix, also a late one: it is carried along the increments since its stamp. All fixes come from one source, each with
@@ -277,23 +272,18 @@ pub unsafe extern "C" fn posegate_tracker_fix(
     report: *const posegate_report,
     reason: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, report).and(separate(tracker, reason));
-        let report = read(report).and_then(|report| report.report());
-        write(reason, u32::from(Reason::Silent.code()))?;
-        apart?;
-        let held = &mut *open(tracker)?;
-        let taken = match &report {
-            Ok(report) => code(held.fix(report)),
-            Err(_) => {
-                held.drop_fix();
-                u32::from(Reason::Silent.code())
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer_or(reason, u32::from(Reason::Silent.code()), || {
+            separate(tracker, report).and(separate(tracker, reason))?;
+            let tracker = object(tracker)?;
+            let report = read(report).and_then(|report| report.report());
+            if report.is_err() {
+                tracker.drop_fix();
             }
-        };
-        write(reason, taken)?;
-        report.map(|_| ())
-    })
+            Ok(code(tracker.fix(&report?)))
+        })
+    }
 }
 
 /// Writes the report for now: the newest fix, carried to the newest odometry. For records, margins and monitors; a control cycle calls
@@ -310,26 +300,20 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
     now_ms: u32,
     tracked: *mut posegate_tracked,
 ) -> posegate_status {
-    let of = |found: &Result<Tracked, Reason>| match found {
-        Ok(found) => posegate_tracked {
-            evidence: posegate_evidence::of(found),
-            reason: 0,
-            reserved: 0,
-        },
-        Err(reason) => posegate_tracked {
-            evidence: posegate_evidence::NONE,
-            reason: u32::from(reason.code()),
-            reserved: 0,
-        },
-    };
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, tracked);
-        write(tracked, of(&Err(Reason::Silent)))?;
-        apart?;
-        let found = (*open(tracker)?).tracked(now_ms);
-        write(tracked, of(&found))
-    })
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer(tracked, || {
+            separate(tracker, tracked)?;
+            Ok(match object(tracker)?.tracked(now_ms) {
+                Ok(found) => posegate_tracked {
+                    evidence: posegate_evidence::of(&found),
+                    reason: 0,
+                    reserved: 0,
+                },
+                Err(reason) => posegate_tracked::without(reason),
+            })
+        })
+    }
 }
 
 /// Evaluates the newest fix, carried to the newest odometry, at the controller's time `now_ms`: the step of a control cycle between two
@@ -350,39 +334,37 @@ pub unsafe extern "C" fn posegate_gate_step_tracked(
     tracker: *mut posegate_tracker,
     step: *mut posegate_step,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written. The two storages are apart, so both objects may be used at once.
+    // SAFETY: the caller's promise. The two storages are apart, so both objects may be used at once.
     posegate_status::of(|| unsafe {
         let apart = separate(gate, step)
             .and(separate(gate, tracker))
             .and(separate(tracker, gate));
         // A tracker that the step shares is no longer initialised, so the gate closes.
         let of_tracker = separate(tracker, step);
-        let written = write(step, posegate_step::DENIED);
-        apart?;
-        let tracker = open(tracker);
-        let gate = held(gate)?;
-        let found = match &tracker {
-            Ok(tracker) => {
-                let tracker = &mut **tracker;
-                // The gate may have another table since the tracker was initialised.
-                if let Ok(table) = gate.table() {
-                    tracker.cover(table.radius_squared());
+        let mut tracker = object(tracker);
+        act(apart, step, posegate_step::DENIED, || {
+            let gate = held(gate)?;
+            let found = match &mut tracker {
+                Ok(tracker) => {
+                    // The gate may have another table since the tracker was initialised.
+                    if let Ok(table) = gate.table() {
+                        tracker.cover(table.radius_squared());
+                    }
+                    tracker.tracked(now_ms)
                 }
-                tracker.tracked(now_ms)
+                Err(_) => Err(Reason::Silent),
+            };
+            let mut result = match &found {
+                Ok(tracked) => gate.step_on(now_ms, &tracked.evidence()),
+                Err(_) if tracker.is_ok() => gate.tick(now_ms),
+                Err(_) => gate.step(now_ms, &no_report()),
+            };
+            if let Err(reason) = found {
+                result.verdict = Err(reason);
             }
-            Err(_) => Err(Reason::Silent),
-        };
-        let mut result = match &found {
-            Ok(tracked) => gate.step_on(now_ms, &tracked.evidence()),
-            Err(_) if tracker.is_ok() => gate.tick(now_ms),
-            Err(_) => gate.step(now_ms, &no_report()),
-        };
-        if let Err(reason) = found {
-            result.verdict = Err(reason);
-        }
-        of_tracker?;
-        written?;
-        write(step, posegate_step::of(result))?;
+            of_tracker?;
+            Ok(posegate_step::of(result))
+        })?;
         tracker.map(|_| ())
     })
 }
