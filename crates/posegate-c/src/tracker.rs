@@ -11,6 +11,9 @@ use posegate::report::Report;
 use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
 
+// The core's errors are plain numbers in the layout of C. `cbindgen.toml` has their name, too.
+pub use posegate::track::OdometryErrors as posegate_odometry_errors;
+
 /// Number of 64-bit words of a `posegate_tracker`.
 pub const POSEGATE_TRACKER_WORDS: usize = 192;
 /// Number of increments that a tracker keeps; those that together last at most 8 ms are kept as one. A fix with a stamp before the oldest
@@ -33,35 +36,12 @@ unsafe impl Storage for posegate_tracker {
     const MARK: u32 = 0x7472_6163;
 }
 
-/// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
-/// a bound: the share of every movement that may be wrong in the worst direction. Lengths are those of the path. No value may be below zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct posegate_odometry_errors {
-    /// Standard deviation of the position on each axis, metres per root of a metre driven.
-    pub m_per_sqrt_m: f64,
-    /// Standard deviation of the heading, radians per root of a radian turned.
-    pub rad_per_sqrt_rad: f64,
-    /// Standard deviation of the heading, radians per root of a metre driven.
-    pub rad_per_sqrt_m: f64,
-    /// Standard deviation of the position on each axis, metres per root of a second.
-    pub m_per_sqrt_s: f64,
-    /// Standard deviation of the heading, radians per root of a second.
-    pub rad_per_sqrt_s: f64,
-    /// The share of a driven length that may be wrong, in any direction; below 1.
-    pub slip: f64,
-    /// The share of a turn that may be wrong, in either direction; below 1.
-    pub turn_slip: f64,
-    /// The additional turn that may be wrong, radians per metre driven.
-    pub turn_slip_per_m: f64,
-}
-
 /// The settings of a tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_tracker_settings {
     /// The errors of the odometry.
-    pub errors: posegate_odometry_errors,
+    pub errors: OdometryErrors,
     /// The source of the fixes: the trust in its covariances, and the largest speeds of the robot (a larger increment is a
     /// jump). The tracker applies the trust, so the gate's source of the carried reports has inflation 1 and all terms filled. Its
     /// frame is not used.
@@ -121,21 +101,6 @@ impl posegate_tracked {
     }
 }
 
-impl posegate_odometry_errors {
-    const fn errors(&self) -> OdometryErrors {
-        OdometryErrors {
-            m_per_sqrt_m: self.m_per_sqrt_m,
-            rad_per_sqrt_rad: self.rad_per_sqrt_rad,
-            rad_per_sqrt_m: self.rad_per_sqrt_m,
-            m_per_sqrt_s: self.m_per_sqrt_s,
-            rad_per_sqrt_s: self.rad_per_sqrt_s,
-            slip: self.slip,
-            turn_slip: self.turn_slip,
-            turn_slip_per_m: self.turn_slip_per_m,
-        }
-    }
-}
-
 impl posegate_report {
     const fn of(report: &Report) -> Self {
         Self {
@@ -189,11 +154,11 @@ pub unsafe extern "C" fn posegate_tracker_init(
             let table = Table::parse(bytes_apart(tracker, table, length)?)?;
             let source = given.source.source()?;
             // Odometry without any error does not exist: the errors were forgotten.
-            if given.errors.errors() == OdometryErrors::NONE {
+            if given.errors == OdometryErrors::NONE {
                 return Err(posegate_status::Odometry);
             }
             let made = Tracker::new(TrackerSettings {
-                errors: given.errors.errors(),
+                errors: given.errors,
                 bounds: source.motion,
                 trust: source.trust,
                 radius_squared: table.radius_squared(),
