@@ -28,10 +28,10 @@ pub(super) unsafe fn answer_or<A: Plain>(
 ) -> posegate_status {
     posegate_status::of(|| {
         check(to)?;
-        let made = made();
-        // SAFETY: the caller's promise.
-        unsafe { write(to, *made.as_ref().unwrap_or(&denied)) }?;
-        made.map(|_| ())
+        // SAFETY: checked, except for the caller's promise.
+        made()
+            .map(|answer| unsafe { to.write(answer) })
+            .inspect_err(|_| unsafe { to.write(denied) })
     })
 }
 
@@ -40,20 +40,20 @@ pub(super) unsafe fn answer_or<A: Plain>(
 ///
 /// # Safety
 /// As for [`write`].
-pub(super) unsafe fn act<A: Plain>(
+pub(super) unsafe fn act<A: Plain, M: Into<A>>(
     apart: Done,
     to: *mut A,
     denied: A,
-    made: impl FnOnce() -> Result<A, posegate_status>,
+    made: impl FnOnce() -> Result<M, posegate_status>,
 ) -> Done {
     // SAFETY: the caller's promise.
-    unsafe {
-        let written = write(to, denied);
-        apart?;
-        let made = made();
-        written?;
-        write(to, made?)
-    }
+    let written = unsafe { write(to, denied) };
+    apart?;
+    let made = made();
+    written?;
+    // SAFETY: it was written before.
+    unsafe { to.write(made?.into()) };
+    Ok(())
 }
 
 /// Initialises storage with an object. After an error the storage is not initialised.

@@ -41,9 +41,13 @@ pub unsafe extern "C" fn posegate_clock_init(
     most_still: u32,
     count: u32,
 ) -> posegate_status {
-    let made = Clock::new(ticks_per_s, counter_bits, most_still, count);
     // SAFETY: the caller's promise.
-    unsafe { init(clock, || made.ok_or(posegate_status::BadValue)) }
+    unsafe {
+        init(clock, || {
+            let made = Clock::new(ticks_per_s, counter_bits, most_still, count);
+            made.ok_or(posegate_status::BadValue)
+        })
+    }
 }
 
 /// Takes the present count and writes the time in milliseconds. Call it in every control cycle, at least once per wrap of the counter: two wraps

@@ -1,7 +1,7 @@
 //! A report with its other hypotheses, and with the bounded slip of its odometry.
 
 use super::memory::{Plain, check, read, unused};
-use super::report::NO_ESTIMATE;
+use super::report::no_estimate;
 use super::{posegate_belief, posegate_report, posegate_status, posegate_verdict};
 use posegate::gate::{Evidence, MOST_HYPOTHESES};
 use posegate::report::{PoseEstimate, Report};
@@ -96,7 +96,7 @@ impl Read {
             if count > POSEGATE_OTHERS {
                 return Err(posegate_status::BadLength);
             }
-            let mut others = [NO_ESTIMATE; POSEGATE_OTHERS];
+            let mut others = [no_estimate(); POSEGATE_OTHERS];
             let mut given = (&raw const (*evidence).others).cast::<posegate_belief>();
             for other in others.iter_mut().take(count) {
                 *other = read(given)?.belief()?;
@@ -111,10 +111,8 @@ impl Read {
                     read(&raw const (*evidence).beside_q24)?,
                 ),
                 elsewhere: Risk::from_q32(read(&raw const (*evidence).elsewhere_q32)?),
-                since_fix_ms: match read(&raw const (*evidence).since_fix_ms)? {
-                    0 => None,
-                    since_fix_ms => Some(since_fix_ms),
-                },
+                since_fix_ms: Some(read(&raw const (*evidence).since_fix_ms)?)
+                    .filter(|since_fix_ms| *since_fix_ms != 0),
             })
         }
     }

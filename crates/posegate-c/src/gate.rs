@@ -3,6 +3,7 @@
 use super::call::{act, answer};
 use super::evidence::Read;
 use super::memory::{Plain, Storage, bytes, check, close, disjoint, open, read, separate, take};
+use super::reason::code;
 use super::report::no_report;
 use super::settings::{POSEGATE_MOST_SOURCES, POSEGATE_NAME_LENGTH, name};
 use super::status::Done;
@@ -171,14 +172,12 @@ impl posegate_state {
     }
 }
 
-impl posegate_step {
-    pub(super) fn of(step: Step) -> Self {
+impl From<Step> for posegate_step {
+    fn from(step: Step) -> Self {
         Self {
             permission: posegate_permission::of(step.permission),
             state: posegate_state::of(step.state),
-            reason: step
-                .verdict
-                .map_or_else(|reason| u32::from(reason.code()), |()| 0),
+            reason: code(step.verdict),
         }
     }
 }
@@ -246,13 +245,12 @@ unsafe fn stepped(
     // SAFETY: the caller's promise.
     unsafe {
         let apart = apart.and(separate(gate, step));
-        act(apart, step, posegate_step::DENIED, || {
-            Ok(posegate_step::of(by(held(gate)?)))
-        })
+        act(apart, step, posegate_step::DENIED, || Ok(by(held(gate)?)))
     }
 }
 
 /// Returns a digest of all settings.
+#[inline(never)]
 fn digest(settings: &Settings<'_>) -> u32 {
     let Settings {
         task,
@@ -332,7 +330,7 @@ unsafe fn fill(
         *source = given.source()?;
     }
     let (task, length) = name(&given.task);
-    let (restart, look_at) = (given.restart()?, given.look_at());
+    let restart = given.restart()?;
     let permits = u16::try_from(given.permits_in_a_row);
     let permits_in_a_row = permits.map_err(|_| posegate_status::PermitsInARow)?;
     // SAFETY: the caller's promise. The borrowed settings have been written, are not written again while the gate is in
@@ -354,8 +352,11 @@ unsafe fn fill(
             inhibit_hold_ms: given.inhibit_hold_ms,
             permits_in_a_row,
             restart,
-            most_runs: given.most_runs(),
-            look_at,
+            most_runs: match given.most_runs {
+                0 => const { Settings::for_source(0, 0).most_runs },
+                runs => runs,
+            },
+            look_at: Some(given.look_at_tag).filter(|tag| *tag != POSEGATE_NO_TAG),
         });
         let settings: &'static Settings<'static> = &(*held).settings;
         (&raw mut (*held).digest).write(digest(settings));
@@ -486,11 +487,14 @@ pub unsafe extern "C" fn posegate_gate_step(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(gate, report);
+        let mut valid = Ok(());
         let report = read(report).and_then(|report| report.report());
-        stepped(gate, apart, step, |gate| {
-            gate.step(now_ms, &report.unwrap_or(no_report()))
-        })?;
-        report.map(|_| ())
+        let report = report.unwrap_or_else(|status| {
+            valid = Err(status);
+            no_report()
+        });
+        stepped(gate, apart, step, |gate| gate.step(now_ms, &report))?;
+        valid
     })
 }
 

@@ -15,8 +15,8 @@
 //! - **What cannot be checked** is the caller's promise. A pointer that is neither null nor misaligned is valid for
 //!   its type and the given length. Storage is used by one context at a time. A table outlives the gate on it.
 //!
-//! This is the only library with unsafe code. Pointers are dereferenced only in `memory.rs`, and in the gate, whose
-//! settings are in the same storage.
+//! This is the only library with unsafe code. Pointers are dereferenced only in `memory.rs` and `call.rs`, and in the gate, whose
+//! settings are in the same storage. `call.rs` has the order of reads and writes of every call.
 //!
 //! # The archive
 //! ```text

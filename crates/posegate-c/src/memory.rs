@@ -1,4 +1,4 @@
-//! Pointers from C: checked, and dereferenced only here.
+//! Pointers from C: checked, read and written.
 
 use super::posegate_status;
 use super::status::Done;
@@ -89,13 +89,18 @@ fn disjoint_addresses(a: usize, a_bytes: usize, b: usize, b_bytes: usize) -> Don
     }
 }
 
-/// Refuses an argument that shares a byte with storage. The storage is then no longer initialised, because a
+/// Refuses an argument that shares a byte with storage.
+pub(super) fn apart<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
+    disjoint(storage, size_of::<S>(), other, size_of::<T>())
+}
+
+/// Refuses an argument that shares a byte with storage in use. The storage is then no longer initialised, because a
 /// write to the argument would damage its object.
 ///
 /// # Safety
 /// As for [`write`].
 pub(super) unsafe fn separate<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
-    let apart = disjoint(storage, size_of::<S>(), other, size_of::<T>());
+    let apart = apart(storage, other);
     if apart.is_err() {
         // SAFETY: the caller's promise.
         unsafe { unseal(storage) };
@@ -202,16 +207,6 @@ pub(super) unsafe fn bytes_apart<'a, S: Storage>(
     // SAFETY: the caller's promise.
     let bytes = unsafe { bytes(from, length) }?;
     disjoint(storage, size_of::<S>(), from, length).map(|()| bytes)
-}
-
-/// Returns the place of an element of an array.
-///
-/// # Safety
-/// The array has more than `index` elements.
-pub(super) unsafe fn element<T>(array: *mut T, index: usize) -> Result<*mut T, posegate_status> {
-    check(array)?;
-    // SAFETY: within the array, by the caller's promise.
-    Ok(unsafe { array.add(index) })
 }
 
 /// Marks storage as not initialised, and returns the place of its object.

@@ -3,6 +3,11 @@
 use core::ffi::c_char;
 use posegate::gate::Reason;
 
+/// Returns 0, or the code of a reason.
+pub(super) fn code(outcome: Result<(), Reason>) -> u32 {
+    outcome.map_or_else(|reason| u32::from(reason.code()), |()| 0)
+}
+
 /// Returns the text of a code, or an empty text for a code without a reason.
 fn text(texts: &'static str, reason: u32) -> *const c_char {
     let place = reason

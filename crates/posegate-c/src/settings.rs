@@ -244,18 +244,4 @@ impl posegate_settings {
             _ => Err(posegate_status::Restart),
         }
     }
-
-    pub(super) const fn most_runs(&self) -> u32 {
-        match self.most_runs {
-            0 => const { Settings::for_source(0, 0).most_runs },
-            runs => runs,
-        }
-    }
-
-    pub(super) const fn look_at(&self) -> Option<u32> {
-        match self.look_at_tag {
-            POSEGATE_NO_TAG => None,
-            tag => Some(tag),
-        }
-    }
 }

@@ -3,7 +3,8 @@
 use super::call::{act, answer, answer_or, init};
 use super::evidence::posegate_evidence;
 use super::gate::{held, posegate_gate, posegate_step};
-use super::memory::{Plain, Storage, bytes_apart, object, read, separate};
+use super::memory::{Plain, Storage, apart, bytes_apart, object, read, separate};
+use super::reason::code;
 use super::report::no_report;
 use super::{posegate_belief, posegate_report, posegate_source, posegate_status};
 use posegate::gate::Reason;
@@ -84,22 +85,16 @@ pub struct posegate_tracked {
 
 // SAFETY: numbers.
 unsafe impl Plain for posegate_tracked {
-    const DENIED: Self = Self::without(Reason::Silent);
+    const DENIED: Self = Self {
+        evidence: posegate_evidence::NONE,
+        reason: Reason::Silent.code() as u32,
+        reserved: 0,
+    };
 }
 // SAFETY: numbers.
 unsafe impl Plain for posegate_tracker_settings {}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_increment {}
-
-impl posegate_tracked {
-    const fn without(reason: Reason) -> Self {
-        Self {
-            evidence: posegate_evidence::NONE,
-            reason: reason.code() as u32,
-            reserved: 0,
-        }
-    }
-}
 
 impl posegate_report {
     const fn of(report: &Report) -> Self {
@@ -121,14 +116,9 @@ impl posegate_evidence {
             other_count: 0,
             beside_um: tracked.beside.translation_um().unsigned_abs(),
             beside_q24: tracked.beside.yaw_q24().unsigned_abs(),
-            ..Self::NONE
+            ..Self::ZERO
         }
     }
-}
-
-/// Returns 0, or the code of a reason.
-fn code(outcome: Result<(), Reason>) -> u32 {
-    outcome.map_or_else(|reason| u32::from(reason.code()), |()| 0)
 }
 
 /// Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table. With several tables, give the one with
@@ -150,7 +140,7 @@ pub unsafe extern "C" fn posegate_tracker_init(
     unsafe {
         init(tracker, || {
             let given = read(settings)?;
-            separate(tracker, settings)?;
+            apart(tracker, settings)?;
             let table = Table::parse(bytes_apart(tracker, table, length)?)?;
             let source = given.source.source()?;
             // Odometry without any error does not exist: the errors were forgotten.
@@ -189,17 +179,21 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, increment).and(separate(tracker, reason));
-        let given = read(increment).and_then(|given| {
+        let given = read(increment);
+        let of = |given: posegate_increment| {
             let times = [given.begins_ms, given.stamp_ms];
             Increment::of(given.ahead_m, given.left_m, given.turn_rad, times)
                 .ok_or(posegate_status::BadValue)
-        });
+        };
         act(apart, reason, JUMP, || {
             let tracker = object(tracker)?;
-            if given.is_err() {
-                tracker.forget();
+            match given.and_then(of) {
+                Ok(increment) => Ok(code(tracker.odometry(increment))),
+                Err(status) => {
+                    tracker.forget();
+                    Err(status)
+                }
             }
-            Ok(code(tracker.odometry(given?)))
         })
     })
 }
@@ -242,11 +236,13 @@ pub unsafe extern "C" fn posegate_tracker_fix(
         answer_or(reason, u32::from(Reason::Silent.code()), || {
             separate(tracker, report).and(separate(tracker, reason))?;
             let tracker = object(tracker)?;
-            let report = read(report).and_then(|report| report.report());
-            if report.is_err() {
-                tracker.drop_fix();
+            match read(report).and_then(|report| report.report()) {
+                Ok(report) => Ok(code(tracker.fix(&report))),
+                Err(status) => {
+                    tracker.drop_fix();
+                    Err(status)
+                }
             }
-            Ok(code(tracker.fix(&report?)))
         })
     }
 }
@@ -275,7 +271,10 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
                     reason: 0,
                     reserved: 0,
                 },
-                Err(reason) => posegate_tracked::without(reason),
+                Err(reason) => posegate_tracked {
+                    reason: u32::from(reason.code()),
+                    ..posegate_tracked::DENIED
+                },
             })
         })
     }
@@ -328,7 +327,7 @@ pub unsafe extern "C" fn posegate_gate_step_tracked(
                 result.verdict = Err(reason);
             }
             of_tracker?;
-            Ok(posegate_step::of(result))
+            Ok(result)
         })?;
         tracker.map(|_| ())
     })

@@ -2,7 +2,7 @@
 
 use super::call::{answer, init};
 use super::memory::{
-    Plain, Storage, bytes, element, object, open, read, separate, separate_from_all, unused, write,
+    Plain, Storage, bytes, check, object, open, read, separate, separate_from_all, unused, write,
 };
 use super::{POSEGATE_PERMIT, posegate_belief, posegate_judge, posegate_status, posegate_verdict};
 use posegate::contain::Margin;
@@ -141,16 +141,18 @@ impl posegate_request {
 
 impl posegate_reply {
     fn reply(&self) -> Option<Reply> {
-        const ERRORS: [WireError; 4] = [
-            WireError::Frame,
-            WireError::Checksum,
-            WireError::Content,
-            WireError::Table,
-        ];
-        let is = |error: &WireError| posegate_status::from(*error) as i32 == self.status;
+        const NONE: i32 = posegate_status::Ok as i32;
+        const FRAME: i32 = posegate_status::WireFrame as i32;
+        const CHECKSUM: i32 = posegate_status::WireChecksum as i32;
+        const CONTENT: i32 = posegate_status::WireContent as i32;
+        const TABLE: i32 = posegate_status::WireTable as i32;
         let verdict = match self.status {
-            0 => Ok(self.verdict.decode()?),
-            _ => Err(ERRORS.into_iter().find(is)?),
+            NONE => Ok(self.verdict.decode()?),
+            FRAME => Err(WireError::Frame),
+            CHECKSUM => Err(WireError::Checksum),
+            CONTENT => Err(WireError::Content),
+            TABLE => Err(WireError::Table),
+            _ => return None,
         };
         Some(Reply {
             sequence: u16::try_from(self.sequence).ok()?,
@@ -281,7 +283,8 @@ pub unsafe extern "C" fn posegate_request_judge(
             if index >= count {
                 return Err(posegate_status::WireTable);
             }
-            let judge: &Evaluator<'_> = &*open(element(storages, index)?)?;
+            check(judges)?;
+            let judge: &Evaluator<'_> = &*open(storages.wrapping_add(index))?;
             // `judge` is the only one in the slice.
             let asked = Request {
                 table: 0,
