@@ -1,9 +1,9 @@
 //! The tracker: a fix carried forward by odometry, in caller-owned storage.
 
-use super::call::{act, answer, answer_or, init};
+use super::call::{act, answer, answer_or};
 use super::evidence::posegate_evidence;
 use super::gate::{held, posegate_gate, posegate_step};
-use super::memory::{Plain, Storage, apart, bytes_apart, object, read, separate};
+use super::memory::{Plain, Storage, apart, bytes_apart, close, object, read, separate, take};
 use super::reason::code;
 use super::report::no_report;
 use super::{posegate_belief, posegate_report, posegate_source, posegate_status};
@@ -137,27 +137,29 @@ pub unsafe extern "C" fn posegate_tracker_init(
     settings: *const posegate_tracker_settings,
 ) -> posegate_status {
     // SAFETY: the caller's promise. The table is not borrowed for longer than the call.
-    unsafe {
-        init(tracker, || {
-            let given = read(settings)?;
-            apart(tracker, settings)?;
-            let table = Table::parse(bytes_apart(tracker, table, length)?)?;
-            let source = given.source.source()?;
-            // Odometry without any error does not exist: the errors were forgotten.
-            if given.errors == OdometryErrors::NONE {
-                return Err(posegate_status::Odometry);
-            }
-            let made = Tracker::new(TrackerSettings {
-                errors: given.errors,
-                bounds: source.motion,
-                trust: source.trust,
-                radius_squared: table.radius_squared(),
-                maximum_gap_ms: given.maximum_gap_ms,
-                maximum_fix_age_ms: given.maximum_fix_age_ms,
-            });
-            made.ok_or(posegate_status::Odometry)
-        })
-    }
+    // Not by `init`: the stack has no space for a second copy of the object.
+    posegate_status::of(|| unsafe {
+        let held = take(tracker)?;
+        let given = read(settings)?;
+        apart(tracker, settings)?;
+        let table = Table::parse(bytes_apart(tracker, table, length)?)?;
+        let source = given.source.source()?;
+        // Odometry without any error does not exist: the errors were forgotten.
+        if given.errors == OdometryErrors::NONE {
+            return Err(posegate_status::Odometry);
+        }
+        let made = Tracker::new(TrackerSettings {
+            errors: given.errors,
+            bounds: source.motion,
+            trust: source.trust,
+            radius_squared: table.radius_squared(),
+            maximum_gap_ms: given.maximum_gap_ms,
+            maximum_fix_age_ms: given.maximum_fix_age_ms,
+        });
+        held.write(made.ok_or(posegate_status::Odometry)?);
+        close(tracker);
+        Ok(())
+    })
 }
 
 /// Takes an increment of the odometry. Writes 0, or the `posegate_reason` that breaks the path:
