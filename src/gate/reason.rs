@@ -132,6 +132,13 @@ macro_rules! reasons {
             /// Every reason, in the order of the codes.
             pub const ALL: [Self; 49] = [$(Self::$variant),+];
 
+            /// The names of all reasons in the order of the codes, each with a zero after it, for C.
+            pub const NAMES: &'static str = concat!($($name, "\0"),+);
+            /// As [`Reason::NAMES`], for the sentences that say what happened.
+            pub const MEANINGS: &'static str = concat!($($meaning, "\0"),+);
+            /// As [`Reason::NAMES`], for the sentences that say what to do.
+            pub const ACTIONS: &'static str = concat!($($action, "\0"),+);
+
             /// Returns the name in `snake_case`, the same in every output.
             #[must_use]
             pub const fn name(self) -> &'static str {

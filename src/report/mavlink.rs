@@ -29,27 +29,29 @@ pub enum Axes {
     Down,
 }
 
-/// `VISION_POSITION_ESTIMATE` (102): the fields of the pose.
+/// MAVLink `VISION_POSITION_ESTIMATE` (102): the fields of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
 pub struct VisionPositionEstimate {
-    /// x, y, z as in the message, metres.
+    /// x, y, z in the message's axes, metres.
     pub position: [f32; 3],
-    /// Roll, pitch, yaw as in the message, radians.
+    /// Roll, pitch, yaw, radians.
     pub angles: [f32; 3],
     /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub covariance: [f32; 21],
 }
 
-/// `ODOMETRY` (331): the fields of the pose.
+/// MAVLink `ODOMETRY` (331): the fields of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
 pub struct Odometry {
-    /// x, y, z as in the message, metres.
+    /// x, y, z in the message's axes, metres.
     pub position: [f32; 3],
-    /// The orientation `q`: w, x, y, z.
+    /// The orientation: a quaternion w, x, y, z.
     pub q: [f32; 4],
-    /// `pose_covariance`, as in [`VisionPositionEstimate::covariance`].
+    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
     pub pose_covariance: [f32; 21],
 }
 

@@ -75,7 +75,8 @@ mod way;
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrackerSettings {
-    /// The errors of the odometry.
+    /// The errors of the odometry. Lengths and turns may be those that the robot drove or those that the odometry reported: the bounds hold
+    /// for the longer. A length is that of the path, not of the line between its ends.
     pub errors: OdometryErrors,
     /// The largest speeds of the robot. A larger increment is a jump.
     pub bounds: MotionBounds,

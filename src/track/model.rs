@@ -3,11 +3,11 @@
 use crate::motion::MotionBounds;
 use crate::num::{Float, Rounding, sqrt_ceil, wide};
 
-/// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip
-/// is a bound: the share of every movement that may be wrong in the worst direction. A length is that of the path, not of the line between
-/// its ends. Lengths and turns may be those that the robot drove or those that the odometry reported: the bounds hold for the longer.
+/// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
+/// a bound: the share of every movement that may be wrong in the worst direction. Lengths are those of the path. No value may be below zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
 pub struct OdometryErrors {
     /// Standard deviation of the position on each axis, metres per root of a metre driven.
     pub m_per_sqrt_m: f64,
@@ -27,6 +27,8 @@ pub struct OdometryErrors {
     pub turn_slip_per_m: f64,
 }
 
+// The header of C gets the struct alone.
+/// cbindgen:ignore
 impl OdometryErrors {
     /// No error at all; to be filled in.
     pub const NONE: Self = Self {

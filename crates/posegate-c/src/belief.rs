@@ -1,9 +1,15 @@
 //! A source's estimate of the robot's pose.
 
-use super::memory::{Plain, answer, read};
+use super::call::answer;
+use super::memory::{Plain, read};
 use super::posegate_status;
 use posegate::report::{Heading, PoseEstimate, mavlink, ros};
 use posegate::set::Uncertainty;
+
+// Messages are those of the core, which are plain numbers in the layout of C. `cbindgen.toml` has their names, too.
+pub use posegate::report::mavlink::Odometry as posegate_mavlink_odometry;
+pub use posegate::report::mavlink::VisionPositionEstimate as posegate_mavlink_vision;
+pub use posegate::report::ros::PoseWithCovariance as posegate_ros_pose;
 
 /// The form of an estimate's heading. 0 is not a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,42 +64,6 @@ pub struct posegate_belief {
     pub spread_kind: u32,
 }
 
-/// `geometry_msgs/PoseWithCovariance`, in the layout of `rosidl` in C.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct posegate_ros_pose {
-    /// `pose.position`: x, y, z, metres. z is ignored.
-    pub position: [f64; 3],
-    /// `pose.orientation`: x, y, z, w.
-    pub orientation: [f64; 4],
-    /// 6 x 6 by rows over x, y, z and rotations about the fixed axes x, y, z: m^2, m rad, rad^2.
-    pub covariance: [f64; 36],
-}
-
-/// MAVLink `ODOMETRY` (331): the fields of the pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct posegate_mavlink_odometry {
-    /// x, y, z in the message's axes, metres.
-    pub position: [f32; 3],
-    /// The orientation: a quaternion w, x, y, z.
-    pub q: [f32; 4],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
-    pub pose_covariance: [f32; 21],
-}
-
-/// MAVLink `VISION_POSITION_ESTIMATE` (102): the fields of the pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct posegate_mavlink_vision {
-    /// x, y, z in the message's axes, metres.
-    pub position: [f32; 3],
-    /// Roll, pitch, yaw, radians.
-    pub angles: [f32; 3],
-    /// Upper triangle by rows over x, y, z, roll, pitch, yaw: m^2, m rad, rad^2. NaN in the first entry means unknown.
-    pub covariance: [f32; 21],
-}
-
 /// An estimate in nine numbers, as in micro-ROS messages and CAN frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
@@ -118,28 +88,18 @@ pub struct posegate_compact {
     pub yaw_yaw: f32,
 }
 
-// SAFETY: numbers.
+// SAFETY: numbers. The zero has no form, so every function refuses it.
 unsafe impl Plain for posegate_belief {}
 // SAFETY: numbers.
-unsafe impl Plain for posegate_ros_pose {}
+unsafe impl Plain for ros::PoseWithCovariance {}
 // SAFETY: numbers.
-unsafe impl Plain for posegate_mavlink_odometry {}
+unsafe impl Plain for mavlink::Odometry {}
 // SAFETY: numbers.
-unsafe impl Plain for posegate_mavlink_vision {}
+unsafe impl Plain for mavlink::VisionPositionEstimate {}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_compact {}
 
 impl posegate_belief {
-    /// An estimate of no form, which every function refuses.
-    pub(super) const NONE: Self = Self {
-        x_m: 0.0,
-        y_m: 0.0,
-        heading: [0.0; 4],
-        spread: [0.0; 9],
-        heading_kind: 0,
-        spread_kind: 0,
-    };
-
     pub(super) const fn of(belief: &PoseEstimate) -> Self {
         let (heading_kind, heading) = match belief.heading {
             Heading::Radians(yaw) => (posegate_heading::Yaw, [yaw, 0.0, 0.0, 0.0]),
@@ -215,18 +175,14 @@ const fn axes(axes: u32) -> Result<mavlink::Axes, posegate_status> {
 /// Converts a message. After an error the estimate has no form.
 ///
 /// # Safety
-/// As for [`read`] and [`write`].
+/// As for [`read`] and [`answer`].
 unsafe fn convert<T: Plain>(
     message: *const T,
     belief: *mut posegate_belief,
     of: impl FnOnce(&T) -> Result<PoseEstimate, posegate_status>,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let made = read(message).and_then(|message| of(&message));
-        let made = made.map(|made| posegate_belief::of(&made));
-        answer(belief, made, posegate_belief::NONE)
-    })
+    unsafe { answer(belief, || Ok(posegate_belief::of(&of(&read(message)?)?))) }
 }
 
 /// Converts a ROS message to an estimate: its marginal over x, y and yaw.
@@ -235,18 +191,11 @@ unsafe fn convert<T: Plain>(
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_ros(
-    message: *const posegate_ros_pose,
+    message: *const ros::PoseWithCovariance,
     belief: *mut posegate_belief,
 ) -> posegate_status {
-    let of = |message: &posegate_ros_pose| {
-        Ok(PoseEstimate::from(&ros::PoseWithCovariance {
-            position: message.position,
-            orientation: message.orientation,
-            covariance: message.covariance,
-        }))
-    };
     // SAFETY: the caller's promise.
-    unsafe { convert(message, belief, of) }
+    unsafe { convert(message, belief, |message| Ok(PoseEstimate::from(message))) }
 }
 
 /// Converts a MAVLink `ODOMETRY` to an estimate in axes with z up; `axes` is a `posegate_axes`.
@@ -257,20 +206,16 @@ pub unsafe extern "C" fn posegate_belief_from_ros(
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
-    message: *const posegate_mavlink_odometry,
+    message: *const mavlink::Odometry,
     axes: u32,
     belief: *mut posegate_belief,
 ) -> posegate_status {
-    let of = |message: &posegate_mavlink_odometry| {
-        let odometry = mavlink::Odometry {
-            position: message.position,
-            q: message.q,
-            pose_covariance: message.pose_covariance,
-        };
-        Ok(odometry.belief(self::axes(axes)?))
-    };
     // SAFETY: the caller's promise.
-    unsafe { convert(message, belief, of) }
+    unsafe {
+        convert(message, belief, |message| {
+            Ok(message.belief(self::axes(axes)?))
+        })
+    }
 }
 
 /// Converts a MAVLink `VISION_POSITION_ESTIMATE` to an estimate in axes with z up; `axes` is a
@@ -282,20 +227,16 @@ pub unsafe extern "C" fn posegate_belief_from_mavlink_odometry(
 /// Each pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_belief_from_mavlink_vision(
-    message: *const posegate_mavlink_vision,
+    message: *const mavlink::VisionPositionEstimate,
     axes: u32,
     belief: *mut posegate_belief,
 ) -> posegate_status {
-    let of = |message: &posegate_mavlink_vision| {
-        let vision = mavlink::VisionPositionEstimate {
-            position: message.position,
-            angles: message.angles,
-            covariance: message.covariance,
-        };
-        Ok(vision.belief(self::axes(axes)?))
-    };
     // SAFETY: the caller's promise.
-    unsafe { convert(message, belief, of) }
+    unsafe {
+        convert(message, belief, |message| {
+            Ok(message.belief(self::axes(axes)?))
+        })
+    }
 }
 
 /// Converts nine numbers to an estimate.
@@ -307,20 +248,10 @@ pub unsafe extern "C" fn posegate_belief_from_compact(
     message: *const posegate_compact,
     belief: *mut posegate_belief,
 ) -> posegate_status {
-    let of = |message: &posegate_compact| {
-        let posegate_compact {
-            x_m,
-            y_m,
-            yaw_rad,
-            xx,
-            xy,
-            x_yaw,
-            yy,
-            y_yaw,
-            yaw_yaw,
-        } = *message;
-        let numbers = [x_m, y_m, yaw_rad, xx, xy, x_yaw, yy, y_yaw, yaw_yaw];
-        Ok(PoseEstimate::compact(numbers))
+    let of = |m: &posegate_compact| {
+        Ok(PoseEstimate::compact([
+            m.x_m, m.y_m, m.yaw_rad, m.xx, m.xy, m.x_yaw, m.yy, m.y_yaw, m.yaw_yaw,
+        ]))
     };
     // SAFETY: the caller's promise.
     unsafe { convert(message, belief, of) }

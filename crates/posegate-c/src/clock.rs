@@ -1,6 +1,7 @@
 //! A counter of ticks as the milliseconds of a gate.
 
-use super::memory::{Storage, close, open, separate, take, write};
+use super::call::init;
+use super::memory::{Storage, object, separate, write};
 use super::posegate_status;
 use posegate::gate::Clock;
 
@@ -41,13 +42,12 @@ pub unsafe extern "C" fn posegate_clock_init(
     count: u32,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let held = take(clock)?;
-        let made = Clock::new(ticks_per_s, counter_bits, most_still, count);
-        held.write(made.ok_or(posegate_status::BadValue)?);
-        close(clock);
-        Ok(())
-    })
+    unsafe {
+        init(clock, || {
+            let made = Clock::new(ticks_per_s, counter_bits, most_still, count);
+            made.ok_or(posegate_status::BadValue)
+        })
+    }
 }
 
 /// Takes the present count and writes the time in milliseconds. Call it in every control cycle, at least once per wrap of the counter: two wraps
@@ -64,12 +64,12 @@ pub unsafe extern "C" fn posegate_clock_now(
     count: u32,
     now_ms: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
+    // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(clock, now_ms);
         write(now_ms, 0)?;
         apart?;
-        let clock = &mut *open(clock)?;
+        let clock = object(clock)?;
         write(now_ms, clock.now_ms(count))?;
         if clock.is_stopped() {
             return Err(posegate_status::ClockStopped);

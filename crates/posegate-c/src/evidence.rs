@@ -1,9 +1,10 @@
 //! A report with its other hypotheses, and with the bounded slip of its odometry.
 
-use super::memory::{Plain, read, unused};
+use super::memory::{Plain, check, read, unused};
+use super::report::no_estimate;
 use super::{posegate_belief, posegate_report, posegate_status, posegate_verdict};
 use posegate::gate::{Evidence, MOST_HYPOTHESES};
-use posegate::report::{Heading, PoseEstimate, Report};
+use posegate::report::{PoseEstimate, Report};
 use posegate::set::Growth;
 use posegate::task::Risk;
 
@@ -57,32 +58,15 @@ unsafe impl Plain for posegate_evidence {}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_examined {}
 
-impl posegate_examined {
-    pub(super) const DENIED: Self = Self {
-        verdict: posegate_verdict::DENIED,
-        hypothesis: 0,
-        reserved: 0,
-    };
-}
-
 impl posegate_evidence {
     /// Evidence of no form, which closes every gate.
     pub(super) const NONE: Self = Self {
         report: posegate_report {
-            belief: posegate_belief::NONE,
-            frame: 0,
             source: u32::MAX,
-            sequence: 0,
-            stamp_ms: 0,
-            reserved: 0,
+            ..Plain::ZERO
         },
-        others: [posegate_belief::NONE; POSEGATE_OTHERS],
         other_count: u32::MAX,
-        beside_um: 0,
-        beside_q24: 0,
-        elsewhere_q32: 0,
-        since_fix_ms: 0,
-        reserved: 0,
+        ..Self::ZERO
     };
 }
 
@@ -102,15 +86,9 @@ impl Read {
     /// # Safety
     /// As for [`read`].
     pub(super) unsafe fn from(evidence: *const posegate_evidence) -> Result<Self, posegate_status> {
-        const NONE: PoseEstimate = PoseEstimate {
-            x_m: 0.0,
-            y_m: 0.0,
-            heading: Heading::Radians(0.0),
-            spread: None,
-        };
         // SAFETY: the caller's promise; a null or misaligned pointer is refused before anything is read.
         unsafe {
-            super::memory::place(evidence.cast_mut())?;
+            check(evidence)?;
             let report = read(&raw const (*evidence).report)?.report()?;
             unused(read(&raw const (*evidence).reserved)?)?;
             let count = read(&raw const (*evidence).other_count)?;
@@ -118,7 +96,7 @@ impl Read {
             if count > POSEGATE_OTHERS {
                 return Err(posegate_status::BadLength);
             }
-            let mut others = [NONE; POSEGATE_OTHERS];
+            let mut others = [no_estimate(); POSEGATE_OTHERS];
             let mut given = (&raw const (*evidence).others).cast::<posegate_belief>();
             for other in others.iter_mut().take(count) {
                 *other = read(given)?.belief()?;
@@ -133,10 +111,8 @@ impl Read {
                     read(&raw const (*evidence).beside_q24)?,
                 ),
                 elsewhere: Risk::from_q32(read(&raw const (*evidence).elsewhere_q32)?),
-                since_fix_ms: match read(&raw const (*evidence).since_fix_ms)? {
-                    0 => None,
-                    since_fix_ms => Some(since_fix_ms),
-                },
+                since_fix_ms: Some(read(&raw const (*evidence).since_fix_ms)?)
+                    .filter(|since_fix_ms| *since_fix_ms != 0),
             })
         }
     }

@@ -1,11 +1,12 @@
 //! The gate: the state machine in caller-owned storage.
 
+use super::call::{act, answer};
 use super::evidence::Read;
-use super::memory::{
-    Plain, Storage, bytes, close, disjoint, open, place, read, separate, take, write,
-};
+use super::memory::{Plain, Storage, bytes, check, close, disjoint, open, read, separate, take};
+use super::reason::code;
 use super::report::no_report;
 use super::settings::{POSEGATE_MOST_SOURCES, POSEGATE_NAME_LENGTH, name};
+use super::status::Done;
 use super::{
     POSEGATE_NO_TAG, posegate_evidence, posegate_examined, posegate_permission, posegate_report,
     posegate_settings, posegate_status, posegate_verdict,
@@ -139,17 +140,21 @@ pub enum posegate_scrubbed {
 // SAFETY: integers.
 unsafe impl Plain for posegate_state {}
 // SAFETY: integers.
-unsafe impl Plain for posegate_step {}
+unsafe impl Plain for posegate_step {
+    const DENIED: Self = Self {
+        permission: posegate_permission::DENIED,
+        ..Self::ZERO
+    };
+}
 // SAFETY: integers.
-unsafe impl Plain for posegate_advice {}
+unsafe impl Plain for posegate_advice {
+    const DENIED: Self = Self {
+        kind: 0,
+        tag: POSEGATE_NO_TAG,
+    };
+}
 
 impl posegate_state {
-    const NOWHERE: Self = Self {
-        kind: 0,
-        reason: 0,
-        permits: 0,
-    };
-
     fn of(state: State) -> Self {
         let (kind, reason, permits) = match state {
             State::Inhibited(reason) => (posegate_state_kind::Inhibited, reason.code(), 0),
@@ -167,33 +172,20 @@ impl posegate_state {
     }
 }
 
-impl posegate_step {
-    pub(super) const DENIED: Self = Self {
-        permission: posegate_permission::DENIED,
-        state: posegate_state::NOWHERE,
-        reason: 0,
-    };
-
-    pub(super) fn of(step: Step) -> Self {
+impl From<Step> for posegate_step {
+    fn from(step: Step) -> Self {
         Self {
             permission: posegate_permission::of(step.permission),
             state: posegate_state::of(step.state),
-            reason: step
-                .verdict
-                .map_or_else(|reason| u32::from(reason.code()), |()| 0),
+            reason: code(step.verdict),
         }
     }
 }
 
 impl posegate_advice {
-    const NONE: Self = Self {
-        kind: 0,
-        tag: POSEGATE_NO_TAG,
-    };
-
     fn of(advice: Option<Advice>) -> Self {
         let (kind, tag) = match advice {
-            None => return Self::NONE,
+            None => return Self::DENIED,
             Some(Advice::Wait) => (posegate_advice_kind::Wait, None),
             Some(Advice::Relocalise) => (posegate_advice_kind::Relocalise, None),
             Some(Advice::LookAtTag(tag)) => (posegate_advice_kind::LookAtTag, Some(tag)),
@@ -240,7 +232,25 @@ pub(super) unsafe fn held<'a>(
     }
 }
 
+/// Asks an initialised gate, and writes the answer of a step. The gate is asked even if the answer cannot be written.
+///
+/// # Safety
+/// As for [`held`] and [`act`].
+unsafe fn stepped(
+    gate: *mut posegate_gate,
+    apart: Done,
+    step: *mut posegate_step,
+    by: impl FnOnce(&mut Gate<'static>) -> Step,
+) -> Done {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let apart = apart.and(separate(gate, step));
+        act(apart, step, posegate_step::DENIED, || Ok(by(held(gate)?)))
+    }
+}
+
 /// Returns a digest of all settings.
+#[inline(never)]
 fn digest(settings: &Settings<'_>) -> u32 {
     let Settings {
         task,
@@ -320,7 +330,7 @@ unsafe fn fill(
         *source = given.source()?;
     }
     let (task, length) = name(&given.task);
-    let (restart, look_at) = (given.restart()?, given.look_at());
+    let restart = given.restart()?;
     let permits = u16::try_from(given.permits_in_a_row);
     let permits_in_a_row = permits.map_err(|_| posegate_status::PermitsInARow)?;
     // SAFETY: the caller's promise. The borrowed settings have been written, are not written again while the gate is in
@@ -342,8 +352,11 @@ unsafe fn fill(
             inhibit_hold_ms: given.inhibit_hold_ms,
             permits_in_a_row,
             restart,
-            most_runs: given.most_runs(),
-            look_at,
+            most_runs: match given.most_runs {
+                0 => const { Settings::for_source(0, 0).most_runs },
+                runs => runs,
+            },
+            look_at: Some(given.look_at_tag).filter(|tag| *tag != POSEGATE_NO_TAG),
         });
         let settings: &'static Settings<'static> = &(*held).settings;
         (&raw mut (*held).digest).write(digest(settings));
@@ -402,7 +415,7 @@ pub unsafe extern "C" fn posegate_gate_init(
         let given = read(settings);
         let table = bytes(table, length);
         // A gate that was saved before does not match the counter any more, whether this call succeeds or not.
-        let counted = separate(gate, counter).and(place(counter));
+        let counted = separate(gate, counter).and(check(counter));
         if counted.is_ok() && (of_table.is_ok() || table.is_err()) {
             counter.write_volatile(counter.read_volatile().wrapping_add(1));
         }
@@ -473,18 +486,14 @@ pub unsafe extern "C" fn posegate_gate_step(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let apart = separate(gate, report).and(separate(gate, step));
+        let apart = separate(gate, report);
         let mut valid = Ok(());
         let report = read(report).and_then(|report| report.report());
-        let report = report.unwrap_or_else(|error| {
-            valid = Err(error);
+        let report = report.unwrap_or_else(|status| {
+            valid = Err(status);
             no_report()
         });
-        let written = write(step, posegate_step::DENIED);
-        apart?;
-        let result = held(gate).map(|gate| gate.step(now_ms, &report));
-        written?;
-        write(step, posegate_step::of(result?))?;
+        stepped(gate, apart, step, |gate| gate.step(now_ms, &report))?;
         valid
     })
 }
@@ -508,16 +517,12 @@ pub unsafe extern "C" fn posegate_gate_step_on(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let apart = separate(gate, evidence).and(separate(gate, step));
+        let apart = separate(gate, evidence);
         let read = Read::from(evidence);
-        let written = write(step, posegate_step::DENIED);
-        apart?;
-        let result = held(gate).map(|gate| match &read {
+        stepped(gate, apart, step, |gate| match &read {
             Ok(read) => gate.step_on(now_ms, &read.evidence()),
             Err(_) => gate.step(now_ms, &no_report()),
-        });
-        written?;
-        write(step, posegate_step::of(result?))?;
+        })?;
         read.map(|_| ())
     })
 }
@@ -537,14 +542,7 @@ pub unsafe extern "C" fn posegate_gate_tick(
     step: *mut posegate_step,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = separate(gate, step);
-        let written = write(step, posegate_step::DENIED);
-        apart?;
-        let result = held(gate).map(|gate| gate.tick(now_ms));
-        written?;
-        write(step, posegate_step::of(result?))
-    })
+    posegate_status::of(|| unsafe { stepped(gate, Ok(()), step, |gate| gate.tick(now_ms)) })
 }
 
 /// Checks the table again and restarts the gate, closed. This is the only way out of a latched fault. A reset is a
@@ -596,19 +594,14 @@ pub unsafe extern "C" fn posegate_gate_inhibit(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let apart = separate(gate, step);
-        let written = write(step, posegate_step::DENIED);
-        apart?;
         let reason = u8::try_from(reason).ok().and_then(Reason::from_code);
-        let result = held(gate).map(|gate| match reason {
+        stepped(gate, Ok(()), step, |gate| match reason {
             Some(reason) => gate.inhibit(now_ms, reason),
             None => {
                 gate.fault(Reason::MemoryDamaged);
                 gate.tick(now_ms)
             }
-        });
-        written?;
-        write(step, posegate_step::of(result?))?;
+        })?;
         reason.map(|_| ()).ok_or(posegate_status::BadValue)
     })
 }
@@ -650,17 +643,14 @@ pub unsafe extern "C" fn posegate_gate_scrub(
 ) -> posegate_status {
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
-        let apart = separate(gate, scrubbed);
-        let written = write(scrubbed, 0);
-        apart?;
-        let result = held(gate).map(|gate| gate.scrub(count));
-        written?;
-        let result = match result? {
-            ScrubProgress::UnderWay => posegate_scrubbed::UnderWay,
-            ScrubProgress::Whole => posegate_scrubbed::Whole,
-            ScrubProgress::Damaged => posegate_scrubbed::Damaged,
-        };
-        write(scrubbed, result as u32)
+        act(separate(gate, scrubbed), scrubbed, 0, || {
+            let progress = match held(gate)?.scrub(count) {
+                ScrubProgress::UnderWay => posegate_scrubbed::UnderWay,
+                ScrubProgress::Whole => posegate_scrubbed::Whole,
+                ScrubProgress::Damaged => posegate_scrubbed::Damaged,
+            };
+            Ok(progress as u32)
+        })
     })
 }
 
@@ -674,13 +664,12 @@ pub unsafe extern "C" fn posegate_gate_state(
     state: *mut posegate_state,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = separate(gate, state);
-        write(state, posegate_state::NOWHERE)?;
-        apart?;
-        let result = held(gate)?.state();
-        write(state, posegate_state::of(result))
-    })
+    unsafe {
+        answer(state, || {
+            separate(gate, state)?;
+            Ok(posegate_state::of(held(gate)?.state()))
+        })
+    }
 }
 
 /// Writes what to do if the gate is closed.
@@ -693,13 +682,12 @@ pub unsafe extern "C" fn posegate_gate_advice(
     advice: *mut posegate_advice,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = separate(gate, advice);
-        write(advice, posegate_advice::NONE)?;
-        apart?;
-        let result = held(gate)?.advice();
-        write(advice, posegate_advice::of(result))
-    })
+    unsafe {
+        answer(advice, || {
+            separate(gate, advice)?;
+            Ok(posegate_advice::of(held(gate)?.advice()))
+        })
+    }
 }
 
 /// Writes the verdict on a report's estimate with its margin and worst pose, at the cost of 30 to 500 decisions. For
@@ -714,15 +702,13 @@ pub unsafe extern "C" fn posegate_gate_examine(
     verdict: *mut posegate_verdict,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = separate(gate, report).and(separate(gate, verdict));
-        let report = read(report);
-        write(verdict, posegate_verdict::DENIED)?;
-        apart?;
-        let gate = held(gate)?;
-        let report = report?.report()?;
-        write(verdict, posegate_verdict::of(gate.examine(&report)))
-    })
+    unsafe {
+        answer(verdict, || {
+            separate(gate, report).and(separate(gate, verdict))?;
+            let gate = held(gate)?;
+            Ok(posegate_verdict::of(gate.examine(&read(report)?.report()?)))
+        })
+    }
 }
 
 /// Writes the verdict on a report with several hypotheses, or a report that a tracker has carried. The cost is that of
@@ -737,18 +723,16 @@ pub unsafe extern "C" fn posegate_gate_examine_on(
     examined: *mut posegate_examined,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = separate(gate, evidence).and(separate(gate, examined));
-        let read = Read::from(evidence);
-        write(examined, posegate_examined::DENIED)?;
-        apart?;
-        let gate = held(gate)?;
-        let (hypothesis, verdict) = gate.examine_on(&read?.evidence());
-        let result = posegate_examined {
-            verdict: posegate_verdict::of(verdict),
-            hypothesis: u32::from(hypothesis),
-            ..posegate_examined::DENIED
-        };
-        write(examined, result)
-    })
+    unsafe {
+        answer(examined, || {
+            separate(gate, evidence).and(separate(gate, examined))?;
+            let gate = held(gate)?;
+            let (hypothesis, verdict) = gate.examine_on(&Read::from(evidence)?.evidence());
+            Ok(posegate_examined {
+                verdict: posegate_verdict::of(verdict),
+                hypothesis: u32::from(hypothesis),
+                reserved: 0,
+            })
+        })
+    }
 }

@@ -1,10 +1,8 @@
 //! For recordings and benches only: evaluates single estimates, each on its own, as [`Evaluator`] does.
 
-use super::memory::{
-    Plain, Storage, bytes, close, disjoint, open, read, separate, take, unused, write,
-};
-use super::{posegate_belief, posegate_status, posegate_verdict};
-use posegate::contain::Margin;
+use super::call::{answer, init};
+use super::memory::{Plain, Storage, bytes_apart, open, read, separate, unused};
+use super::{POSEGATE_PERMIT, posegate_belief, posegate_status, posegate_verdict};
 use posegate::gate::Verdict;
 use posegate::recordings::Evaluator;
 use posegate::report::{Heading, PoseEstimate};
@@ -54,17 +52,6 @@ pub struct posegate_estimate {
 // SAFETY: numbers.
 unsafe impl Plain for posegate_estimate {}
 
-/// Returns the judge in storage.
-///
-/// # Safety
-/// As for [`open`], for as long as `'a`.
-pub(super) unsafe fn judge<'a>(
-    storage: *const posegate_judge,
-) -> Result<&'a Evaluator<'static>, posegate_status> {
-    // SAFETY: the caller's promise; nothing is written.
-    unsafe { Ok(&*open(storage.cast_mut())?) }
-}
-
 /// Returns the pose-set of an estimate. With a yaw in radians, the checks are in the order of [`PoseSet::gaussian`], as
 /// for requests.
 pub(super) fn pose_set(
@@ -106,21 +93,18 @@ pub unsafe extern "C" fn posegate_judge_init(
     maximum_age_ms: u32,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = disjoint(judge, size_of::<posegate_judge>(), table, length);
-        let held = take(judge)?;
-        let table = bytes(table, length)?;
-        apart?;
-        held.write(Evaluator::new(table, maximum_age_ms)?);
-        close(judge);
-        Ok(())
-    })
+    unsafe {
+        init(judge, || {
+            let table = bytes_apart(judge, table, length)?;
+            Ok(Evaluator::new(table, maximum_age_ms)?)
+        })
+    }
 }
 
 /// Evaluates an estimate and writes the verdict.
 ///
 /// # Safety
-/// As for [`open`], [`read`] and [`write`].
+/// As for [`open`], [`read`] and [`answer`].
 unsafe fn judged(
     judge: *const posegate_judge,
     estimate: *const posegate_estimate,
@@ -128,29 +112,26 @@ unsafe fn judged(
     by: impl FnOnce(&Evaluator<'_>, u32, u32, Result<PoseSet, InputError>) -> posegate_verdict,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let storage = judge.cast_mut();
-        let apart = separate(storage, estimate).and(separate(storage, verdict));
-        let estimate = read(estimate);
-        write(verdict, posegate_verdict::DENIED)?;
-        apart?;
-        let judge = self::judge(judge)?;
-        let estimate = estimate?;
-        unused(estimate.reserved)?;
-        let radius = match estimate.radius_squared_q16 {
-            0 => judge.radius_squared(),
-            raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,
-        };
-        let belief = estimate.belief.belief()?;
-        let is_gaussian = matches!(belief.spread, Some(Uncertainty::Gaussian(_)));
-        // A request may be stricter than the site, but not less strict.
-        if is_gaussian && !(radius.q16() >= judge.radius_squared().q16()) {
-            return Err(posegate_status::BadValue);
-        }
-        let set = pose_set(&belief, radius);
-        let result = by(judge, estimate.now_ms, estimate.stamp_ms, set);
-        write(verdict, result)
-    })
+    unsafe {
+        answer(verdict, || {
+            let storage = judge.cast_mut();
+            separate(storage, estimate).and(separate(storage, verdict))?;
+            let (judge, estimate) = (&*open(storage)?, read(estimate)?);
+            unused(estimate.reserved)?;
+            let radius = match estimate.radius_squared_q16 {
+                0 => judge.radius_squared(),
+                raw => RadiusSquared::from_q16(raw).ok_or(posegate_status::BadValue)?,
+            };
+            let belief = estimate.belief.belief()?;
+            let is_gaussian = matches!(belief.spread, Some(Uncertainty::Gaussian(_)));
+            // A request may be stricter than the site, but not less strict.
+            if is_gaussian && !(radius.q16() >= judge.radius_squared().q16()) {
+                return Err(posegate_status::BadValue);
+            }
+            let set = pose_set(&belief, radius);
+            Ok(by(judge, estimate.now_ms, estimate.stamp_ms, set))
+        })
+    }
 }
 
 /// For recordings and benches only.
@@ -170,11 +151,8 @@ pub unsafe extern "C" fn posegate_judge_permits(
 ) -> posegate_status {
     let by = |judge: &Evaluator<'_>, now, stamp, set| match judge.permits(now, stamp, set) {
         Ok(()) => posegate_verdict {
-            has_margin: 0,
-            margin_q16: 0,
-            ..posegate_verdict::of(Verdict::Permit {
-                margin: Margin::ONE,
-            })
+            verdict: POSEGATE_PERMIT,
+            ..Plain::ZERO
         },
         Err(reason) => posegate_verdict::of(Verdict::deny(reason)),
     };

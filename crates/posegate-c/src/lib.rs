@@ -15,8 +15,8 @@
 //! - **What cannot be checked** is the caller's promise. A pointer that is neither null nor misaligned is valid for
 //!   its type and the given length. Storage is used by one context at a time. A table outlives the gate on it.
 //!
-//! This is the only library with unsafe code. Pointers are dereferenced only in `memory.rs`, and in the gate, whose
-//! settings are in the same storage.
+//! This is the only library with unsafe code. Pointers are dereferenced only in `memory.rs` and `call.rs`, and in the gate, whose
+//! settings are in the same storage. `call.rs` has the order of reads and writes of every call.
 //!
 //! # The archive
 //! ```text
@@ -52,30 +52,14 @@
 extern crate std;
 
 // A page in a browser evaluates single estimates and drives nothing: it has no gate.
-pub use self::belief::*;
+pub use self::{
+    belief::*, judge::*, permission::*, reason::*, report::*, status::*, table::*, wire::*,
+};
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::clock::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::evidence::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::gate::*;
-pub use self::judge::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::monitor::*;
-pub use self::permission::*;
-pub use self::reason::*;
-pub use self::report::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::sequencer::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::settings::*;
-pub use self::status::*;
-pub use self::table::*;
-#[cfg(not(target_arch = "wasm32"))]
-pub use self::tracker::*;
-pub use self::wire::*;
+pub use self::{clock::*, evidence::*, gate::*, monitor::*, sequencer::*, settings::*, tracker::*};
 
 mod belief;
+mod call;
 #[cfg(not(target_arch = "wasm32"))]
 mod clock;
 #[cfg(not(target_arch = "wasm32"))]

@@ -1,4 +1,4 @@
-//! Pointers from C: checked, and dereferenced only here.
+//! Pointers from C: checked, read and written.
 
 use super::posegate_status;
 use super::status::Done;
@@ -7,7 +7,13 @@ use super::status::Done;
 ///
 /// # Safety
 /// Every bit pattern must be a value of the type.
-pub(super) unsafe trait Plain: Copy {}
+pub(super) unsafe trait Plain: Copy {
+    /// The value whose bytes are zero.
+    // SAFETY: every bit pattern is a value.
+    const ZERO: Self = unsafe { core::mem::zeroed() };
+    /// What an output holds after an error.
+    const DENIED: Self = Self::ZERO;
+}
 
 // SAFETY: an integer.
 unsafe impl Plain for u8 {}
@@ -47,7 +53,7 @@ fn seal<S: Storage>(storage: *const S) -> u32 {
 }
 
 /// Refuses a null or misaligned pointer.
-fn check<T>(pointer: *const T) -> Done {
+pub(super) fn check<T>(pointer: *const T) -> Done {
     check_address(pointer.addr(), align_of::<T>())
 }
 
@@ -83,13 +89,18 @@ fn disjoint_addresses(a: usize, a_bytes: usize, b: usize, b_bytes: usize) -> Don
     }
 }
 
-/// Refuses an argument that shares a byte with storage. The storage is then no longer initialised, because a
+/// Refuses an argument that shares a byte with storage.
+pub(super) fn apart<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
+    disjoint(storage, size_of::<S>(), other, size_of::<T>())
+}
+
+/// Refuses an argument that shares a byte with storage in use. The storage is then no longer initialised, because a
 /// write to the argument would damage its object.
 ///
 /// # Safety
 /// As for [`write`].
 pub(super) unsafe fn separate<S: Storage, T>(storage: *mut S, other: *const T) -> Done {
-    let apart = disjoint(storage, size_of::<S>(), other, size_of::<T>());
+    let apart = apart(storage, other);
     if apart.is_err() {
         // SAFETY: the caller's promise.
         unsafe { unseal(storage) };
@@ -168,27 +179,6 @@ pub(super) const fn unused(reserved: u32) -> Done {
     }
 }
 
-/// Refuses a pointer that cannot be written to, before a function does anything that it could not report to
-/// the caller.
-pub(super) fn place<T>(to: *mut T) -> Done {
-    check(to)
-}
-
-/// Writes the result of a call, or a denial after an error. Call it after all inputs have been read: the
-/// target may share bytes with an input.
-///
-/// # Safety
-/// As for [`write`].
-pub(super) unsafe fn answer<T: Plain>(
-    to: *mut T,
-    outcome: Result<T, posegate_status>,
-    denied: T,
-) -> Done {
-    // SAFETY: the caller's promise.
-    unsafe { write(to, *outcome.as_ref().unwrap_or(&denied)) }?;
-    outcome.map(|_| ())
-}
-
 /// Returns bytes that C lends for as long as `'a`.
 ///
 /// # Safety
@@ -205,14 +195,18 @@ pub(super) unsafe fn bytes<'a>(
     Ok(unsafe { core::slice::from_raw_parts(from, length) })
 }
 
-/// Returns the place of an element of an array.
+/// As [`bytes`], apart from storage.
 ///
 /// # Safety
-/// The array has more than `index` elements.
-pub(super) unsafe fn element<T>(array: *mut T, index: usize) -> Result<*mut T, posegate_status> {
-    check(array)?;
-    // SAFETY: within the array, by the caller's promise.
-    Ok(unsafe { array.add(index) })
+/// As for [`bytes`].
+pub(super) unsafe fn bytes_apart<'a, S: Storage>(
+    storage: *mut S,
+    from: *const u8,
+    length: usize,
+) -> Result<&'a [u8], posegate_status> {
+    // SAFETY: the caller's promise.
+    let bytes = unsafe { bytes(from, length) }?;
+    disjoint(storage, size_of::<S>(), from, length).map(|()| bytes)
 }
 
 /// Marks storage as not initialised, and returns the place of its object.
@@ -266,4 +260,15 @@ pub(super) unsafe fn open<S: Storage>(storage: *mut S) -> Result<*mut S::Held, p
     }
     // SAFETY: as above.
     Ok(unsafe { &raw mut (*slot).held })
+}
+
+/// Returns the object in initialised storage.
+///
+/// # Safety
+/// As for [`open`], for as long as `'a`; no other reference to the object is in use.
+pub(super) unsafe fn object<'a, S: Storage>(
+    storage: *mut S,
+) -> Result<&'a mut S::Held, posegate_status> {
+    // SAFETY: the caller's promise; sealed storage has been written.
+    unsafe { Ok(&mut *open(storage)?) }
 }

@@ -1,7 +1,8 @@
 //! Compares every accepted fix with its prediction: are the errors that a source claims still valid?
 
+use super::call::{answer_or, init};
 use super::evidence::Read;
-use super::memory::{Storage, close, open, read, separate, take, write};
+use super::memory::{Storage, object, read, separate};
 use super::{posegate_evidence, posegate_report, posegate_status};
 use posegate::gate::{Innovation, ModelStanding, Monitor};
 
@@ -71,13 +72,11 @@ pub unsafe extern "C" fn posegate_monitor_init(
     fixes_between_false_alarms: u32,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let held = take(monitor)?;
-        let made = Monitor::new(fixes_between_false_alarms);
-        held.write(made.ok_or(posegate_status::BadValue)?);
-        close(monitor);
-        Ok(())
-    })
+    unsafe {
+        init(monitor, || {
+            Monitor::new(fixes_between_false_alarms).ok_or(posegate_status::BadValue)
+        })
+    }
 }
 
 /// Takes an accepted fix and its prediction for the same time. With a tracker call `posegate_tracker_tracked` before and after
@@ -99,30 +98,28 @@ pub unsafe extern "C" fn posegate_monitor_fix(
 ) -> posegate_status {
     const INDEPENDENT: u32 = posegate_dependence::Independent as u32;
     const UNKNOWN: u32 = posegate_dependence::Unknown as u32;
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(monitor, fix)
-            .and(separate(monitor, prediction))
-            .and(separate(monitor, model));
-        let fix = read(fix).and_then(|report| report.report());
-        let prediction = Read::from(prediction);
-        write(model, CONTRADICTED)?;
-        apart?;
-        let monitor = &mut *open(monitor)?;
-        let (fix, prediction) = (fix?, prediction?);
-        let prediction = prediction.evidence();
-        let (belief, beside) = (&prediction.report.belief, prediction.beside);
-        let innovation = match dependence {
-            INDEPENDENT => Innovation::of_independent(&fix.belief, belief, beside),
-            UNKNOWN => Innovation::of_dependent(&fix.belief, belief, beside),
-            _ => return Err(posegate_status::BadValue),
-        };
-        let standing = innovation.and_then(|innovation| monitor.fix(&innovation));
-        write(
-            model,
-            self::model(standing.map_err(|_| posegate_status::BadValue)?),
-        )
-    })
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer_or(model, CONTRADICTED, || {
+            separate(monitor, fix)
+                .and(separate(monitor, prediction))
+                .and(separate(monitor, model))?;
+            let monitor = object(monitor)?;
+            let fix = read(fix)?.report()?;
+            let prediction = Read::from(prediction)?;
+            let prediction = prediction.evidence();
+            let (belief, beside) = (&prediction.report.belief, prediction.beside);
+            let innovation = match dependence {
+                INDEPENDENT => Innovation::of_independent(&fix.belief, belief, beside),
+                UNKNOWN => Innovation::of_dependent(&fix.belief, belief, beside),
+                _ => return Err(posegate_status::BadValue),
+            };
+            let standing = innovation.and_then(|innovation| monitor.fix(&innovation));
+            Ok(self::model(
+                standing.map_err(|_| posegate_status::BadValue)?,
+            ))
+        })
+    }
 }
 
 /// Discards all fixes of a monitor. A manual action: call it after the cause was removed.
@@ -131,10 +128,6 @@ pub unsafe extern "C" fn posegate_monitor_fix(
 /// The pointer is null, misaligned, or valid for its type.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn posegate_monitor_reset(monitor: *mut posegate_monitor) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let monitor = &mut *open(monitor)?;
-        monitor.reset();
-        Ok(())
-    })
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe { object(monitor).map(Monitor::reset) })
 }

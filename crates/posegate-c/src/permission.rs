@@ -30,8 +30,6 @@ pub struct posegate_permission {
 }
 
 impl posegate_permission {
-    pub(super) const DENIED: Self = Self::of(Permission::DENIED);
-
     pub(super) const fn of(permission: Permission) -> Self {
         let [verdict, complement, low, high, a, b, c, d] = permission.to_bytes();
         Self {
@@ -83,17 +81,15 @@ pub struct posegate_verdict {
 }
 
 // SAFETY: integers.
-unsafe impl Plain for posegate_permission {}
+unsafe impl Plain for posegate_permission {
+    const DENIED: Self = Self::of(Permission::DENIED);
+}
 // SAFETY: integers.
+unsafe impl Plain for posegate_pose {}
+// SAFETY: integers. Zero is `POSEGATE_DENY`.
 unsafe impl Plain for posegate_verdict {}
 
 impl posegate_pose {
-    pub(super) const ORIGIN: Self = Self {
-        x_um: 0,
-        y_um: 0,
-        yaw_turn_q32: 0,
-    };
-
     pub(super) const fn of(pose: Pose) -> Self {
         Self {
             x_um: pose.x_um,
@@ -104,16 +100,6 @@ impl posegate_pose {
 }
 
 impl posegate_verdict {
-    pub(super) const DENIED: Self = Self {
-        verdict: POSEGATE_DENY,
-        has_margin: 0,
-        has_worst_pose: 0,
-        reserved: 0,
-        reason: 0,
-        margin_q16: 0,
-        worst_pose: posegate_pose::ORIGIN,
-    };
-
     pub(super) fn of(verdict: Verdict) -> Self {
         let (byte, reason, margin, worst) = match verdict {
             Verdict::Permit { margin } => (POSEGATE_PERMIT, 0, Some(margin), None),
@@ -123,7 +109,6 @@ impl posegate_verdict {
                 worst_pose,
             } => (POSEGATE_DENY, reason.code(), margin, worst_pose),
         };
-        let pose = worst.unwrap_or_default();
         Self {
             verdict: byte,
             has_margin: u8::from(margin.is_some()),
@@ -131,7 +116,7 @@ impl posegate_verdict {
             reserved: 0,
             reason: u32::from(reason),
             margin_q16: margin.map_or(0, Margin::q16),
-            worst_pose: posegate_pose::of(pose),
+            worst_pose: posegate_pose::of(worst.unwrap_or_default()),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Reports of sources, and the frames of their numbers.
 
-use super::memory::{Plain, answer, bytes, unused};
+use super::call::answer;
+use super::memory::{Plain, bytes, unused};
 use super::{posegate_belief, posegate_status};
 use core::ffi::c_char;
 use posegate::report::{FrameId, Heading, PoseEstimate, Report};
@@ -40,19 +41,26 @@ impl posegate_report {
     }
 }
 
-/// Returns the report that a gate receives instead of an invalid one. It is from a source that no gate has.
+/// Returns an estimate of unknown uncertainty, which denies.
+pub(super) const fn no_estimate() -> PoseEstimate {
+    PoseEstimate {
+        x_m: 0.0,
+        y_m: 0.0,
+        heading: Heading::Radians(0.0),
+        spread: None,
+    }
+}
+
+/// Returns the report that a gate receives instead of an invalid one. It is from a source that no gate has. One function,
+/// to save flash.
+#[inline(never)]
 pub(super) const fn no_report() -> Report {
     Report {
         source: u8::MAX,
         frame: FrameId::UNNAMED,
         sequence: 0,
         stamp_ms: 0,
-        belief: PoseEstimate {
-            x_m: 0.0,
-            y_m: 0.0,
-            heading: Heading::Radians(0.0),
-            spread: None,
-        },
+        belief: no_estimate(),
     }
 }
 
@@ -71,11 +79,10 @@ pub unsafe extern "C" fn posegate_frame_id(
     frame: *mut u64,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let digest = bytes(name.cast(), length).and_then(|name| {
-            let name = core::str::from_utf8(name).map_err(|_| posegate_status::BadValue)?;
-            Ok(FrameId::of(name).digest())
-        });
-        answer(frame, digest, 0)
-    })
+    unsafe {
+        answer(frame, || {
+            let name = core::str::from_utf8(bytes(name.cast(), length)?);
+            Ok(FrameId::of(name.map_err(|_| posegate_status::BadValue)?).digest())
+        })
+    }
 }

@@ -1,6 +1,7 @@
 //! A plan on the controller: its rules in flash, the next step for the current pose-set.
 
-use super::memory::{Plain, Storage, answer, bytes, close, disjoint, open, read, separate, take};
+use super::call::{answer, init};
+use super::memory::{Plain, Storage, bytes_apart, object, read, separate};
 use super::table::text;
 use super::{POSEGATE_NO_TAG, posegate_belief, posegate_pose, posegate_status};
 use core::ffi::c_char;
@@ -73,34 +74,32 @@ pub struct posegate_instruction {
 }
 
 // SAFETY: integers.
-unsafe impl Plain for posegate_instruction {}
+unsafe impl Plain for posegate_instruction {
+    const DENIED: Self = Self {
+        kind: posegate_instruction_kind::Inhibit as u32,
+        tag: POSEGATE_NO_TAG,
+        ..Self::ZERO
+    };
+}
 
 impl posegate_instruction {
-    const INHIBIT: Self = Self {
-        kind: posegate_instruction_kind::Inhibit as u32,
-        stop: 0,
-        tag: POSEGATE_NO_TAG,
-        task: [0; 36],
-        to: posegate_pose::ORIGIN,
-    };
-
     fn of(instruction: Instruction<'_>) -> Self {
         match instruction {
             Instruction::Look { task, tag } => Self {
                 kind: posegate_instruction_kind::Look as u32,
                 tag,
                 task: text(task),
-                ..Self::INHIBIT
+                ..Self::DENIED
             },
             Instruction::Drive { to } => Self {
                 kind: posegate_instruction_kind::Drive as u32,
                 to: posegate_pose::of(to),
-                ..Self::INHIBIT
+                ..Self::DENIED
             },
             Instruction::Work { task } => Self {
                 kind: posegate_instruction_kind::Work as u32,
                 task: text(task),
-                ..Self::INHIBIT
+                ..Self::DENIED
             },
             Instruction::Inhibit(why) => Self {
                 stop: match why {
@@ -110,7 +109,7 @@ impl posegate_instruction {
                     // C has no number for any others.
                     _ => 0,
                 },
-                ..Self::INHIBIT
+                ..Self::DENIED
             },
         }
     }
@@ -130,16 +129,13 @@ pub unsafe extern "C" fn posegate_sequencer_init(
     length: usize,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let apart = disjoint(sequencer, size_of::<posegate_sequencer>(), rules, length);
-        let held = take(sequencer)?;
-        let rules = bytes(rules, length)?;
-        apart?;
-        let rules = Rules::parse(rules).map_err(|_| posegate_status::RulesInvalid)?;
-        held.write(Sequencer::new(rules));
-        close(sequencer);
-        Ok(())
-    })
+    unsafe {
+        init(sequencer, || {
+            let rules = Rules::parse(bytes_apart(sequencer, rules, length)?);
+            let rules = rules.map_err(|_| posegate_status::RulesInvalid)?;
+            Ok(Sequencer::new(rules))
+        })
+    }
 }
 
 /// Writes the next step for the current estimate. `radius_squared_q16` is the squared radius of a Gaussian set, unit 2^-16, such as that of
@@ -158,25 +154,21 @@ pub unsafe extern "C" fn posegate_sequencer_next(
     radius_squared_q16: u32,
     instruction: *mut posegate_instruction,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(sequencer, belief).and(separate(sequencer, instruction));
-        let set = read(belief).and_then(|belief| {
-            let belief = belief.belief()?;
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer(instruction, || {
+            separate(sequencer, belief).and(separate(sequencer, instruction))?;
+            let sequencer = object(sequencer)?;
+            let belief = read(belief)?.belief()?;
             let radius = match belief.spread {
                 Some(Uncertainty::Gaussian(_)) => RadiusSquared::from_q16(radius_squared_q16),
                 _ => Some(RadiusSquared::LARGEST),
             };
             let set = belief.pose_set(radius.ok_or(posegate_status::BadValue)?, Trust::FULL);
-            set.map_err(|_| posegate_status::BadValue)
-        });
-        let next = apart.and_then(|()| {
-            super::memory::place(instruction)?;
-            let held = &mut *open(sequencer)?;
-            Ok(posegate_instruction::of(held.next(&set?)))
-        });
-        answer(instruction, next, posegate_instruction::INHIBIT)
-    })
+            let set = set.map_err(|_| posegate_status::BadValue)?;
+            Ok(posegate_instruction::of(sequencer.next(&set)))
+        })
+    }
 }
 
 /// Reports that the last instruction succeeded: after a drive or a look the plan continues, after the work it ends.
@@ -187,11 +179,8 @@ pub unsafe extern "C" fn posegate_sequencer_next(
 pub unsafe extern "C" fn posegate_sequencer_succeeded(
     sequencer: *mut posegate_sequencer,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        (&mut *open(sequencer)?).succeeded();
-        Ok(())
-    })
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe { object(sequencer).map(Sequencer::succeeded) })
 }
 
 /// Reports that the last instruction failed: the tag was not seen, the gate did not permit, or the drive was stopped. The step is repeated as
@@ -203,9 +192,6 @@ pub unsafe extern "C" fn posegate_sequencer_succeeded(
 pub unsafe extern "C" fn posegate_sequencer_failed(
     sequencer: *mut posegate_sequencer,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        (&mut *open(sequencer)?).failed();
-        Ok(())
-    })
+    // SAFETY: the caller's promise.
+    posegate_status::of(|| unsafe { object(sequencer).map(Sequencer::failed) })
 }

@@ -138,38 +138,6 @@ pub struct posegate_settings {
 // SAFETY: numbers.
 unsafe impl Plain for posegate_settings {}
 
-impl posegate_settings {
-    const NONE: Self = Self {
-        task: [0; POSEGATE_NAME_LENGTH],
-        task_digest: [0; 32],
-        sources: [posegate_source {
-            frame: [0; POSEGATE_NAME_LENGTH],
-            inflation: 0.0,
-            cross_terms: 0,
-            share_q8: 0,
-            motion: 0,
-            reserved: 0,
-            along_m_s: 0.0,
-            across_m_s: 0.0,
-            turn_rad_s: 0.0,
-            ages: [posegate_age {
-                until_ms: 0,
-                inflation_q16: 0,
-            }; POSEGATE_MOST_AGES],
-        }; POSEGATE_MOST_SOURCES],
-        source_count: 0,
-        maximum_age_ms: 0,
-        response_ms: 0,
-        report_period_ms: 0,
-        permit_hold_ms: 0,
-        inhibit_hold_ms: 0,
-        permits_in_a_row: 0,
-        restart: 0,
-        look_at_tag: POSEGATE_NO_TAG,
-        most_runs: 0,
-    };
-}
-
 /// Writes settings whose times fit a source that reports every `period_ms`, and whose reports arrive up to `jitter_ms` after their
 /// stamps: such as 500 and 100 for AMCL at 2 Hz. Task, task digest and sources are zero and must be filled in; `response_ms` is 20,
 /// `permits_in_a_row` 3, and the restart is automatic.
@@ -198,7 +166,8 @@ pub unsafe extern "C" fn posegate_settings_for_source(
         permits_in_a_row: u32::from(times.permits_in_a_row),
         restart: posegate_restart::Automatic as u32,
         most_runs: times.most_runs,
-        ..posegate_settings::NONE
+        look_at_tag: POSEGATE_NO_TAG,
+        ..Plain::ZERO
     };
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe { write(settings, fitting) })
@@ -273,20 +242,6 @@ impl posegate_settings {
             AUTOMATIC => Ok(Restart::Automatic),
             ON_RESET => Ok(Restart::OnReset),
             _ => Err(posegate_status::Restart),
-        }
-    }
-
-    pub(super) const fn most_runs(&self) -> u32 {
-        match self.most_runs {
-            0 => const { Settings::for_source(0, 0).most_runs },
-            runs => runs,
-        }
-    }
-
-    pub(super) const fn look_at(&self) -> Option<u32> {
-        match self.look_at_tag {
-            POSEGATE_NO_TAG => None,
-            tag => Some(tag),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Tables: bytes in flash.
 
-use super::memory::{Plain, answer, bytes};
+use super::call::answer;
+use super::memory::{Plain, bytes};
 use super::posegate_status;
 use core::ffi::c_char;
 use posegate::table::{self, Parts, Table};
@@ -49,18 +50,6 @@ const _: () = assert!(
 // SAFETY: integers.
 unsafe impl Plain for posegate_table_info {}
 
-impl posegate_table_info {
-    const NONE: Self = Self {
-        task: [0; 36],
-        tool_version: [0; 20],
-        task_digest: [0; 32],
-        radius_squared_q16: 0,
-        crc: 0,
-        parts: 0,
-        missing_parts: 0,
-    };
-}
-
 /// Returns a text with at least one zero after it.
 pub(super) fn text<const N: usize>(from: &str) -> [c_char; N] {
     let mut text = [0; N];
@@ -86,9 +75,9 @@ pub unsafe extern "C" fn posegate_table_check(
     info: *mut posegate_table_info,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let found = bytes(table, length).and_then(|bytes| {
-            let table = Table::parse(bytes)?;
+    unsafe {
+        answer(info, || {
+            let table = Table::parse(bytes(table, length)?)?;
             let parts = table.parts();
             Ok(posegate_table_info {
                 task: text(table.task()),
@@ -99,9 +88,8 @@ pub unsafe extern "C" fn posegate_table_check(
                 parts: parts.bits(),
                 missing_parts: parts.without(Parts::BUILT).bits(),
             })
-        });
-        answer(info, found, posegate_table_info::NONE)
-    })
+        })
+    }
 }
 
 /// Continues a CRC-32C: writes the CRC of data whose first part has the CRC `so_far` (0 for no bytes)
@@ -118,9 +106,10 @@ pub unsafe extern "C" fn posegate_checksum(
     checksum: *mut u32,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let bytes = self::bytes(bytes, length);
-        let found = bytes.map(|bytes| table::checksum_continued(so_far, bytes));
-        answer(checksum, found, 0)
-    })
+    unsafe {
+        answer(checksum, || {
+            let bytes = self::bytes(bytes, length)?;
+            Ok(table::checksum_continued(so_far, bytes))
+        })
+    }
 }

@@ -1,14 +1,19 @@
 //! The tracker: a fix carried forward by odometry, in caller-owned storage.
 
+use super::call::{act, answer, answer_or};
 use super::evidence::posegate_evidence;
 use super::gate::{held, posegate_gate, posegate_step};
-use super::memory::{Plain, Storage, bytes, close, disjoint, open, read, separate, take, write};
+use super::memory::{Plain, Storage, apart, bytes_apart, close, object, read, separate, take};
+use super::reason::code;
 use super::report::no_report;
 use super::{posegate_belief, posegate_report, posegate_source, posegate_status};
 use posegate::gate::Reason;
 use posegate::report::Report;
 use posegate::table::Table;
 use posegate::track::{Increment, OdometryErrors, Tracked, Tracker, TrackerSettings};
+
+// The core's errors are plain numbers in the layout of C. `cbindgen.toml` has their name, too.
+pub use posegate::track::OdometryErrors as posegate_odometry_errors;
 
 /// Number of 64-bit words of a `posegate_tracker`.
 pub const POSEGATE_TRACKER_WORDS: usize = 192;
@@ -32,35 +37,12 @@ unsafe impl Storage for posegate_tracker {
     const MARK: u32 = 0x7472_6163;
 }
 
-/// The errors of an odometry. Deviations grow with the root of the path length, as does the sum of many small independent errors. Slip is
-/// a bound: the share of every movement that may be wrong in the worst direction. Lengths are those of the path. No value may be below zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct posegate_odometry_errors {
-    /// Standard deviation of the position on each axis, metres per root of a metre driven.
-    pub m_per_sqrt_m: f64,
-    /// Standard deviation of the heading, radians per root of a radian turned.
-    pub rad_per_sqrt_rad: f64,
-    /// Standard deviation of the heading, radians per root of a metre driven.
-    pub rad_per_sqrt_m: f64,
-    /// Standard deviation of the position on each axis, metres per root of a second.
-    pub m_per_sqrt_s: f64,
-    /// Standard deviation of the heading, radians per root of a second.
-    pub rad_per_sqrt_s: f64,
-    /// The share of a driven length that may be wrong, in any direction; below 1.
-    pub slip: f64,
-    /// The share of a turn that may be wrong, in either direction; below 1.
-    pub turn_slip: f64,
-    /// The additional turn that may be wrong, radians per metre driven.
-    pub turn_slip_per_m: f64,
-}
-
 /// The settings of a tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct posegate_tracker_settings {
     /// The errors of the odometry.
-    pub errors: posegate_odometry_errors,
+    pub errors: OdometryErrors,
     /// The source of the fixes: the trust in its covariances, and the largest speeds of the robot (a larger increment is a
     /// jump). The tracker applies the trust, so the gate's source of the carried reports has inflation 1 and all terms filled. Its
     /// frame is not used.
@@ -102,26 +84,17 @@ pub struct posegate_tracked {
 }
 
 // SAFETY: numbers.
-unsafe impl Plain for posegate_tracked {}
+unsafe impl Plain for posegate_tracked {
+    const DENIED: Self = Self {
+        evidence: posegate_evidence::NONE,
+        reason: Reason::Silent.code() as u32,
+        reserved: 0,
+    };
+}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_tracker_settings {}
 // SAFETY: numbers.
 unsafe impl Plain for posegate_increment {}
-
-impl posegate_odometry_errors {
-    const fn errors(&self) -> OdometryErrors {
-        OdometryErrors {
-            m_per_sqrt_m: self.m_per_sqrt_m,
-            rad_per_sqrt_rad: self.rad_per_sqrt_rad,
-            rad_per_sqrt_m: self.rad_per_sqrt_m,
-            m_per_sqrt_s: self.m_per_sqrt_s,
-            rad_per_sqrt_s: self.rad_per_sqrt_s,
-            slip: self.slip,
-            turn_slip: self.turn_slip,
-            turn_slip_per_m: self.turn_slip_per_m,
-        }
-    }
-}
 
 impl posegate_report {
     const fn of(report: &Report) -> Self {
@@ -143,14 +116,9 @@ impl posegate_evidence {
             other_count: 0,
             beside_um: tracked.beside.translation_um().unsigned_abs(),
             beside_q24: tracked.beside.yaw_q24().unsigned_abs(),
-            ..Self::NONE
+            ..Self::ZERO
         }
     }
-}
-
-/// Returns 0, or the code of a reason.
-fn code(outcome: Result<(), Reason>) -> u32 {
-    outcome.map_or_else(|reason| u32::from(reason.code()), |()| 0)
 }
 
 /// Initialises storage for a tracker without odometry and without a fix, whose reports go to a gate on this table. With several tables, give the one with
@@ -169,25 +137,19 @@ pub unsafe extern "C" fn posegate_tracker_init(
     settings: *const posegate_tracker_settings,
 ) -> posegate_status {
     // SAFETY: the caller's promise. The table is not borrowed for longer than the call.
+    // Not by `init`: the stack has no space for a second copy of the object.
     posegate_status::of(|| unsafe {
-        let apart = separate(tracker, settings).and(disjoint(
-            tracker,
-            size_of::<posegate_tracker>(),
-            table,
-            length,
-        ));
-        let given = read(settings);
-        let held = take(tracker);
-        let (held, given) = (held?, given?);
-        apart?;
-        let table = Table::parse(bytes(table, length)?)?;
+        let held = take(tracker)?;
+        let given = read(settings)?;
+        apart(tracker, settings)?;
+        let table = Table::parse(bytes_apart(tracker, table, length)?)?;
         let source = given.source.source()?;
         // Odometry without any error does not exist: the errors were forgotten.
-        if given.errors.errors() == OdometryErrors::NONE {
+        if given.errors == OdometryErrors::NONE {
             return Err(posegate_status::Odometry);
         }
         let made = Tracker::new(TrackerSettings {
-            errors: given.errors.errors(),
+            errors: given.errors,
             bounds: source.motion,
             trust: source.trust,
             radius_squared: table.radius_squared(),
@@ -216,31 +178,25 @@ pub unsafe extern "C" fn posegate_tracker_odometry(
     reason: *mut u32,
 ) -> posegate_status {
     const JUMP: u32 = Reason::OdometryJump.code() as u32;
-    // SAFETY: the caller's promise; sealed storage has been written.
+    // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(tracker, increment).and(separate(tracker, reason));
         let given = read(increment);
-        let written = write(reason, JUMP);
-        apart?;
-        let held = &mut *open(tracker)?;
         let of = |given: posegate_increment| {
-            Increment::of(
-                given.ahead_m,
-                given.left_m,
-                given.turn_rad,
-                [given.begins_ms, given.stamp_ms],
-            )
-            .ok_or(posegate_status::BadValue)
+            let times = [given.begins_ms, given.stamp_ms];
+            Increment::of(given.ahead_m, given.left_m, given.turn_rad, times)
+                .ok_or(posegate_status::BadValue)
         };
-        let taken = match given.and_then(of) {
-            Ok(increment) => held.odometry(increment),
-            Err(status) => {
-                held.forget();
-                return Err(status);
+        act(apart, reason, JUMP, || {
+            let tracker = object(tracker)?;
+            match given.and_then(of) {
+                Ok(increment) => Ok(code(tracker.odometry(increment))),
+                Err(status) => {
+                    tracker.forget();
+                    Err(status)
+                }
             }
-        };
-        written?;
-        write(reason, code(taken))
+        })
     })
 }
 
@@ -254,13 +210,13 @@ pub unsafe extern "C" fn posegate_tracker_reach(
     tracker: *mut posegate_tracker,
     reach_ms: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, reach_ms);
-        write(reach_ms, 0)?;
-        apart?;
-        write(reach_ms, (*open(tracker)?).reach_ms())
-    })
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer(reach_ms, || {
+            separate(tracker, reach_ms)?;
+            Ok(object(tracker)?.reach_ms())
+        })
+    }
 }
 
 /// Takes a fix, also a late one: it is carried along the increments since its stamp. All fixes come from one source, each with
@@ -277,23 +233,20 @@ pub unsafe extern "C" fn posegate_tracker_fix(
     report: *const posegate_report,
     reason: *mut u32,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, report).and(separate(tracker, reason));
-        let report = read(report).and_then(|report| report.report());
-        write(reason, u32::from(Reason::Silent.code()))?;
-        apart?;
-        let held = &mut *open(tracker)?;
-        let taken = match &report {
-            Ok(report) => code(held.fix(report)),
-            Err(_) => {
-                held.drop_fix();
-                u32::from(Reason::Silent.code())
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer_or(reason, u32::from(Reason::Silent.code()), || {
+            separate(tracker, report).and(separate(tracker, reason))?;
+            let tracker = object(tracker)?;
+            match read(report).and_then(|report| report.report()) {
+                Ok(report) => Ok(code(tracker.fix(&report))),
+                Err(status) => {
+                    tracker.drop_fix();
+                    Err(status)
+                }
             }
-        };
-        write(reason, taken)?;
-        report.map(|_| ())
-    })
+        })
+    }
 }
 
 /// Writes the report for now: the newest fix, carried to the newest odometry. For records, margins and monitors; a control cycle calls
@@ -310,26 +263,23 @@ pub unsafe extern "C" fn posegate_tracker_tracked(
     now_ms: u32,
     tracked: *mut posegate_tracked,
 ) -> posegate_status {
-    let of = |found: &Result<Tracked, Reason>| match found {
-        Ok(found) => posegate_tracked {
-            evidence: posegate_evidence::of(found),
-            reason: 0,
-            reserved: 0,
-        },
-        Err(reason) => posegate_tracked {
-            evidence: posegate_evidence::NONE,
-            reason: u32::from(reason.code()),
-            reserved: 0,
-        },
-    };
-    // SAFETY: the caller's promise; sealed storage has been written.
-    posegate_status::of(|| unsafe {
-        let apart = separate(tracker, tracked);
-        write(tracked, of(&Err(Reason::Silent)))?;
-        apart?;
-        let found = (*open(tracker)?).tracked(now_ms);
-        write(tracked, of(&found))
-    })
+    // SAFETY: the caller's promise.
+    unsafe {
+        answer(tracked, || {
+            separate(tracker, tracked)?;
+            Ok(match object(tracker)?.tracked(now_ms) {
+                Ok(found) => posegate_tracked {
+                    evidence: posegate_evidence::of(&found),
+                    reason: 0,
+                    reserved: 0,
+                },
+                Err(reason) => posegate_tracked {
+                    reason: u32::from(reason.code()),
+                    ..posegate_tracked::DENIED
+                },
+            })
+        })
+    }
 }
 
 /// Evaluates the newest fix, carried to the newest odometry, at the controller's time `now_ms`: the step of a control cycle between two
@@ -350,39 +300,37 @@ pub unsafe extern "C" fn posegate_gate_step_tracked(
     tracker: *mut posegate_tracker,
     step: *mut posegate_step,
 ) -> posegate_status {
-    // SAFETY: the caller's promise; sealed storage has been written. The two storages are apart, so both objects may be used at once.
+    // SAFETY: the caller's promise. The two storages are apart, so both objects may be used at once.
     posegate_status::of(|| unsafe {
         let apart = separate(gate, step)
             .and(separate(gate, tracker))
             .and(separate(tracker, gate));
         // A tracker that the step shares is no longer initialised, so the gate closes.
         let of_tracker = separate(tracker, step);
-        let written = write(step, posegate_step::DENIED);
-        apart?;
-        let tracker = open(tracker);
-        let gate = held(gate)?;
-        let found = match &tracker {
-            Ok(tracker) => {
-                let tracker = &mut **tracker;
-                // The gate may have another table since the tracker was initialised.
-                if let Ok(table) = gate.table() {
-                    tracker.cover(table.radius_squared());
+        let mut tracker = object(tracker);
+        act(apart, step, posegate_step::DENIED, || {
+            let gate = held(gate)?;
+            let found = match &mut tracker {
+                Ok(tracker) => {
+                    // The gate may have another table since the tracker was initialised.
+                    if let Ok(table) = gate.table() {
+                        tracker.cover(table.radius_squared());
+                    }
+                    tracker.tracked(now_ms)
                 }
-                tracker.tracked(now_ms)
+                Err(_) => Err(Reason::Silent),
+            };
+            let mut result = match &found {
+                Ok(tracked) => gate.step_on(now_ms, &tracked.evidence()),
+                Err(_) if tracker.is_ok() => gate.tick(now_ms),
+                Err(_) => gate.step(now_ms, &no_report()),
+            };
+            if let Err(reason) = found {
+                result.verdict = Err(reason);
             }
-            Err(_) => Err(Reason::Silent),
-        };
-        let mut result = match &found {
-            Ok(tracked) => gate.step_on(now_ms, &tracked.evidence()),
-            Err(_) if tracker.is_ok() => gate.tick(now_ms),
-            Err(_) => gate.step(now_ms, &no_report()),
-        };
-        if let Err(reason) = found {
-            result.verdict = Err(reason);
-        }
-        of_tracker?;
-        written?;
-        write(step, posegate_step::of(result))?;
+            of_tracker?;
+            Ok(result)
+        })?;
         tracker.map(|_| ())
     })
 }

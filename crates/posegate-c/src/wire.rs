@@ -1,9 +1,8 @@
 //! Estimates in and verdicts out over a serial line, in the frames of [`posegate::wire`].
 
-use super::judge::judge;
+use super::call::{answer, init};
 use super::memory::{
-    Plain, Storage, answer, bytes, close, element, open, read, separate, separate_from_all, take,
-    unused, write,
+    Plain, Storage, bytes, check, object, open, read, separate, separate_from_all, unused, write,
 };
 use super::{POSEGATE_PERMIT, posegate_belief, posegate_judge, posegate_status, posegate_verdict};
 use posegate::contain::Margin;
@@ -94,15 +93,8 @@ unsafe impl Plain for posegate_request {}
 unsafe impl Plain for posegate_reply {}
 
 impl posegate_message {
-    const EMPTY: Self = Self {
-        is_complete: 0,
-        reserved: [0; 2],
-        length: 0,
-        bytes: [0; POSEGATE_LONGEST_MESSAGE],
-    };
-
     fn of(bytes: &[u8]) -> Self {
-        let mut message = Self::EMPTY;
+        let mut message = Self::ZERO;
         for (to, byte) in message.bytes.iter_mut().zip(bytes) {
             *to = *byte;
         }
@@ -113,16 +105,6 @@ impl posegate_message {
 }
 
 impl posegate_request {
-    const NONE: Self = Self {
-        belief: posegate_belief::NONE,
-        sequence: 0,
-        table: 0,
-        stamp_ms: 0,
-        now_ms: 0,
-        radius_squared_q16: 0,
-        reserved: 0,
-    };
-
     const fn of(request: &Request) -> Self {
         Self {
             belief: posegate_belief::of(&PoseEstimate::new(request.estimate, request.spread)),
@@ -223,11 +205,7 @@ pub unsafe extern "C" fn posegate_receiver_init(
     receiver: *mut posegate_receiver,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        take(receiver)?.write(Receiver::new());
-        close(receiver);
-        Ok(())
-    })
+    unsafe { init(receiver, || Ok(Receiver::new())) }
 }
 
 /// Takes one byte of the line. At the end of a frame `is_complete` is 1. Then the body is in the message,
@@ -244,10 +222,9 @@ pub unsafe extern "C" fn posegate_receiver_push(
     // SAFETY: the caller's promise.
     posegate_status::of(|| unsafe {
         let apart = separate(receiver, body);
-        write(body, posegate_message::EMPTY)?;
+        write(body, posegate_message::ZERO)?;
         apart?;
-        let receiver = &mut *open(receiver)?;
-        let Some(frame) = receiver.push(byte) else {
+        let Some(frame) = object(receiver)?.push(byte) else {
             return Ok(());
         };
         let mut message = posegate_message::of(frame.as_deref().unwrap_or_default());
@@ -271,11 +248,12 @@ pub unsafe extern "C" fn posegate_request_decode(
     request: *mut posegate_request,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let decoded = bytes(body, length).and_then(|body| Ok(Request::from_body(body)?));
-        let decoded = decoded.map(|decoded| posegate_request::of(&decoded));
-        answer(request, decoded, posegate_request::NONE)
-    })
+    unsafe {
+        answer(request, || {
+            let decoded = Request::from_body(bytes(body, length)?)?;
+            Ok(posegate_request::of(&decoded))
+        })
+    }
 }
 
 /// For recordings and benches only.
@@ -295,27 +273,27 @@ pub unsafe extern "C" fn posegate_request_judge(
     verdict: *mut posegate_verdict,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let storages = judges.cast_mut();
-        let apart = separate_from_all(storages, count, request)
-            .and(separate_from_all(storages, count, verdict));
-        let request = read(request);
-        write(verdict, posegate_verdict::DENIED)?;
-        apart?;
-        let request = request?.request().ok_or(posegate_status::BadValue)?;
-        let index = usize::from(request.table);
-        if index >= count {
-            return Err(posegate_status::WireTable);
-        }
-        let judge: &Evaluator<'_> = judge(element(judges.cast_mut(), index)?)?;
-        // `judge` is the only one in the slice.
-        let asked = Request {
-            table: 0,
-            ..request
-        };
-        let result = asked.evaluate(core::slice::from_ref(judge))?;
-        write(verdict, posegate_verdict::of(result))
-    })
+    unsafe {
+        answer(verdict, || {
+            let storages = judges.cast_mut();
+            separate_from_all(storages, count, request)
+                .and(separate_from_all(storages, count, verdict))?;
+            let request = read(request)?.request().ok_or(posegate_status::BadValue)?;
+            let index = usize::from(request.table);
+            if index >= count {
+                return Err(posegate_status::WireTable);
+            }
+            check(judges)?;
+            let judge: &Evaluator<'_> = &*open(storages.wrapping_add(index))?;
+            // `judge` is the only one in the slice.
+            let asked = Request {
+                table: 0,
+                ..request
+            };
+            let result = asked.evaluate(core::slice::from_ref(judge))?;
+            Ok(posegate_verdict::of(result))
+        })
+    }
 }
 
 /// Encodes the body of a reply.
@@ -330,13 +308,12 @@ pub unsafe extern "C" fn posegate_reply_encode(
     body: *mut posegate_message,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let encoded = read(reply).and_then(|reply| {
-            let reply = reply.reply().ok_or(posegate_status::BadValue)?;
+    unsafe {
+        answer(body, || {
+            let reply = read(reply)?.reply().ok_or(posegate_status::BadValue)?;
             Ok(posegate_message::of(&reply.body()))
-        });
-        answer(body, encoded, posegate_message::EMPTY)
-    })
+        })
+    }
 }
 
 /// Encodes the frame of a body: the bytes for the line, with the closing zero.
@@ -351,14 +328,14 @@ pub unsafe extern "C" fn posegate_frame_encode(
     frame: *mut posegate_message,
 ) -> posegate_status {
     // SAFETY: the caller's promise.
-    posegate_status::of(|| unsafe {
-        let encoded = read(body).and_then(|body| {
+    unsafe {
+        answer(frame, || {
+            let body = read(body)?;
             unused(u16::from_le_bytes(body.reserved).into())?;
             let bytes = body.bytes.get(..usize::from(body.length));
             let bytes = bytes.filter(|bytes| bytes.len() <= posegate::wire::LONGEST_BODY);
             let bytes = bytes.ok_or(posegate_status::BadLength)?;
             Ok(posegate_message::of(&encode(bytes)))
-        });
-        answer(frame, encoded, posegate_message::EMPTY)
-    })
+        })
+    }
 }

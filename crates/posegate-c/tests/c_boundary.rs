@@ -4,6 +4,8 @@
 //! `cargo test -p posegate-c --test c_boundary`; under Miri as well, with `MIRIFLAGS=-Zmiri-ignore-leaks`, since
 //! storage is leaked so that it stays where it is.
 
+mod support;
+
 use core::ffi::CStr;
 use core::mem::MaybeUninit;
 use posegate::gate::{Gate, Permission, Reason, Restart, Settings, Source, State, Verdict};
@@ -16,11 +18,11 @@ use posegate::set::{
 use posegate::table::{Table, checksum};
 use posegate::wire::{LONGEST_BODY, Receiver, Reply, Request, encode};
 use posegate_c::*;
-
-const NO_AGES: [posegate_age; POSEGATE_MOST_AGES] = [posegate_age {
-    until_ms: 0,
-    inflation_q16: 0,
-}; POSEGATE_MOST_AGES];
+use support::functions::{Kind, functions, memory, put};
+use support::{
+    DOCK, SEE_T7, evidence_of_c, in_c, leaked, message, misaligned, name, report_of_c, settings,
+    zero, zeroed,
+};
 
 const fn age(until_ms: u32, inflation_q16: u32) -> posegate_age {
     posegate_age {
@@ -29,108 +31,8 @@ const fn age(until_ms: u32, inflation_q16: u32) -> posegate_age {
     }
 }
 
-static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
-static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
-
 /// Miri is a thousand times slower.
 const ROUNDS: u32 = if cfg!(miri) { 60 } else { 20_000 };
-
-/// Returns a pointer to storage that never moves, as in C.
-fn leaked<T>(value: T) -> *mut T {
-    Box::into_raw(Box::new(value))
-}
-
-fn zeroed<T>() -> *mut T {
-    // SAFETY: used for structs of numbers and pointers.
-    leaked(unsafe { MaybeUninit::zeroed().assume_init() })
-}
-
-/// Returns a pointer to a place for a `T` that is misaligned by one byte.
-fn misaligned<T>() -> *mut T {
-    let bytes = vec![0u64; size_of::<T>() / 8 + 2].leak();
-    bytes.as_mut_ptr().wrapping_byte_add(1).cast()
-}
-
-fn name<const N: usize>(text: &str) -> [core::ffi::c_char; N] {
-    let mut name = [0; N];
-    for (to, byte) in name.iter_mut().zip(text.bytes()) {
-        *to = core::ffi::c_char::from_ne_bytes([byte]);
-    }
-    name
-}
-
-fn source() -> posegate_source {
-    posegate_source {
-        frame: name("map"),
-        inflation: 1.0,
-        cross_terms: posegate_cross_terms::Filled as u32,
-        share_q8: 0,
-        motion: posegate_motion::Moves as u32,
-        reserved: 0,
-        along_m_s: 0.001,
-        across_m_s: 0.0,
-        turn_rad_s: 0.0,
-        ages: NO_AGES,
-    }
-}
-
-/// Returns the settings, which are the same in both languages.
-fn settings() -> posegate_settings {
-    posegate_settings {
-        task: name("dock"),
-        task_digest: Table::parse(DOCK).unwrap().task_digest(),
-        sources: [
-            source(),
-            posegate_source {
-                frame: name("odom"),
-                inflation: 1.5,
-                cross_terms: posegate_cross_terms::YawUnknown as u32,
-                share_q8: 128,
-                motion: posegate_motion::StandsStill as u32,
-                reserved: 0,
-                along_m_s: 0.0,
-                across_m_s: 0.0,
-                turn_rad_s: 0.0,
-                ages: NO_AGES,
-            },
-            // Not used: `source_count` is 2.
-            posegate_source {
-                frame: [0; 32],
-                inflation: f64::NAN,
-                cross_terms: 99,
-                share_q8: 0,
-                motion: posegate_motion::StandsStill as u32,
-                reserved: 0,
-                along_m_s: 0.0,
-                across_m_s: 0.0,
-                turn_rad_s: 0.0,
-                ages: NO_AGES,
-            },
-            posegate_source {
-                frame: [0; 32],
-                inflation: 0.0,
-                cross_terms: 0,
-                share_q8: 0,
-                motion: posegate_motion::StandsStill as u32,
-                reserved: 0,
-                along_m_s: 0.0,
-                across_m_s: 0.0,
-                turn_rad_s: 0.0,
-                ages: NO_AGES,
-            },
-        ],
-        source_count: 2,
-        maximum_age_ms: 200,
-        response_ms: 30,
-        report_period_ms: 50,
-        permit_hold_ms: 100,
-        inhibit_hold_ms: 40,
-        permits_in_a_row: 3,
-        restart: posegate_restart::Automatic as u32,
-        look_at_tag: 7,
-        most_runs: 0,
-    }
-}
 
 fn settings_of_rust() -> &'static Settings<'static> {
     let sources = [
@@ -180,14 +82,8 @@ fn gate() -> *mut posegate_gate {
 }
 
 fn good(sequence: u32, stamp_ms: u32) -> posegate_report {
-    posegate_report {
-        belief: belief(0.01, posegate_spread::Gaussian, [1e-4, 1e-4, 1e-4]),
-        frame: FrameId::of("map").digest(),
-        source: 0,
-        sequence,
-        stamp_ms,
-        reserved: 0,
-    }
+    let belief = belief(0.01, posegate_spread::Gaussian, [1e-4, 1e-4, 1e-4]);
+    report_of_c(sequence, stamp_ms, belief)
 }
 
 fn belief(x_m: f64, kind: posegate_spread, [xx, yy, tt]: [f64; 3]) -> posegate_belief {
@@ -216,8 +112,7 @@ fn open_step() -> posegate_step {
         },
         state: posegate_state {
             kind: posegate_state_kind::Permitted as u32,
-            reason: 0,
-            permits: 0,
+            ..zero()
         },
         reason: 0,
     }
@@ -232,15 +127,8 @@ fn open_verdict() -> posegate_verdict {
     posegate_verdict {
         verdict: POSEGATE_PERMIT,
         has_margin: 1,
-        has_worst_pose: 0,
-        reserved: 0,
-        reason: 0,
         margin_q16: 1 << 20,
-        worst_pose: posegate_pose {
-            x_um: 0,
-            y_um: 0,
-            yaw_turn_q32: 0,
-        },
+        ..zero()
     }
 }
 
@@ -344,243 +232,110 @@ fn gate_closes_even_if_output_cannot_be_written() {
     }
 }
 
-/// Every function with every pointer null, misaligned, or to zeroed storage: an error, and no permit.
+/// Every function with every pointer null, misaligned, or to zeroed storage: an error, a denial in each output, and an `init` function
+/// leaves storage that is not in use.
 #[test]
 fn bad_pointers_are_errors() {
-    const NULL: posegate_status = posegate_status::Null;
-    const MISALIGNED: posegate_status = posegate_status::Misaligned;
-    const NOT_INITIALISED: posegate_status = posegate_status::NotInitialised;
     let mut count = 0;
-    let mut is = |found: posegate_status, expected: posegate_status| {
-        assert_eq!(found, expected, "check {count}");
-        count += 1;
-    };
-    let (settings, report) = (settings(), good(0, 0));
-    let (table, length) = (DOCK.as_ptr(), DOCK.len());
-    let estimate = estimate(&report.belief, 0, 0, 0);
-    // SAFETY: pointers are null, misaligned, to zeroed storage, or valid.
-    unsafe {
-        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            is(
-                posegate_gate_init(bad, table, length, &settings, counter(), 0),
-                expected,
-            );
-        }
-        is(
-            posegate_gate_init(zeroed(), core::ptr::null(), length, &settings, counter(), 0),
-            NULL,
-        );
-        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            let gate = gate();
-            is(
-                posegate_gate_init(gate, table, length, bad, counter(), 0),
-                expected,
-            );
-            // It is no longer a gate.
-            is(step(gate, 0, &report).0, NOT_INITIALISED);
-        }
-        for (bad, expected) in [
-            (core::ptr::null_mut(), NULL),
-            (misaligned(), MISALIGNED),
-            (zeroed(), NOT_INITIALISED),
-        ] {
-            let (status, output) = step(bad, 0, &report);
-            is(status, expected);
-            assert!(!is_permit(&output) && output.state.kind == 0);
-            let mut output = open_step();
-            is(posegate_gate_tick(bad, 0, &mut output), expected);
-            assert!(!is_permit(&output) && output.state.kind == 0);
-            let mut output = open_step();
-            is(posegate_gate_inhibit(bad, 0, 33, &mut output), expected);
-            assert!(!is_permit(&output) && output.state.kind == 0);
-            is(posegate_gate_reset(bad, 0), expected);
-            is(posegate_gate_fault(bad, 33), expected);
-            let mut word = 2;
-            is(posegate_gate_scrub(bad, 1, &mut word), expected);
-            assert_eq!(word, 0);
-            let mut state = output.state;
-            state.kind = posegate_state_kind::Permitted as u32;
-            is(posegate_gate_state(bad, &mut state), expected);
-            assert_eq!(state.kind, 0);
-            let mut advice = posegate_advice { kind: 5, tag: 5 };
-            is(posegate_gate_advice(bad, &mut advice), expected);
-            assert_eq!(advice.kind, 0);
-            let mut verdict = open_verdict();
-            is(posegate_gate_examine(bad, &report, &mut verdict), expected);
-            assert_eq!(verdict.verdict, POSEGATE_DENY);
-        }
-        for (bad, expected) in [
-            (core::ptr::null_mut(), NULL),
-            (misaligned(), MISALIGNED),
-            (zeroed(), NOT_INITIALISED),
-        ] {
-            for permits in [true, false] {
-                let mut verdict = open_verdict();
-                let status = if permits {
-                    posegate_judge_permits(bad, &estimate, &mut verdict)
-                } else {
-                    posegate_judge_examine(bad, &estimate, &mut verdict)
+    for function in functions() {
+        let arguments = &function.arguments;
+        let makes = function.name.ends_with("_init") || function.name.ends_with("_change_table");
+        for (at, bad) in arguments.iter().enumerate() {
+            let length = bad.bytes.len();
+            let unaligned = memory(length + 16).wrapping_add(1);
+            for (pointer, expected) in [
+                (core::ptr::null_mut(), posegate_status::Null),
+                (unaligned, posegate_status::Misaligned),
+                (memory(length), posegate_status::NotInitialised),
+            ] {
+                // Bytes are always aligned, and only storage can be missing.
+                let is_bad = match expected {
+                    posegate_status::Misaligned => bad.align > 1,
+                    posegate_status::NotInitialised => {
+                        bad.is_storage() && !function.name.ends_with("_init")
+                    }
+                    _ => true,
                 };
-                is(status, expected);
-                assert_eq!(verdict.verdict, POSEGATE_DENY);
+                if !is_bad {
+                    continue;
+                }
+                let mut places: Vec<_> = arguments.iter().map(|a| memory(a.bytes.len())).collect();
+                for (argument, place) in arguments.iter().zip(&places) {
+                    argument.set_up(*place);
+                    if !argument.is_storage() {
+                        put(*place, &argument.bytes);
+                    }
+                }
+                places[at] = pointer;
+                let what = format!("{}: argument {at}, {expected:?}", function.name);
+                assert_eq!(function.call(&places), expected, "{what}");
+                for (argument, place) in arguments.iter().zip(&places) {
+                    if *place == pointer {
+                        continue;
+                    }
+                    match argument.kind {
+                        Kind::Output => {
+                            assert!(
+                                is_denial(function.name, at, *place, argument.bytes.len()),
+                                "{what}"
+                            );
+                        }
+                        Kind::Storage { .. } if makes => {
+                            assert!(!argument.is_in_use(*place), "{what}");
+                        }
+                        _ => {}
+                    }
+                }
+                count += 1;
             }
         }
-        // Inputs.
-        let gate = open_gate();
-        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            let (status, output) = step(gate, 100, bad);
-            is(status, expected);
-            assert!(!is_permit(&output));
-            let mut verdict = open_verdict();
-            is(posegate_gate_examine(gate, bad, &mut verdict), expected);
-            assert_eq!(verdict.verdict, POSEGATE_DENY);
-        }
-        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            let mut verdict = open_verdict();
-            is(
-                posegate_judge_permits(judge(DOCK), bad, &mut verdict),
-                expected,
-            );
-            assert_eq!(verdict.verdict, POSEGATE_DENY);
-        }
-        assert_eq!(
-            posegate_permission_is_permit(core::ptr::null(), 0),
-            POSEGATE_DENY
-        );
-        // Outputs.
-        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            is(posegate_gate_step(gate, 0, &report, bad), expected);
-            is(posegate_gate_tick(gate, 0, bad), expected);
-        }
-        for (bad, expected) in [(core::ptr::null_mut(), NULL), (misaligned(), MISALIGNED)] {
-            is(
-                posegate_judge_permits(judge(DOCK), &estimate, bad),
-                expected,
-            );
-            is(
-                posegate_judge_examine(judge(DOCK), &estimate, bad),
-                expected,
-            );
-            is(posegate_gate_examine(gate, &report, bad), expected);
-        }
-        is(posegate_gate_state(gate, core::ptr::null_mut()), NULL);
-        is(posegate_gate_advice(gate, core::ptr::null_mut()), NULL);
-        is(posegate_gate_scrub(gate, 1, core::ptr::null_mut()), NULL);
-        bad_pointers_of_the_rest(&mut is);
     }
-    assert!(count >= 60, "{count}");
+    assert!(count >= 225, "{count}");
+    // SAFETY: null.
+    let opens = unsafe { posegate_permission_is_permit(core::ptr::null(), 0) };
+    assert_eq!(opens, POSEGATE_DENY);
 }
 
-/// # Safety
-/// Pointers are null, misaligned, to zeroed storage, or valid.
-unsafe fn bad_pointers_of_the_rest(is: &mut dyn FnMut(posegate_status, posegate_status)) {
-    const NULL: posegate_status = posegate_status::Null;
-    const MISALIGNED: posegate_status = posegate_status::Misaligned;
-    // SAFETY: guaranteed by the caller.
+/// Returns `true` if a function with a bad argument has written a denial to an output that had no zeros.
+fn is_denial(function: &str, bad: usize, output: *mut u8, length: usize) -> bool {
+    // SAFETY: an output of the type of the function.
     unsafe {
-        is(
-            posegate_judge_init(core::ptr::null_mut(), DOCK.as_ptr(), 0, 1),
-            NULL,
-        );
-        is(
-            posegate_judge_init(misaligned(), DOCK.as_ptr(), 0, 1),
-            MISALIGNED,
-        );
-        is(posegate_judge_init(zeroed(), core::ptr::null(), 0, 1), NULL);
-        is(posegate_table_check(core::ptr::null(), 0, zeroed()), NULL);
-        is(
-            posegate_table_check(DOCK.as_ptr(), 0, core::ptr::null_mut()),
-            NULL,
-        );
-        is(
-            posegate_table_check(DOCK.as_ptr(), 0, misaligned()),
-            MISALIGNED,
-        );
-        is(posegate_checksum(0, core::ptr::null(), 0, zeroed()), NULL);
-        is(
-            posegate_checksum(0, DOCK.as_ptr(), 0, misaligned()),
-            MISALIGNED,
-        );
-        is(posegate_frame_id(core::ptr::null(), 0, zeroed()), NULL);
-        is(
-            posegate_frame_id(c"map".as_ptr(), 3, core::ptr::null_mut()),
-            NULL,
-        );
-        is(
-            posegate_frame_id(c"map".as_ptr(), 3, misaligned()),
-            MISALIGNED,
-        );
-        is(posegate_belief_from_ros(core::ptr::null(), zeroed()), NULL);
-        is(posegate_belief_from_ros(misaligned(), zeroed()), MISALIGNED);
-        is(
-            posegate_belief_from_ros(zeroed(), core::ptr::null_mut()),
-            NULL,
-        );
-        is(
-            posegate_belief_from_mavlink_odometry(misaligned(), 1, zeroed()),
-            MISALIGNED,
-        );
-        is(
-            posegate_belief_from_mavlink_vision(misaligned(), 1, zeroed()),
-            MISALIGNED,
-        );
-        is(
-            posegate_belief_from_compact(misaligned(), zeroed()),
-            MISALIGNED,
-        );
-        is(
-            posegate_belief_from_compact(zeroed(), misaligned()),
-            MISALIGNED,
-        );
-        is(posegate_receiver_init(core::ptr::null_mut()), NULL);
-        is(posegate_receiver_init(misaligned()), MISALIGNED);
-        is(
-            posegate_receiver_push(zeroed(), 0, zeroed()),
-            posegate_status::NotInitialised,
-        );
-        is(
-            posegate_receiver_push(core::ptr::null_mut(), 0, zeroed()),
-            NULL,
-        );
-        let receiver = zeroed();
-        is(posegate_receiver_init(receiver), posegate_status::Ok);
-        is(
-            posegate_receiver_push(receiver, 0, core::ptr::null_mut()),
-            NULL,
-        );
-        is(
-            posegate_request_decode(core::ptr::null(), 1, zeroed()),
-            NULL,
-        );
-        is(
-            posegate_request_decode(DOCK.as_ptr(), 1, misaligned()),
-            MISALIGNED,
-        );
-        is(
-            posegate_request_judge(core::ptr::null(), judge(DOCK), 1, zeroed()),
-            NULL,
-        );
-        let asked = leaked(request());
-        is(
-            posegate_request_judge(asked, core::ptr::null(), 1, zeroed()),
-            NULL,
-        );
-        is(
-            posegate_request_judge(asked, misaligned(), 1, zeroed()),
-            MISALIGNED,
-        );
-        is(
-            posegate_request_judge(asked, zeroed(), 1, zeroed()),
-            posegate_status::NotInitialised,
-        );
-        is(
-            posegate_request_judge(asked, judge(DOCK), 1, misaligned()),
-            MISALIGNED,
-        );
-        is(posegate_reply_encode(core::ptr::null(), zeroed()), NULL);
-        is(posegate_reply_encode(zeroed(), core::ptr::null_mut()), NULL);
-        is(posegate_frame_encode(core::ptr::null(), zeroed()), NULL);
-        is(posegate_frame_encode(zeroed(), core::ptr::null_mut()), NULL);
+        let word = *output.cast::<u32>();
+        match function {
+            "posegate_gate_tick"
+            | "posegate_gate_inhibit"
+            | "posegate_gate_step"
+            | "posegate_gate_step_on"
+            | "posegate_gate_step_tracked" => {
+                let step = &*output.cast::<posegate_step>();
+                // A gate that is there closes, and says so.
+                let kind = if bad == 0 {
+                    0
+                } else {
+                    posegate_state_kind::Inhibited as u32
+                };
+                step.state.kind == kind && !is_permit(step)
+            }
+            "posegate_gate_advice" => {
+                let advice = &*output.cast::<posegate_advice>();
+                (advice.kind, advice.tag) == (0, POSEGATE_NO_TAG)
+            }
+            "posegate_sequencer_next" => {
+                let next = &*output.cast::<posegate_instruction>();
+                (next.kind, next.stop) == (posegate_instruction_kind::Inhibit as u32, 0)
+            }
+            "posegate_monitor_fix" => word == posegate_model::Contradicted as u32,
+            "posegate_tracker_odometry" => word == u32::from(Reason::OdometryJump.code()),
+            "posegate_tracker_fix" => word == u32::from(Reason::Silent.code()),
+            "posegate_tracker_tracked" => {
+                let tracked = &*output.cast::<posegate_tracked>();
+                tracked.reason == u32::from(Reason::Silent.code())
+                    && tracked.evidence.other_count > POSEGATE_OTHERS as u32
+            }
+            _ => support::functions::read(output, length)
+                .iter()
+                .all(|byte| *byte == 0),
+        }
     }
 }
 
@@ -1049,36 +804,6 @@ impl Random {
     }
 }
 
-/// Converts a belief to that of C.
-fn in_c(belief: &PoseEstimate) -> posegate_belief {
-    let (heading_kind, heading) = match belief.heading {
-        Heading::Radians(yaw) => (1, [yaw, f64::NAN, 7.0, 7.0]),
-        Heading::RollPitchYaw([roll, pitch, yaw]) => (2, [roll, pitch, yaw, f64::NAN]),
-        Heading::Quaternion(entries) => (3, entries),
-    };
-    let (spread_kind, spread) = match belief.spread {
-        Some(Uncertainty::Gaussian([[a, b, c], [d, e, f], [g, h, i]])) => {
-            (1, [a, b, c, d, e, f, g, h, i])
-        }
-        Some(Uncertainty::Bounded {
-            translation_m,
-            yaw_rad,
-        }) => (
-            2,
-            [translation_m, yaw_rad, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0, 7.0],
-        ),
-        None => (3, [7.0; 9]),
-    };
-    posegate_belief {
-        x_m: belief.x_m,
-        y_m: belief.y_m,
-        heading,
-        spread,
-        heading_kind,
-        spread_kind,
-    }
-}
-
 fn assert_same(output: &posegate_verdict, verdict: &Verdict, place: &str) {
     match verdict {
         Verdict::Permit { margin } => {
@@ -1431,17 +1156,6 @@ fn c_messages_become_same_estimates_as_in_rust() {
     }
 }
 
-fn message(bytes: &[u8]) -> posegate_message {
-    let mut message = posegate_message {
-        is_complete: 0,
-        reserved: [0; 2],
-        length: bytes.len() as u8,
-        bytes: [0; POSEGATE_LONGEST_MESSAGE],
-    };
-    message.bytes[..bytes.len()].copy_from_slice(bytes);
-    message
-}
-
 fn request() -> posegate_request {
     posegate_request {
         belief: belief(0.01, posegate_spread::Bounded, [0.01, 0.0, 0.005]),
@@ -1692,69 +1406,33 @@ fn reserved_fields_must_be_zero() {
         let gate = open_gate();
         assert_eq!(posegate_gate_step(gate, 0, &report, &mut step), bad);
         assert!(!is_permit(&step));
-        let mut evidence = posegate_evidence {
-            report: good(0, 0),
-            others: [good(0, 0).belief; POSEGATE_OTHERS],
-            other_count: 0,
-            beside_um: 0,
-            beside_q24: 0,
-            elsewhere_q32: 0,
-            since_fix_ms: 0,
-            reserved: 0,
-        };
+        let mut evidence = evidence_of_c(good(0, 0), &[]);
         let gate = open_gate();
         assert_ne!(posegate_gate_step_on(gate, 0, &evidence, &mut step), bad);
         evidence.reserved = 1 << 31;
         assert_eq!(posegate_gate_step_on(gate, 0, &evidence, &mut step), bad);
         assert!(!is_permit(&step));
-        let judge = zeroed();
-        let status = posegate_judge_init(judge, DOCK.as_ptr(), DOCK.len(), 100);
-        assert_eq!(status, posegate_status::Ok);
-        let mut estimate = posegate_estimate {
-            belief: good(0, 0).belief,
-            stamp_ms: 0,
-            now_ms: 0,
-            radius_squared_q16: 0,
-            reserved: 0,
-        };
+        let judge = judge(DOCK);
+        let mut estimate = estimate(&good(0, 0).belief, 0, 0, 0);
         let status = posegate_judge_permits(judge, &estimate, &mut verdict);
         assert_eq!(status, posegate_status::Ok);
         estimate.reserved = 1;
         let status = posegate_judge_permits(judge, &estimate, &mut verdict);
         assert_eq!((status, verdict.verdict), (bad, POSEGATE_DENY));
         let body = posegate_message {
-            is_complete: 0,
             reserved: [0, 1],
-            length: 3,
-            bytes: [0; POSEGATE_LONGEST_MESSAGE],
+            ..message(&[0; 3])
         };
         assert_eq!(posegate_frame_encode(&body, zeroed()), bad);
-        let mut reply = posegate_reply {
-            sequence: 0,
-            status: 0,
-            verdict: posegate_verdict {
-                verdict: POSEGATE_DENY,
-                has_margin: 0,
-                has_worst_pose: 0,
-                reserved: 0,
-                reason: 1,
-                margin_q16: 0,
-                worst_pose: verdict.worst_pose,
-            },
-            interlock_high: 0,
-        };
+        let mut reply: posegate_reply = zero();
+        reply.verdict.reason = 1;
         let status = posegate_reply_encode(&reply, zeroed());
         assert_eq!(status, posegate_status::Ok);
         reply.verdict.reserved = 1;
         assert_eq!(posegate_reply_encode(&reply, zeroed()), bad);
         let mut request = posegate_request {
             belief: good(0, 0).belief,
-            sequence: 1,
-            table: 0,
-            stamp_ms: 0,
-            now_ms: 0,
-            radius_squared_q16: 743_498,
-            reserved: 0,
+            ..request()
         };
         let status = posegate_request_judge(&request, judge, 1, &mut verdict);
         assert_eq!(status, posegate_status::Ok);

@@ -18,6 +18,9 @@ fn generated() -> String {
         .with_config(config)
         .with_src(at_root("crates/posegate-c/src/lib.rs"))
         .with_src(at_root("src/gate/reason.rs"))
+        .with_src(at_root("src/report/mavlink.rs"))
+        .with_src(at_root("src/report/ros.rs"))
+        .with_src(at_root("src/track/model.rs"))
         .generate()
         .unwrap_or_else(|error| panic!("cbindgen: {error}"));
     let mut header = Vec::new();

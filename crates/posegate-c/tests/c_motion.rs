@@ -1,5 +1,7 @@
 //! A robot that moves, in C: hypotheses, tracker and fitting settings act as in Rust, and no wrong argument opens a gate.
 
+mod support;
+
 use posegate::gate::{Evidence, Gate, Reason, Settings, Source, Verdict};
 use posegate::motion::MotionBounds;
 use posegate::report::{FrameId, PoseEstimate, Report};
@@ -9,45 +11,16 @@ use posegate::task::Risk;
 use posegate::track::{Increment, OdometryErrors, Tracker, TrackerSettings};
 use posegate_c::*;
 use std::collections::BTreeSet;
-
-const NO_AGES: [posegate_age; POSEGATE_MOST_AGES] = [posegate_age {
-    until_ms: 0,
-    inflation_q16: 0,
-}; POSEGATE_MOST_AGES];
-
-static DOCK: &[u8] = include_bytes!("../../../examples/tables/dock.posegate");
-static SEE_T7: &[u8] = include_bytes!("../../../examples/tables/see-t7.posegate");
-
-fn leaked<T>(value: T) -> *mut T {
-    Box::leak(Box::new(value))
-}
-
-/// Returns zeroed storage.
-fn zeroed<T>() -> *mut T {
-    // SAFETY: the tests make storage and structs of numbers.
-    leaked(unsafe { core::mem::zeroed() })
-}
-
-fn misaligned<T>() -> *mut T {
-    zeroed::<[T; 2]>().cast::<u8>().wrapping_add(1).cast()
-}
+use support::{
+    DOCK, SEE_T7, evidence_of_c, in_c, leaked, misaligned, name, report_of_c, source, zero, zeroed,
+};
 
 fn source_of_c() -> posegate_source {
-    let mut frame = [0; 32];
-    for (to, byte) in frame.iter_mut().zip(*b"map") {
-        *to = core::ffi::c_char::from_ne_bytes([byte]);
-    }
     posegate_source {
-        frame,
         inflation: 1.25,
-        cross_terms: posegate_cross_terms::Filled as u32,
-        share_q8: 0,
-        motion: posegate_motion::Moves as u32,
-        reserved: 0,
         along_m_s: 0.5,
-        across_m_s: 0.0,
         turn_rad_s: 1.0,
-        ages: NO_AGES,
+        ..source()
     }
 }
 
@@ -59,9 +32,7 @@ fn settings_of_c(table: &Table<'_>) -> posegate_settings {
         assert_eq!(status, posegate_status::Ok);
         *settings
     };
-    for (to, byte) in settings.task.iter_mut().zip(table.task().bytes()) {
-        *to = core::ffi::c_char::from_ne_bytes([byte]);
-    }
+    settings.task = name(table.task());
     settings.task_digest = table.task_digest();
     settings.sources[0] = posegate_source {
         inflation: 1.0,
@@ -154,34 +125,7 @@ fn belief(x_m: f64, y_m: f64, yaw_rad: f64) -> PoseEstimate {
 }
 
 fn belief_of_c(x_m: f64, y_m: f64, yaw_rad: f64) -> posegate_belief {
-    posegate_belief {
-        x_m,
-        y_m,
-        heading: [yaw_rad, 0.0, 0.0, 0.0],
-        spread: [4e-4, 1e-4, 0.0, 1e-4, 3e-4, 0.0, 0.0, 0.0, 1e-4],
-        heading_kind: posegate_heading::Yaw as u32,
-        spread_kind: posegate_spread::Gaussian as u32,
-    }
-}
-
-fn report_of_c(sequence: u32, stamp_ms: u32, belief: posegate_belief) -> posegate_report {
-    posegate_report {
-        belief,
-        frame: FrameId::of("map").digest(),
-        source: 0,
-        sequence,
-        stamp_ms,
-        reserved: 0,
-    }
-}
-
-fn evidence_of_c(report: posegate_report, others: &[posegate_belief]) -> posegate_evidence {
-    // SAFETY: numbers.
-    let mut evidence: posegate_evidence = unsafe { *zeroed() };
-    evidence.report = report;
-    evidence.other_count = others.len() as u32;
-    evidence.others[..others.len()].copy_from_slice(others);
-    evidence
+    in_c(&belief(x_m, y_m, yaw_rad))
 }
 
 fn step_on(
@@ -189,9 +133,9 @@ fn step_on(
     now_ms: u32,
     evidence: *const posegate_evidence,
 ) -> (posegate_status, posegate_step) {
-    // SAFETY: a step of numbers; the tests pass what the function must handle.
+    // SAFETY: the tests pass what the function must handle.
     unsafe {
-        let mut step = core::mem::zeroed();
+        let mut step = zero();
         let status = posegate_gate_step_on(gate, now_ms, evidence, &mut step);
         (status, step)
     }
@@ -476,80 +420,31 @@ fn c_hypotheses_equal_rust() {
     assert_eq!(step_on(gate, 110, &evidence).0, posegate_status::Ok);
 }
 
+/// A gate closes at evidence or a tracker that is not there, and says so.
 #[test]
-fn bad_pointers_are_errors_and_close() {
-    let evidence = evidence_of_c(report_of_c(1, 100, belief_of_c(0.0, 0.0, 0.0)), &[]);
-    let increment = posegate_increment {
-        ahead_m: 0.0,
-        left_m: 0.0,
-        turn_rad: 0.0,
-        begins_ms: 0,
-        stamp_ms: 0,
-    };
+fn a_gate_closes_without_evidence_or_tracker() {
     let settings = tracker_settings_of_c();
-    let (table, length) = (DOCK.as_ptr(), DOCK.len());
     // SAFETY: pointers are null, misaligned, to zeroed storage, or valid.
     unsafe {
-        for (bad, expected) in [
-            (core::ptr::null_mut::<u64>(), posegate_status::Null),
+        for (evidence, expected) in [
+            (core::ptr::null_mut(), posegate_status::Null),
             (misaligned(), posegate_status::Misaligned),
         ] {
-            assert_eq!(posegate_settings_for_source(1, 1, bad.cast()), expected);
-            assert_eq!(step_on(bad.cast(), 0, &evidence).0, expected);
-            let (status, step) = step_on(gate_of_c(DOCK), 0, bad.cast());
+            let (status, step) = step_on(gate_of_c(DOCK), 0, evidence);
             assert_eq!(status, expected);
             assert_eq!(step.reason, u32::from(Reason::SourceUnknown.code()));
-            let gate = gate_of_c(DOCK);
-            let status = posegate_gate_step_on(gate, 0, &evidence, bad.cast());
-            assert_eq!(status, expected);
-            let status = posegate_gate_examine_on(gate, bad.cast(), zeroed());
-            assert_eq!(status, expected);
-            let status = posegate_gate_examine_on(gate, &evidence, bad.cast());
-            assert_eq!(status, expected);
-            let status = posegate_tracker_init(bad.cast(), table, length, &settings);
-            assert_eq!(status, expected);
-            let status = posegate_tracker_init(zeroed(), table, length, bad.cast());
-            assert_eq!(status, expected);
-            let tracker = tracker_of_c();
-            let mut reason = 0;
-            let status = posegate_tracker_odometry(bad.cast(), &increment, &mut reason);
-            assert_eq!(status, expected);
-            assert_ne!(reason, 0);
-            reason = 0;
-            let status = posegate_tracker_odometry(tracker, bad.cast(), &mut reason);
-            assert_eq!(status, expected);
-            assert_ne!(reason, 0);
-            let status = posegate_tracker_fix(tracker, bad.cast(), &mut reason);
-            assert_eq!(status, expected);
-            let tracked = leaked(posegate_tracked {
-                evidence,
-                reason: 0,
-                reserved: 0,
-            });
-            assert_eq!(posegate_tracker_tracked(bad.cast(), 0, tracked), expected);
-            assert_ne!((*tracked).reason, 0);
-            assert_eq!(posegate_tracker_tracked(tracker, 0, bad.cast()), expected);
-            assert_eq!(posegate_tracker_reach(tracker, bad.cast()), expected);
-            let mut reach_ms = 77;
-            let status = posegate_tracker_reach(bad.cast(), &mut reach_ms);
-            assert_eq!((status, reach_ms), (expected, 0));
         }
-        let not_initialised = posegate_status::NotInitialised;
-        let status = posegate_tracker_tracked(zeroed(), 0, zeroed());
-        assert_eq!(status, not_initialised);
-        // A gate that steps on no tracker closes.
         let (gate, step) = (gate_of_c(SEE_T7), zeroed::<posegate_step>());
         for (tracker, expected) in [
-            (zeroed(), not_initialised),
+            (zeroed(), posegate_status::NotInitialised),
             (core::ptr::null_mut(), posegate_status::Null),
         ] {
             let status = posegate_gate_step_tracked(gate, 2_000, tracker, step);
             assert_eq!(status, expected);
             assert_eq!((*step).reason, u32::from(Reason::Silent.code()));
         }
-        let status = posegate_tracker_init(zeroed(), core::ptr::null(), 0, &settings);
-        assert_eq!(status, posegate_status::Null);
-        let status = posegate_tracker_init(zeroed(), table, length - 1, &settings);
+        let (table, length) = (DOCK.as_ptr(), DOCK.len() - 1);
+        let status = posegate_tracker_init(zeroed(), table, length, &settings);
         assert_eq!(status, posegate_status::TableInvalid);
     }
 }
@@ -622,13 +517,7 @@ fn invalid_odometry_ends_the_path() {
 fn zeroed_and_wrong_tracker_settings_are_refused() {
     type Change = fn(&mut posegate_tracker_settings);
     let wrong: [(Change, posegate_status); 9] = [
-        (
-            |s| {
-                // SAFETY: numbers.
-                s.errors = unsafe { core::mem::zeroed() };
-            },
-            posegate_status::Odometry,
-        ),
+        (|s| s.errors = zero(), posegate_status::Odometry),
         (
             |s| (s.source.along_m_s, s.source.turn_rad_s) = (0.0, 0.0),
             posegate_status::Motion,

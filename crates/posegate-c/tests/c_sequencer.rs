@@ -1,29 +1,18 @@
 //! A plan and a clock in C: they act as in Rust, and no wrong argument gives a step or stops the time unseen.
 
+mod support;
+
 use posegate::gate::{Clock, Reason};
+use posegate::report::PoseEstimate;
 use posegate::sequencer::{Instruction, Rules, Sequencer, StopReason};
-use posegate::set::{Estimate, PoseSet, RadiusSquared};
+use posegate::set::{Estimate, PoseSet, RadiusSquared, Uncertainty};
 use posegate_c::*;
 use std::ffi::CStr;
+use support::{RULES, in_c, leaked, zero, zeroed};
 
-static RULES: &[u8] = include_bytes!("../../../examples/tables/contingent.rules");
 /// The squared radius of epsilon 0.99.
 const RADIUS: u32 = 743_498;
 const OK: posegate_status = posegate_status::Ok;
-
-fn leaked<T>(value: T) -> *mut T {
-    Box::leak(Box::new(value))
-}
-
-/// Returns zeroed storage.
-fn zeroed<T>() -> *mut T {
-    // SAFETY: the tests make storage and structs of numbers.
-    leaked(unsafe { core::mem::zeroed() })
-}
-
-fn misaligned<T>() -> *mut T {
-    zeroed::<[T; 2]>().cast::<u8>().wrapping_add(1).cast()
-}
 
 fn sequencer() -> *mut posegate_sequencer {
     let sequencer = zeroed();
@@ -33,24 +22,24 @@ fn sequencer() -> *mut posegate_sequencer {
     sequencer
 }
 
-fn belief(estimate: Estimate, kind: posegate_spread, spread: [f64; 9]) -> posegate_belief {
-    posegate_belief {
-        x_m: estimate.x_m,
-        y_m: estimate.y_m,
-        heading: [estimate.yaw_rad, 0.0, 0.0, 0.0],
-        spread,
-        heading_kind: posegate_heading::Yaw as u32,
-        spread_kind: kind as u32,
-    }
+const ORIGIN: Estimate = Estimate {
+    x_m: 0.0,
+    y_m: 0.0,
+    yaw_rad: 0.0,
+};
+
+/// Returns an estimate from which the plan drives first.
+fn start() -> posegate_belief {
+    let bounded = Uncertainty::Bounded {
+        translation_m: 0.1,
+        yaw_rad: 0.02,
+    };
+    in_c(&PoseEstimate::new(ORIGIN, bounded))
 }
 
 /// Returns what an instruction in Rust is in C.
 fn expected(instruction: Instruction<'_>) -> (u32, u32, u32, String, posegate_pose) {
-    let nowhere = posegate_pose {
-        x_um: 0,
-        y_um: 0,
-        yaw_turn_q32: 0,
-    };
+    let nowhere = zero();
     let none = String::new();
     match instruction {
         Instruction::Look { task, tag } => (1, 0, tag, task.into(), nowhere),
@@ -99,19 +88,20 @@ fn c_sequencer_equals_rust_sequencer() {
                 yaw_rad: f64::from(place.yaw.signed()) / 4_294_967_296.0 * core::f64::consts::TAU,
             };
             let size = 0.02 * (1 + below(15)) as f64;
-            let (kind, spread, set) = if below(2) == 0 {
-                let set = PoseSet::bounded(estimate, size, 0.03).unwrap();
-                let spread = [size, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-                (posegate_spread::Bounded, spread, set)
+            let (spread, set) = if below(2) == 0 {
+                let spread = Uncertainty::Bounded {
+                    translation_m: size,
+                    yaw_rad: 0.03,
+                };
+                (spread, PoseSet::bounded(estimate, size, 0.03).unwrap())
             } else {
                 let variance = (size / 4.0).powi(2);
                 let covariance = [[variance, 0.0, 0.0], [0.0, variance, 0.0], [0.0, 0.0, 1e-4]];
                 let radius = RadiusSquared::from_q16(RADIUS).unwrap();
                 let set = PoseSet::gaussian(estimate, covariance, radius).unwrap();
-                let spread = covariance.as_flattened().try_into().unwrap();
-                (posegate_spread::Gaussian, spread, set)
+                (Uncertainty::Gaussian(covariance), set)
             };
-            let belief = belief(estimate, kind, spread);
+            let belief = support::in_c(&PoseEstimate::new(estimate, spread));
             let next = zeroed::<posegate_instruction>();
             // SAFETY: valid pointers; the name ends with a zero.
             let found = unsafe {
@@ -147,15 +137,10 @@ fn c_sequencer_equals_rust_sequencer() {
 #[test]
 fn invalid_arguments_inhibit() {
     let bad = posegate_status::BadValue;
-    let start = Estimate {
-        x_m: 0.0,
-        y_m: 0.0,
-        yaw_rad: 0.0,
-    };
-    let bounded = [0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let good = belief(start, posegate_spread::Bounded, bounded);
-    let gaussian = [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-4];
-    let gaussian = belief(start, posegate_spread::Gaussian, gaussian);
+    let good = start();
+    let gaussian = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
+    let gaussian = PoseEstimate::new(ORIGIN, Uncertainty::Gaussian(gaussian));
+    let gaussian = in_c(&gaussian);
     let not_a_number = posegate_belief {
         x_m: f64::NAN,
         ..good
@@ -185,35 +170,14 @@ fn invalid_arguments_inhibit() {
         }
         assert_eq!(posegate_sequencer_next(plan, &good, 0, next), OK);
         assert_eq!((*next).kind, posegate_instruction_kind::Drive as u32);
-        for (sequencer, expected) in [
-            (core::ptr::null_mut(), posegate_status::Null),
-            (misaligned(), posegate_status::Misaligned),
-            (zeroed(), posegate_status::NotInitialised),
-        ] {
-            let status = posegate_sequencer_next(sequencer, &good, RADIUS, next);
-            assert_eq!(status, expected);
-            assert_eq!((*next).kind, posegate_instruction_kind::Inhibit as u32);
-            assert_eq!(posegate_sequencer_succeeded(sequencer), expected);
-            assert_eq!(posegate_sequencer_failed(sequencer), expected);
-        }
-        let null = posegate_status::Null;
-        let status = posegate_sequencer_next(plan, core::ptr::null(), RADIUS, next);
-        assert_eq!(status, null);
-        let status = posegate_sequencer_next(plan, &good, RADIUS, core::ptr::null_mut());
-        assert_eq!(status, null);
-        let status = posegate_sequencer_init(zeroed(), core::ptr::null(), RULES.len());
-        assert_eq!(status, null);
-        let bytes = RULES.as_ptr();
-        let status = posegate_sequencer_init(core::ptr::null_mut(), bytes, RULES.len());
-        assert_eq!(status, null);
-        let status = posegate_sequencer_init(zeroed(), bytes, usize::MAX);
+        let status = posegate_sequencer_init(zeroed(), RULES.as_ptr(), usize::MAX);
         assert_eq!(status, posegate_status::BadLength);
         // A copy at another place.
         let moved = leaked(plan.read());
         let status = posegate_sequencer_next(moved, &good, RADIUS, next);
         assert_eq!(status, posegate_status::NotInitialised);
         // Damaged rules leave storage that is not in use.
-        let status = posegate_sequencer_init(plan, bytes, RULES.len() - 1);
+        let status = posegate_sequencer_init(plan, RULES.as_ptr(), RULES.len() - 1);
         assert_eq!(status, posegate_status::RulesInvalid);
         let status = posegate_sequencer_next(plan, &good, RADIUS, next);
         assert_eq!(status, posegate_status::NotInitialised);
@@ -249,10 +213,6 @@ fn c_clock_equals_rust_clock() {
         let status = posegate_clock_now(clock, count, &mut now_ms);
         assert_eq!(status, posegate_status::ClockStopped);
         assert_eq!(now_ms, before);
-        let status = posegate_clock_now(clock, count, core::ptr::null_mut());
-        assert_eq!(status, posegate_status::Null);
-        let status = posegate_clock_now(core::ptr::null_mut(), count, &mut now_ms);
-        assert_eq!((status, now_ms), (posegate_status::Null, 0));
     }
     assert_eq!(Reason::ClockStopped.code(), 46);
 }
@@ -260,13 +220,7 @@ fn c_clock_equals_rust_clock() {
 /// The state of a plan is the caller's own, so the same estimate gives the same step until its result is reported.
 #[test]
 fn a_step_is_repeated_until_its_result_is_reported() {
-    let estimate = Estimate {
-        x_m: 0.0,
-        y_m: 0.0,
-        yaw_rad: 0.0,
-    };
-    let spread = [0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let belief = belief(estimate, posegate_spread::Bounded, spread);
+    let belief = start();
     let (plan, next) = (sequencer(), zeroed::<posegate_instruction>());
     // SAFETY: valid pointers.
     unsafe {
