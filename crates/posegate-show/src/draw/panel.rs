@@ -325,7 +325,8 @@ pub(super) fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f
 }
 
 /// Formats a number, with a minus as wide as a plus.
-pub(super) fn signed(value: f64) -> String {
+#[must_use]
+pub fn signed(value: f64) -> String {
     number(value).replace('-', "\u{2212}")
 }
 

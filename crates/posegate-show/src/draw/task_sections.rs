@@ -37,7 +37,8 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     let columns = headings.len().div_ceil(rows);
     let held: Vec<ContainmentResult> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
 
-    let top = if held.is_empty() { 96.0 } else { 138.0 };
+    let results = results(subject, &held);
+    let top = 96.0 + 42.0 * results.len() as f64;
     let below = top + rows as f64 * (panel_height + GAP[1]) - 22.0;
     let entries = entries(subject, &held);
     let height = below + 8.0 + entries.len().div_ceil(2) as f64 * LINE + 12.0;
@@ -57,7 +58,11 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
         signed(goal.yaw_deg)
     );
     picture.text([24.0, 54.0], &note, &Font::new(12.0, palette::FAINT));
-    write_results(subject, &held, &mut picture);
+    let proof = proof(subject);
+    for (row, (inside, bold)) in results.iter().enumerate() {
+        let at = [24.0, 68.0 + 42.0 * row as f64];
+        verdict(&mut picture, at, *inside, bold, &proof);
+    }
 
     // A finer border than a pixel is not visible.
     let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
@@ -123,30 +128,23 @@ pub(super) fn pose_set(
     }
 }
 
-/// Writes the results of the containment tests.
-fn write_results(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture) {
-    let within = held.iter().filter(|held| held.inside).count();
-    match held {
-        [] => {}
-        [only] => {
-            let name = name_of(&subject.beliefs[0]);
-            let bold = format!("The pose-set of {name}: {}", only.words);
-            verdict(picture, [24.0, 68.0], only.inside, &bold, &note(subject));
-        }
-        all => {
-            let bold = format!("{within} of {} pose-sets are inside", all.len());
-            verdict(
-                picture,
-                [24.0, 68.0],
-                within == all.len(),
-                &bold,
-                &note(subject),
-            );
-        }
+/// Returns the results of the containment tests: one for each pose-set if their names differ, else one for all.
+fn results(subject: &Subject<'_>, held: &[ContainmentResult]) -> Vec<(bool, String)> {
+    let is_bounded = |set: &PoseSetF64| matches!(set.spread, Uncertainty::Bounded { .. });
+    if held.len() > 1 && !subject.beliefs.iter().all(is_bounded) {
+        let within = held.iter().filter(|held| held.inside).count();
+        let words = format!("{within} of {} pose-sets are inside", held.len());
+        return vec![(within == held.len(), words)];
     }
+    let each = subject.beliefs.iter().zip(held);
+    each.map(|(set, ContainmentResult { inside, words })| {
+        let words = format!("The pose-set of {}: {words}", name_of(set));
+        (*inside, words)
+    })
+    .collect()
 }
 
-fn note(subject: &Subject<'_>) -> String {
+fn proof(subject: &Subject<'_>) -> String {
     let proven = if subject.table.is_some() {
         "by the gate, on the table"
     } else {
