@@ -69,28 +69,13 @@ struct Edge {
 impl Edge {
     /// Side 0 to 3 of a square: below, right, above, left.
     fn of_square(i: usize, j: usize, side: usize) -> Self {
-        match side {
-            0 => Self {
-                i,
-                j,
-                along_y: false,
-            },
-            1 => Self {
-                i: i + 1,
-                j,
-                along_y: true,
-            },
-            2 => Self {
-                i,
-                j: j + 1,
-                along_y: false,
-            },
-            _ => Self {
-                i,
-                j,
-                along_y: true,
-            },
-        }
+        let (i, j, along_y) = match side {
+            0 => (i, j, false),
+            1 => (i + 1, j, true),
+            2 => (i, j + 1, false),
+            _ => (i, j, true),
+        };
+        Self { i, j, along_y }
     }
 }
 

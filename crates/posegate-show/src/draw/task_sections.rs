@@ -29,20 +29,20 @@ const MOST: usize = 9;
 pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     let (window, yaw_deg) = subject.extent()?;
     let headings = headings(yaw_deg, &subject.beliefs, subject.goal().yaw_deg);
-    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
-    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
-    let [panel_width, panel_height] = wide.map(|w| w * scale);
-    let columns = ((WIDTH + GAP[0]) / (panel_width + GAP[0])).max(1.0) as usize;
+    let first = Panel::fitted(window, [LEFT, 96.0], LARGEST);
+    let pitch = [first.width() + GAP[0], first.height() + GAP[1]];
+    let columns = ((WIDTH + GAP[0]) / pitch[0]).max(1.0) as usize;
     let rows = headings.len().div_ceil(columns);
     let columns = headings.len().div_ceil(rows);
     let held: Vec<ContainmentResult> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
 
     let results = results(subject, &held);
-    let top = 96.0 + 42.0 * results.len() as f64;
-    let below = top + rows as f64 * (panel_height + GAP[1]) - 22.0;
+    let top = first.top + 42.0 * results.len() as f64;
+    let first = Panel { top, ..first };
+    let below = top + rows as f64 * pitch[1] - 22.0;
     let entries = entries(subject, &held);
     let height = below + 8.0 + entries.len().div_ceil(2) as f64 * LINE + 12.0;
-    let across = columns as f64 * (panel_width + GAP[0]) - GAP[0];
+    let across = columns as f64 * pitch[0] - GAP[0];
     let width = (LEFT + across + 24.0).max(760.0);
     let title = format!(
         "Success set S of {}, heading by heading",
@@ -67,26 +67,25 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     // A finer border than a pixel is not visible.
     let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
         .par_iter()
-        .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / scale))
+        .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / first.scale))
         .collect();
     for (index, (yaw_deg, border)) in headings.iter().zip(&borders).enumerate() {
-        let panel = Panel {
-            window,
-            left: LEFT + (panel_width + GAP[0]) * (index % columns) as f64,
-            top: top + (panel_height + GAP[1]) * (index / columns) as f64,
-            scale,
-            y_title: index % columns == 0,
-        };
+        let panel = first.in_rows(index, columns, pitch);
         let empty = if border.is_empty() { ": empty" } else { "" };
         let title = format!("yaw {}°{empty}", signed(*yaw_deg));
-        panel.draw(&mut picture, &title, tick_at_scale(scale, 42.0), |inside| {
-            inside.polygons(border, &palette::AREA);
-            table_at(subject, *yaw_deg, &window, inside);
-            inside.polygons(border, &palette::BORDER);
-            for (belief, held) in subject.beliefs.iter().zip(&held) {
-                pose_set(subject, belief, held.inside, *yaw_deg, inside);
-            }
-        });
+        panel.draw(
+            &mut picture,
+            &title,
+            tick_at_scale(first.scale, 42.0),
+            |inside| {
+                inside.polygons(border, &palette::AREA);
+                table_at(subject, *yaw_deg, &window, inside);
+                inside.polygons(border, &palette::BORDER);
+                for (belief, held) in subject.beliefs.iter().zip(&held) {
+                    pose_set(subject, belief, held.inside, *yaw_deg, inside);
+                }
+            },
+        );
     }
     let half = entries.len().div_ceil(2);
     let (first, second) = entries.split_at(half);
