@@ -2,9 +2,9 @@
 
 use crate::site_input::{Failure, Outcome, answer, print, progress};
 use posegate_files::files::{Files, OutputFolder};
+use posegate_show::draw::figures;
 use posegate_show::draw::report::{numbers, summary};
 use posegate_show::draw::study::{CaseStudy, SITE, StudyError};
-use posegate_show::draw::{fig1_parking, fig2_chain, fig3_plan, fig3_sections, fig4_placement};
 
 /// Writes the paper's case study: pictures, tables and numbers
 #[derive(clap::Args)]
@@ -28,19 +28,14 @@ pub fn run(arguments: &Arguments, files: &Files) -> Outcome {
     for table in &study.tables {
         written.push((format!("{}.posegate", table.task), table.bytes.clone()));
     }
-    for (name, text) in [
-        ("fig1-parking.svg", fig1_parking(&study)),
-        ("fig2-chain.svg", fig2_chain(&study)),
-        ("fig3-sections.svg", fig3_sections(&study)),
-        ("fig3-plan.svg", fig3_plan(&study)),
-        ("fig4-placement.svg", Ok(fig4_placement(&study))),
-        ("numbers.json", numbers(&study)),
-    ] {
-        written.push((name.into(), text.map_err(fault)?.into_bytes()));
+    for (name, picture) in figures(&study).map_err(fault)? {
+        written.push((name.into(), picture.into_bytes()));
     }
+    let numbers = numbers(&study).map_err(fault)?;
+    written.push(("numbers.json".into(), numbers.clone().into_bytes()));
     files.write_into(folder, &written)?;
     if arguments.json {
-        print(&numbers(&study).map_err(fault)?.trim_end())?;
+        print(&numbers.trim_end())?;
         return Ok(answer(true));
     }
     print(&summary(&study).map_err(fault)?.trim_end())?;

@@ -1,8 +1,11 @@
 //! Measures the time and memory of plans. Prints one JSON line each; fails if a goal is missed. Run by
 //! `ci.sh planning`.
 
+#[path = "support/curves.rs"]
+mod curves;
+
+use curves::logarithmic;
 use posegate_plan::{Options, Prepared, Status};
-use posegate_show::draw::logarithmic;
 use posegate_site::Site;
 use std::process::ExitCode;
 use std::time::Instant;

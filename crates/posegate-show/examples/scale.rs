@@ -8,7 +8,10 @@
 //! its `C` cores (`p` seconds per piece). The merge comes last (`m` seconds per piece): `T(N) = R + ceil(pieces / (N
 //! C)) p + m pieces`. Nodes share only the folder, whose speed is not in the model.
 
-use posegate_show::draw::logarithmic;
+#[path = "support/curves.rs"]
+mod curves;
+
+use curves::logarithmic;
 use posegate_site::Site;
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};

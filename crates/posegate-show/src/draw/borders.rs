@@ -38,9 +38,8 @@ pub fn borders_picture(
         *near = goal;
     }
     let shown: Vec<_> = at.into_iter().filter_map(|k| sections.get(k)).collect();
-    let wide = [window.x, window.y].map(|[lo, hi]| hi - lo);
-    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
-    let pitch = [0, 1].map(|axis| wide[axis] * scale + GAP[axis]);
+    let first = Panel::fitted(*window, [LEFT, TOP], LARGEST);
+    let pitch = [first.width() + GAP[0], first.height() + GAP[1]];
     let width = LEFT + pitch[0] * shown.len().clamp(1, COLUMNS) as f64;
     let rows = shown.len().div_ceil(COLUMNS).max(1);
     let height = TOP + pitch[1] * rows as f64 - 18.0;
@@ -49,19 +48,18 @@ pub fn borders_picture(
     let note = "In the frame of the goal; yaw counts from the goal's.";
     picture.text([24.0, 52.0], note, &Font::new(12.0, palette::FAINT));
     for (number, (yaw_deg, border)) in shown.into_iter().enumerate() {
-        let panel = Panel {
-            window: *window,
-            left: LEFT + pitch[0] * (number % COLUMNS) as f64,
-            top: TOP + pitch[1] * (number / COLUMNS) as f64,
-            scale,
-            y_title: number.is_multiple_of(COLUMNS),
-        };
+        let panel = first.in_rows(number, COLUMNS, pitch);
         let empty = if border.is_empty() { ": empty" } else { "" };
         let title = format!("yaw {}°{empty}", signed(*yaw_deg));
-        panel.draw(&mut picture, &title, tick_at_scale(scale, 42.0), |inside| {
-            inside.polygons(border, &palette::AREA);
-            inside.polygons(border, &palette::BORDER);
-        });
+        panel.draw(
+            &mut picture,
+            &title,
+            tick_at_scale(first.scale, 42.0),
+            |inside| {
+                inside.polygons(border, &palette::AREA);
+                inside.polygons(border, &palette::BORDER);
+            },
+        );
     }
     picture.finish()
 }

@@ -1,7 +1,8 @@
 //! Draws a chain step by step, as in the paper's Figs. 2 and 3: the pose-sets before and after each step, and
 //! S.
 
-use super::hall::{hall, hall_legend};
+use super::hall::{hall, hall_entries, hall_legend, hall_panel, legend_height};
+use super::ingredients::ahead;
 use super::legend::{Sample, legend};
 use super::palette;
 use super::panel::{Inside, Panel, Window, tick_at_scale};
@@ -39,22 +40,15 @@ pub fn chain_picture<'s>(
     let rows = report.steps.len().div_ceil(COLUMNS).max(1);
     let width = LEFT + columns as f64 * ACROSS + 10.0;
     let title = format!("Chain {}", literal(name));
-    // The height of the hall determines where the steps begin: draw it once for its size.
+    // The height of the hall determines where the steps begin.
     let routes = [Route::from(report)];
-    let with_hall = |picture: &mut Picture| {
-        let site = site?;
-        let panel = hall(
-            picture,
-            site,
-            &routes,
-            "The hall and the route",
-            [LEFT, TOP + 14.0],
-            HALL,
-        );
-        let legend = [24.0, panel.bottom() + 44.0];
-        Some(legend[1] + hall_legend(picture, site, &routes, legend) + 34.0)
-    };
-    let first = with_hall(&mut Picture::new(760.0, 760.0, &title)).unwrap_or(TOP);
+    let hall_of = site.map(|site| {
+        let panel = hall_panel(site, &routes, [LEFT, TOP + 14.0], HALL);
+        (site, panel, hall_entries(site, &routes))
+    });
+    let first = hall_of.as_ref().map_or(TOP, |(_, panel, entries)| {
+        panel.bottom() + 44.0 + legend_height(entries) + 34.0
+    });
     let bottom = first + rows as f64 * DOWN;
     let mut picture = Picture::new(width.max(760.0), bottom + 96.0, &title);
     picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
@@ -64,12 +58,13 @@ pub fn chain_picture<'s>(
     };
     let colour = palette::of_words(report.succeeds());
     picture.text([24.0, 54.0], &whole, &Font::new(14.0, colour));
-    with_hall(&mut picture);
+    if let Some((site, panel, entries)) = &hall_of {
+        hall(&mut picture, panel, site, &routes, "The hall and the route");
+        hall_legend(&mut picture, [24.0, panel.bottom() + 44.0], entries);
+    }
     for (index, step) in report.steps.iter().enumerate() {
-        let left = LEFT + (index % COLUMNS) as f64 * ACROSS;
-        let top = first + 14.0 + (index / COLUMNS) as f64 * DOWN;
         let set = step.task.as_deref().and_then(success);
-        panel(&mut picture, [left, top], index, step, set);
+        panel(&mut picture, [LEFT, first + 14.0], index, step, set);
     }
     legend(
         &mut picture,
@@ -96,10 +91,10 @@ pub fn chain_picture<'s>(
     picture.finish()
 }
 
-/// Draws a step: its panel, and two lines below it.
+/// Draws a step: its panel, and two lines below it. The first step's corner is given.
 fn panel(
     picture: &mut Picture,
-    [left, top]: [f64; 2],
+    corner: [f64; 2],
     index: usize,
     step: &StepReport,
     success: Option<&SuccessSet>,
@@ -111,18 +106,9 @@ fn panel(
         }
         _ => position(shown(step)),
     };
-    let window = Window {
-        x: [middle[0] - half, middle[0] + half],
-        y: [middle[1] - half, middle[1] + half],
-    };
-    let scale = EDGE / (2.0 * half);
-    let panel = Panel {
-        window,
-        left,
-        top,
-        scale,
-        y_title: index.is_multiple_of(COLUMNS),
-    };
+    let window = Window::about(middle, half);
+    let panel = Panel::fitted(window, corner, [EDGE; 2]).in_rows(index, COLUMNS, [ACROSS, DOWN]);
+    let scale = panel.scale;
     let what = match (&step.task, step.kind) {
         (Some(task), StepKind::Localization) => format!("{}. look: {}", index + 1, literal(task)),
         (Some(task), _) => format!("{}. work: {}", index + 1, literal(task)),
@@ -139,7 +125,7 @@ fn panel(
         }
         draw_sets(inside, step, 0.16 * half);
     });
-    draw_words(picture, [left, top + EDGE], step);
+    draw_words(picture, [panel.left, panel.top + EDGE], step);
 }
 
 /// Returns the belief that a panel shows: after a drive, before any other step.
@@ -190,12 +176,8 @@ fn draw_sets(inside: &mut Inside<'_>, step: &StepReport, nose: f64) {
     inside.disc(at, reach(shown), &NEEDED);
     let style = palette::of_set(step.failure.is_none());
     inside.disc(at, shown.enclosing()[0], &style);
-    let heading = shown.pose[2];
-    let ahead = [
-        at[0] + nose * libm::cos(heading),
-        at[1] + nose * libm::sin(heading),
-    ];
-    inside.arrow(at, ahead, &Style::outlined(palette::INK, 2.0));
+    let nose = ahead(shown.pose, nose);
+    inside.arrow(at, nose, &Style::outlined(palette::INK, 2.0));
 }
 
 /// Draws the uncertainty and the result of a step below its panel.

@@ -1,9 +1,9 @@
 //! Things on a floor plan: walls, tags, cameras, robots.
 
-use super::ingredients::{Eye, axes, frame};
+use super::ingredients::{Eye, ahead, axes, frame, radians};
 use super::measure::{fitted, text_width};
 use super::palette;
-use super::panel::{Inside, Window};
+use super::panel::{Inside, Panel, Window};
 use super::section::border;
 use super::svg::{Anchor, Font, Style};
 use posegate::shape::{PoseDeg, Tag, Visibility, Wall};
@@ -32,12 +32,9 @@ impl Inside<'_> {
         let (x, y, half) = (tag.pose.x, tag.pose.y, 0.5 * tag.size);
         let end = |way: f64| [x + way * half * across[0], y + way * half * across[1]];
         self.line(&[end(-1.0), end(1.0)], &palette::TAG);
-        let mut tip = [x, y];
-        self.in_pixels(|_, panel| {
-            let longest = longest.map_or(f64::INFINITY, |pixels| pixels / panel.scale);
-            let length = (30.0 / panel.scale).max(0.6 * tag.size).min(longest);
-            tip = [x + length * normal[0], y + length * normal[1]];
-        });
+        let longest = longest.map_or(f64::INFINITY, |pixels| pixels / self.scale());
+        let length = (30.0 / self.scale()).max(0.6 * tag.size).min(longest);
+        let tip = [x + length * normal[0], y + length * normal[1]];
         self.arrow([x, y], tip, &Style::outlined(palette::INK, 1.6));
     }
 
@@ -48,16 +45,8 @@ impl Inside<'_> {
 
     /// Draws a pose as a dot and an arrow forward with a length in pixels.
     pub fn pose_with_arrow(&mut self, pose: PoseDeg, length: f64, style: &Style) {
-        let yaw = pose.yaw_deg.to_radians();
         let from = [pose.x, pose.y];
-        let mut tip = from;
-        self.in_pixels(|_, panel| {
-            let length = length / panel.scale;
-            tip = [
-                pose.x + length * libm::cos(yaw),
-                pose.y + length * libm::sin(yaw),
-            ];
-        });
+        let tip = ahead(radians(pose), length / self.scale());
         self.disc(from, 0.0, &Style::filled(palette::INK));
         self.arrow(from, tip, style);
     }
@@ -76,16 +65,24 @@ impl Inside<'_> {
         self.in_pixels(|picture, panel| {
             let width = 6.4 * text.chars().count() as f64;
             let [x, y] = panel.at(at);
-            let within = |v: f64, lo: f64, hi: f64| v.min(hi).max(lo);
-            let left = panel.left + 3.0;
-            let x = within(x + dx, left, (left + panel.width() - width - 6.0).max(left));
-            let y = within(y + dy, panel.top + 13.0, panel.bottom() - 4.0);
+            let [x, y] = text_within(panel, [x + dx, y + dy], width, 3.0);
             let ground = Style::filled("none").with_fill_opacity("#ffffff", 0.8);
             picture.rectangle([x - 2.0, y - 10.5, width + 2.0, 14.0], &ground);
             let font = Font::new(11.0, palette::INK).bold();
             picture.text([x, y], text, &font.anchored(Anchor::Start));
         });
     }
+}
+
+/// Returns the place of a text in a panel that is nearest to a point, `margin` pixels from the sides of the panel.
+fn text_within(panel: &Panel, [x, y]: [f64; 2], width: f64, margin: f64) -> [f64; 2] {
+    let within = |v: f64, lo: f64, hi: f64| v.min(hi).max(lo);
+    let left = panel.left + margin;
+    let right = panel.left + panel.width() - width - margin;
+    [
+        within(x, left, right.max(left)),
+        within(y, panel.top + 13.0, panel.bottom() - 4.0),
+    ]
 }
 
 /// Returns the parts of a wall's outline where no tag may be mounted at some height: lines in the world, metres.
@@ -166,14 +163,7 @@ impl Labels {
             let wide = text_width(&text, Self::SIZE, true);
             let [x, y] = panel.at(at);
             let place = |dx: f64, dy: f64| {
-                let within = |v: f64, lo: f64, hi: f64| v.min(hi).max(lo);
-                let left = panel.left + 4.0;
-                let x = within(
-                    x + dx,
-                    left,
-                    (panel.left + panel.width() - wide - 4.0).max(left),
-                );
-                let y = within(y + dy, panel.top + 13.0, panel.bottom() - 4.0);
+                let [x, y] = text_within(panel, [x + dx, y + dy], wide, 4.0);
                 [x, y - 11.0, x + wide, y + 4.0]
             };
             let sides = [8.0, -8.0 - wide, -0.5 * wide, 30.0, -30.0 - wide];
@@ -245,7 +235,6 @@ pub fn seen(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::panel::Panel;
     use crate::draw::svg::Picture;
 
     #[test]

@@ -2,7 +2,7 @@
 //! tags.
 
 use super::floor::Labels;
-use super::ingredients::{Eye, Ingredients, radians};
+use super::ingredients::{Eye, Ingredients, ahead, radians};
 use super::legend::{LINE, Sample, legend};
 use super::palette;
 use super::panel::{Inside, Panel, tick_at_scale};
@@ -60,25 +60,25 @@ fn points(site: &Site, routes: &[Route]) -> Vec<[f64; 2]> {
     points
 }
 
-/// Draws the hall into a panel with its left upper corner at a point, at most as large as `largest` (pixels). Returns the panel.
+/// Returns the panel of a hall with its left upper corner at a point, at most as large as `largest` (pixels).
+pub(super) fn hall_panel(
+    site: &Site,
+    routes: &[Route],
+    corner: [f64; 2],
+    largest: [f64; 2],
+) -> Panel {
+    Panel::fitted(about(&points(site, routes)), corner, largest)
+}
+
+/// Draws the hall into its panel.
 pub(super) fn hall(
     picture: &mut Picture,
+    panel: &Panel,
     site: &Site,
     routes: &[Route],
     title: &str,
-    [left, top]: [f64; 2],
-    largest: [f64; 2],
-) -> Panel {
-    let window = about(&points(site, routes));
-    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
-    let scale = (largest[0] / wide[0]).min(largest[1] / wide[1]);
-    let panel = Panel {
-        window,
-        left,
-        top,
-        scale,
-        y_title: true,
-    };
+) {
+    let scale = panel.scale;
     let hall = Hall {
         site,
         routes,
@@ -99,7 +99,6 @@ pub(super) fn hall(
             }
         }
     });
-    panel
 }
 
 /// The drawn parts of a hall.
@@ -182,12 +181,7 @@ impl Hall<'_> {
             }
         }
         for goal in self.goals() {
-            let yaw = goal.yaw_deg.to_radians();
-            let ahead = 13.0 / self.scale;
-            let middle = [
-                goal.x + ahead * libm::cos(yaw),
-                goal.y + ahead * libm::sin(yaw),
-            ];
+            let middle = ahead(radians(goal), 13.0 / self.scale);
             labels.avoid(inside, middle, 9.0);
         }
         for tag in self.site.tags.values() {
@@ -231,14 +225,25 @@ impl Hall<'_> {
     }
 }
 
-/// Draws the legend of a hall in two columns, with an entry for each kind of drawn part; the point is the upper left
-/// corner. Returns its height, pixels.
+/// Draws the legend of a hall in two columns; the point is the upper left corner.
 pub(super) fn hall_legend(
     picture: &mut Picture,
-    site: &Site,
-    routes: &[Route],
     [left, top]: [f64; 2],
-) -> f64 {
+    entries: &[(Sample, &str)],
+) {
+    let rows = entries.len().div_ceil(2);
+    for (column, entries) in entries.chunks(rows).enumerate() {
+        legend(picture, [left + 320.0 * column as f64, top], entries);
+    }
+}
+
+/// Returns the height of the legend of a hall, pixels.
+pub(super) fn legend_height(entries: &[(Sample, &str)]) -> f64 {
+    LINE * entries.len().div_ceil(2) as f64
+}
+
+/// Returns the entries of the legend of a hall: one for each kind of drawn part.
+pub(super) fn hall_entries(site: &Site, routes: &[Route]) -> Vec<(Sample, &'static str)> {
     let kinds = || routes.iter().flat_map(|route| &route.steps);
     let has = |kind| kinds().any(|step| step.kind == kind);
     let of_wall = |is_block: bool| {
@@ -296,12 +301,7 @@ pub(super) fn hall_legend(
         ),
     ];
     let drawn = all.into_iter().filter(|(is_drawn, ..)| *is_drawn);
-    let entries: Vec<(Sample, &str)> = drawn.map(|(_, sample, words)| (sample, words)).collect();
-    let rows = entries.len().div_ceil(2);
-    for (column, entries) in entries.chunks(rows).enumerate() {
-        legend(picture, [left + 320.0 * column as f64, top], entries);
-    }
-    LINE * rows as f64
+    drawn.map(|(_, sample, words)| (sample, words)).collect()
 }
 
 #[cfg(test)]
@@ -332,7 +332,8 @@ mod tests {
         );
         let site = Site::parse(&text, "site.toml").unwrap();
         let mut picture = Picture::new(760.0, 760.0, "walls");
-        let panel = hall(&mut picture, &site, &[], "", [66.0, 50.0], [600.0, 560.0]);
+        let panel = hall_panel(&site, &[], [66.0, 50.0], [600.0, 560.0]);
+        hall(&mut picture, &panel, &site, &[], "");
         let svg = picture.finish();
         for (name, middle) in [("north", [2.0, 3.0]), ("rack_a", [2.0, -2.5])] {
             assert_eq!(svg.matches(&format!(">{name}</text>")).count(), 1, "{svg}");

@@ -60,6 +60,12 @@ pub fn radians(pose: PoseDeg) -> [f64; 3] {
     [pose.x, pose.y, pose.yaw_deg.to_radians()]
 }
 
+/// Returns the point ahead of a pose on the floor (m, m, rad) at a distance, metres.
+#[must_use]
+pub fn ahead([x, y, yaw]: [f64; 3], distance: f64) -> [f64; 2] {
+    [x + distance * libm::cos(yaw), y + distance * libm::sin(yaw)]
+}
+
 /// Returns the axes of a pose in space: forward (x, a tag's normal), left (y) and up (z), in the frame of
 /// the pose.
 #[must_use]

@@ -1,8 +1,8 @@
 //! Pictures of success sets and pose-sets.
 //!
 //! Pictures are SVG: self-contained, with the same bytes on every host. The
-//! paper's case study ([`study`]) is drawn as its Figs. 1 to 4, and reported in numbers
-//! ([`report`]).
+//! paper's case study ([`study`]) is drawn ([`figures`]), and reported in numbers
+//! ([`report`]). [`scene`] has what pictures are made of.
 //!
 //! ```
 //! use posegate_show::draw::{Subject, task_plan};
@@ -14,17 +14,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+/// What pictures are made of: elements of SVG, panels with axes, legends. Their colours are in [`palette`](super::palette).
+pub mod scene {
+    pub use super::legend::{Sample, legend, verdict};
+    pub use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
+    pub use super::section::border;
+    pub use super::svg::{Anchor, Font, Picture, Style, literal, number};
+}
+
 pub use self::belief::PoseSetF64;
 pub(crate) use self::borders::borders_picture;
 pub use self::chain::chain_picture;
-pub use self::fig2::fig2_chain;
-pub use self::fig4::fig4_placement;
-pub use self::growth::logarithmic;
+pub use self::figures::figures;
 pub use self::hall::success_of;
-pub use self::localization::fig3_sections;
-pub use self::parking::fig1_parking;
 pub use self::placement::{Column, placement_picture};
-pub use self::plan::fig3_plan;
 pub use self::replay::replay_picture;
 pub use self::sheet::{Mounted, MountingSheet, mounting_sheet, mounting_sheet_html};
 pub use self::site_pictures::site_pictures;
@@ -36,28 +39,20 @@ pub use self::task_image::{SeenFrom, task_image};
 pub use self::task_plan::task_plan;
 pub use self::task_sections::task_sections;
 
-mod answers;
 mod belief;
 mod borders;
 mod chain;
-mod fig2;
-mod fig4;
+mod figures;
 mod floor;
-mod growth;
 mod hall;
 pub(crate) mod ingredients;
 mod legend;
 mod letters;
-mod localization;
 mod measure;
-mod multiple;
-mod palette;
+pub mod palette;
 pub(crate) mod panel;
-mod parking;
-mod parking_errors;
 mod pieces;
 mod placement;
-mod plan;
 mod portrait;
 mod replay;
 mod replay_lanes;

@@ -13,6 +13,17 @@ pub struct Window {
     pub y: [f64; 2],
 }
 
+impl Window {
+    /// Returns a square about a point, with half its edge, metres.
+    #[must_use]
+    pub fn about([x, y]: [f64; 2], half: f64) -> Self {
+        Self {
+            x: [x - half, x + half],
+            y: [y - half, y + half],
+        }
+    }
+}
+
 /// A rectangle of covered cells in the goal frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
@@ -38,6 +49,32 @@ pub struct Panel {
 }
 
 impl Panel {
+    /// Returns the panel of a window, with its left upper corner at a point, at the largest scale at which it is at most `largest`
+    /// pixels wide and high.
+    #[must_use]
+    pub fn fitted(window: Window, [left, top]: [f64; 2], largest: [f64; 2]) -> Self {
+        let [wide, high] = [window.x, window.y].map(|[lo, hi]| hi - lo);
+        Self {
+            window,
+            left,
+            top,
+            scale: (largest[0] / wide).min(largest[1] / high),
+            y_title: true,
+        }
+    }
+
+    /// Returns the panel at its place in rows of some columns, which begin at this panel; `pitch` is the distance of two columns and of
+    /// two rows, pixels. The first panel of a row has the title of the y axis.
+    #[must_use]
+    pub fn in_rows(self, number: usize, columns: usize, pitch: [f64; 2]) -> Self {
+        Self {
+            left: self.left + pitch[0] * (number % columns) as f64,
+            top: self.top + pitch[1] * (number / columns) as f64,
+            y_title: number.is_multiple_of(columns),
+            ..self
+        }
+    }
+
     /// Returns the width in the picture, pixels.
     #[must_use]
     pub fn width(&self) -> f64 {
@@ -94,38 +131,43 @@ impl Panel {
             });
         });
         picture.rectangle(edges, &Style::outlined(palette::FRAME, 1.0));
-        self.ticks(picture, tick, names);
+        let x = multiples(self.window.x, tick).map(|x| (self.at([x, 0.0])[0], signed(x)));
+        let y = multiples(self.window.y, tick).map(|y| (self.at([0.0, y])[1], signed(y)));
+        let y_name = if self.y_title { names[1] } else { "" };
+        axes(picture, edges, x, y, [names[0], y_name]);
         let heading = Font::new(13.0, palette::INK)
             .bold()
             .anchored(Anchor::Middle);
         let middle = self.left + 0.5 * self.width();
         picture.text([middle, self.top - 7.0], title, &heading);
     }
+}
 
-    fn ticks(&self, picture: &mut Picture, tick: f64, names: [&str; 2]) {
-        let style = Style::outlined(palette::FRAME, 1.0);
-        let label = Font::new(11.0, palette::INK);
-        for x in multiples(self.window.x, tick) {
-            let [px, _] = self.at([x, 0.0]);
-            picture.line(&[[px, self.bottom()], [px, self.bottom() + 4.0]], &style);
-            let font = label.anchored(Anchor::Middle);
-            picture.text([px, self.bottom() + 16.0], &signed(x), &font);
-        }
-        for y in multiples(self.window.y, tick) {
-            let [_, py] = self.at([0.0, y]);
-            picture.line(&[[self.left - 4.0, py], [self.left, py]], &style);
-            let font = label.anchored(Anchor::End);
-            picture.text([self.left - 6.0, py + 4.0], &signed(y), &font);
-        }
-        let title = label.anchored(Anchor::Middle);
-        let middle = [
-            self.left + 0.5 * self.width(),
-            self.top + 0.5 * self.height(),
-        ];
-        picture.text([middle[0], self.bottom() + 30.0], names[0], &title);
-        if self.y_title {
-            picture.text_turned([self.left - 40.0, middle[1]], -90.0, names[1], &title);
-        }
+/// Draws ticks with their labels below a rectangle (left, top, width, height) and to the left of it, and the names of both axes. A tick
+/// has a place in the picture, pixels, and its label.
+pub(super) fn axes(
+    picture: &mut Picture,
+    [left, top, width, height]: [f64; 4],
+    x: impl Iterator<Item = (f64, String)>,
+    y: impl Iterator<Item = (f64, String)>,
+    names: [&str; 2],
+) {
+    let style = Style::outlined(palette::FRAME, 1.0);
+    let label = Font::new(11.0, palette::INK);
+    let (middle, end) = (label.anchored(Anchor::Middle), label.anchored(Anchor::End));
+    let bottom = top + height;
+    for (x, text) in x {
+        picture.line(&[[x, bottom], [x, bottom + 4.0]], &style);
+        picture.text([x, bottom + 16.0], &text, &middle);
+    }
+    for (y, text) in y {
+        picture.line(&[[left - 4.0, y], [left, y]], &style);
+        picture.text([left - 6.0, y + 4.0], &text, &end);
+    }
+    picture.text([left + 0.5 * width, bottom + 30.0], names[0], &middle);
+    if !names[1].is_empty() {
+        let at = [left - 40.0, top + 0.5 * height];
+        picture.text_turned(at, -90.0, names[1], &middle);
     }
 }
 
@@ -136,6 +178,12 @@ pub struct Inside<'p> {
 }
 
 impl Inside<'_> {
+    /// Returns the scale, pixels per metre.
+    #[must_use]
+    pub const fn scale(&self) -> f64 {
+        self.panel.scale
+    }
+
     /// Draws polygons as one path.
     pub fn polygons(&mut self, polygons: &[Vec<[f64; 2]>], style: &Style) {
         let data: String = polygons
@@ -325,7 +373,8 @@ pub(super) fn multiples([lo, hi]: [f64; 2], tick: f64) -> impl Iterator<Item = f
 }
 
 /// Formats a number, with a minus as wide as a plus.
-pub(super) fn signed(value: f64) -> String {
+#[must_use]
+pub fn signed(value: f64) -> String {
     number(value).replace('-', "\u{2212}")
 }
 

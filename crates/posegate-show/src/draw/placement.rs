@@ -172,7 +172,7 @@ fn image(picture: &mut Picture, [left, top]: [f64; 2], column: &Column, view: &V
 
 fn floor(
     picture: &mut Picture,
-    [left, top]: [f64; 2],
+    corner: [f64; 2],
     column: &Column,
     views: &[Visibility],
     reach: f64,
@@ -188,15 +188,13 @@ fn floor(
         goal.y + 0.5 * (reach - 1.6) * toward[1],
     ];
     let wide = 0.5 * (reach + 1.6);
+    let window = Window {
+        x: [middle[0] - wide, middle[0] + wide],
+        y: [middle[1] - half, middle[1] + half],
+    };
     let panel = Panel {
-        window: Window {
-            x: [middle[0] - wide, middle[0] + wide],
-            y: [middle[1] - half, middle[1] + half],
-        },
-        left,
-        top,
-        scale,
         y_title: first,
+        ..Panel::fitted(window, corner, [IMAGE[0], FLOOR_HEIGHT])
     };
     let heading = radians(goal)[2];
     let inside = |[x, y]: [f64; 2]| column.set.membership([x, y, heading]).inside;

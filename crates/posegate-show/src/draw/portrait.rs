@@ -188,16 +188,10 @@ fn one(picture: &mut Picture, left: f64, side: &Side, body: &Body) {
     let wide = (window.x[1] - window.x[0]).max(window.y[1] - window.y[0]);
     let square = |[lo, hi]: [f64; 2]| [0.5 * (lo + hi - wide), 0.5 * (lo + hi + wide)];
     (window.x, window.y) = (square(window.x), square(window.y));
-    let scale = EDGE / wide;
-    let panel = Panel {
-        window,
-        left,
-        top: TOP,
-        scale,
-        y_title: false,
-    };
+    let panel = Panel::fitted(window, [left, TOP], [EDGE; 2]);
+    let scale = panel.scale;
     let tick = tick_at_scale(scale, 46.0);
-    panel.draw_named(picture, side.title, tick, [side.names[0], ""], |inside| {
+    panel.draw_named(picture, side.title, tick, side.names, |inside| {
         if floor {
             let [lo, hi] = window.x;
             let ground = [[lo, window.y[0]], [hi, window.y[0]], [hi, 0.0], [lo, 0.0]];
@@ -238,7 +232,4 @@ fn one(picture: &mut Picture, left: f64, side: &Side, body: &Body) {
             }
         }
     });
-    let turned = Font::new(11.0, palette::INK).anchored(Anchor::Middle);
-    let middle = TOP + 0.5 * EDGE;
-    picture.text_turned([left - 42.0, middle], -90.0, side.names[1], &turned);
 }

@@ -153,15 +153,19 @@ fn intervals(replay: &Replay<'_>, counts: impl Fn(&Bucket) -> RuleCounts) -> Vec
             wrong: rule.false_permits > 0,
         });
     }
-    // Equal neighbours are joined.
+    joined(all)
+}
+
+/// Joins equal neighbours, and removes intervals without a share: nothing in them was judged.
+fn joined(mut all: Vec<Interval>) -> Vec<Interval> {
     all.dedup_by(|next, before| {
         let is_equal = next.share == before.share && next.wrong == before.wrong;
-        if is_equal {
+        let is_joined = is_equal && next.from_s - before.to_s < 1e-9;
+        if is_joined {
             before.to_s = next.to_s;
         }
-        is_equal
+        is_joined
     });
-    // An interval without judged estimates has no share.
     all.retain(|interval| interval.share.is_finite());
     all
 }
@@ -188,7 +192,7 @@ pub(super) fn lanes(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top:
             picture.text([LEFT + 0.5 * WIDTH, top + 0.5 * LANE + 4.0], words, &font);
         }
         for interval in all {
-            bar(picture, axis, top, &interval, &PERMIT);
+            bar(picture, axis, top, &interval, [&PERMIT, &DENIAL]);
             if interval.wrong {
                 let [x, wide] = place(axis, &interval);
                 picture.rectangle([x, top, wide, 5.0], &WRONG);
@@ -242,10 +246,17 @@ fn place(axis: Axis, interval: &Interval) -> [f64; 2] {
     [x, (axis.x(interval.to_s) - x).max(1.0)]
 }
 
-fn bar(picture: &mut Picture, axis: Axis, top: f64, interval: &Interval, style: &Style) {
+/// Draws an interval: its share in the first style, below the rest in the second.
+fn bar(
+    picture: &mut Picture,
+    axis: Axis,
+    top: f64,
+    interval: &Interval,
+    [style, rest]: [&Style; 2],
+) {
     let [x, wide] = place(axis, interval);
     let high = LANE * interval.share;
-    picture.rectangle([x, top, wide, LANE - high], &DENIAL);
+    picture.rectangle([x, top, wide, LANE - high], rest);
     if high > 0.0 {
         picture.rectangle([x, top + LANE - high, wide, high], style);
     }
@@ -274,7 +285,7 @@ fn verdicts(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) ->
         false_permits: bucket.false_permits,
     };
     for interval in intervals(replay, counts) {
-        bar(picture, axis, top, &interval, &OLD);
+        bar(picture, axis, top, &interval, [&OLD, &DENIAL]);
     }
     let timeline = replay.timeline();
     let lasts = replay.maximum_age_s().max(timeline.width_s());
@@ -284,28 +295,17 @@ fn verdicts(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) ->
             continue;
         }
         let from_s = timeline.start_s() + index as f64 * timeline.width_s();
-        let share = bucket.permits as f64 / bucket.estimates as f64;
-        let wrong = bucket.false_permits > 0;
         let next = timeline.buckets().iter().skip(index + 1);
         let free = next.take_while(|bucket| bucket.estimates == 0).count() + 1;
         let to_s = from_s + lasts.min(free as f64 * timeline.width_s());
-        match moments.last_mut() {
-            Some(before)
-                if before.share == share
-                    && before.wrong == wrong
-                    && from_s - before.to_s < 1e-9 =>
-            {
-                before.to_s = to_s;
-            }
-            _ => moments.push(Interval {
-                from_s,
-                to_s,
-                share,
-                wrong,
-            }),
-        }
+        moments.push(Interval {
+            from_s,
+            to_s,
+            share: bucket.permits as f64 / bucket.estimates as f64,
+            wrong: bucket.false_permits > 0,
+        });
     }
-    for moment in moments {
+    for moment in joined(moments) {
         let [x, wide] = place(axis, &moment);
         let high = LANE * moment.share;
         picture.rectangle([x, top + LANE - high, wide, high], &PERMIT);
@@ -327,29 +327,17 @@ fn interlock(picture: &mut Picture, replay: &Replay<'_>, axis: Axis, top: f64) -
     let words = format!("open {:.1} s, {often}", times.open_s);
     names(picture, top, &["interlock", &words]);
     let lanes = &times.lanes;
-    let mut all: Vec<Interval> = Vec::new();
-    for (index, span) in lanes.spans().iter().enumerate() {
-        let from_s = lanes.start_s() + index as f64 * lanes.width_s();
-        let to_s = from_s + lanes.width_s();
+    let at = |index: usize| lanes.start_s() + index as f64 * lanes.width_s();
+    let all = lanes.spans().iter().enumerate();
+    let all = all.map(|(index, span)| Interval {
+        from_s: at(index),
+        to_s: at(index + 1),
         // Full spans are equal but for rounding.
-        let share = (span.open_s() / span.all_s() * 1e6).round() / 1e6;
-        match all.last_mut() {
-            Some(before) if before.share == share => before.to_s = to_s,
-            _ => all.push(Interval {
-                from_s,
-                to_s,
-                share,
-                wrong: false,
-            }),
-        }
-    }
-    for interval in all.iter().filter(|interval| interval.share.is_finite()) {
-        let [x, wide] = place(axis, interval);
-        let high = LANE * interval.share;
-        picture.rectangle([x, top, wide, LANE - high], &SHUT);
-        if high > 0.0 {
-            picture.rectangle([x, top + LANE - high, wide, high], &PERMIT);
-        }
+        share: (span.open_s() / span.all_s() * 1e6).round() / 1e6,
+        wrong: false,
+    });
+    for interval in joined(all.collect()) {
+        bar(picture, axis, top, &interval, [&PERMIT, &SHUT]);
     }
     frame(picture, top);
     top + LANE + BETWEEN

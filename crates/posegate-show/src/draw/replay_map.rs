@@ -89,11 +89,8 @@ impl<'r> ReplayMap<'r> {
         let mut left = LEFT - 100.0;
         let mut panel = |window: Window, title: &str| {
             let panel = Panel {
-                window,
-                left,
-                top: top + 24.0,
-                scale: SIDE / wide(&window),
                 y_title: left < LEFT,
+                ..Panel::fitted(window, [left, top + 24.0], [SIDE; 2])
             };
             left += SIDE + BETWEEN;
             panel.draw(picture, title, tick_at_scale(panel.scale, 60.0), |inside| {
@@ -206,10 +203,6 @@ impl<'r> ReplayMap<'r> {
 /// Returns the smallest square window about a window.
 fn square(window: &Window) -> Window {
     let half = |[lo, hi]: [f64; 2]| 0.5 * (hi - lo);
-    let side = half(window.x).max(half(window.y));
-    let about = |[lo, hi]: [f64; 2]| [0.5 * (lo + hi) - side, 0.5 * (lo + hi) + side];
-    Window {
-        x: about(window.x),
-        y: about(window.y),
-    }
+    let middle = [window.x, window.y].map(|[lo, hi]| 0.5 * (lo + hi));
+    Window::about(middle, half(window.x).max(half(window.y)))
 }

@@ -12,7 +12,7 @@
 use super::placement::Column;
 use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
 use posegate::gate::Verdict;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// A step of the paper's argument: an answer and its meaning.
@@ -81,92 +81,31 @@ pub fn chain(study: &CaseStudy) -> Result<[Step; 3], StudyError> {
     ])
 }
 
-#[derive(Serialize)]
-struct Numbers<'a> {
-    tool_version: &'static str,
-    epsilon: f64,
-    tables: Vec<TableNumbers<'a>>,
-    containments: Vec<Containment>,
-    chain: ChainNumbers,
-    /// Fig. 4.
-    placements: Vec<serde_json::Value>,
-}
-
-#[derive(Serialize)]
-struct TableNumbers<'a> {
-    task: &'a str,
-    bytes: usize,
-    layout: &'static str,
-    /// Columns, rows, slabs.
-    cells: [u16; 3],
-    proven_cells: u64,
-    proven_runs: u64,
-    proven_corners: u64,
-    bake_s: f64,
-    prove_s: f64,
-}
-
-#[derive(Serialize)]
-struct Containment {
-    task: String,
-    pose_set: PoseSetNumbers,
-    verdict: &'static str,
-    reason: Option<&'static str>,
-    margin: f64,
-    worst_pose: Option<[f64; 3]>,
-}
-
-#[derive(Serialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
-enum PoseSetNumbers {
-    Bounded {
-        translation: f64,
-        yaw_deg: f64,
-    },
-    Gaussian {
-        sigma_x: f64,
-        sigma_y: f64,
-        sigma_yaw_deg: f64,
-        epsilon: f64,
-    },
-}
-
-#[derive(Serialize)]
-struct ChainNumbers {
-    assumption: &'static str,
-    steps: Vec<String>,
-    holds: bool,
-}
-
-fn containment(answer: &Answer, epsilon: f64) -> Containment {
-    Containment {
-        task: answer.task.clone(),
-        pose_set: match answer.known {
-            PoseSetSpec::Bounded {
-                translation,
-                yaw_deg,
-            } => PoseSetNumbers::Bounded {
-                translation,
-                yaw_deg,
-            },
-            PoseSetSpec::Gaussian {
-                sigma,
-                sigma_yaw_deg,
-            } => PoseSetNumbers::Gaussian {
-                sigma_x: sigma,
-                sigma_y: sigma,
-                sigma_yaw_deg,
-                epsilon,
-            },
+fn containment(answer: &Answer, epsilon: f64) -> Value {
+    json!({
+        "task": answer.task,
+        "pose_set": match answer.known {
+            PoseSetSpec::Bounded { translation, yaw_deg } => json!({
+                "type": "bounded",
+                "translation": translation,
+                "yaw_deg": yaw_deg,
+            }),
+            PoseSetSpec::Gaussian { sigma, sigma_yaw_deg } => json!({
+                "type": "gaussian",
+                "sigma_x": sigma,
+                "sigma_y": sigma,
+                "sigma_yaw_deg": sigma_yaw_deg,
+                "epsilon": epsilon,
+            }),
         },
-        verdict: if answer.holds() { "permit" } else { "deny" },
-        reason: match answer.verdict {
+        "verdict": if answer.holds() { "permit" } else { "deny" },
+        "reason": match answer.verdict {
             Verdict::Permit { .. } => None,
             Verdict::Deny { reason, .. } => Some(reason.name()),
         },
-        margin: answer.margin(),
-        worst_pose: answer.worst_pose(),
-    }
+        "margin": answer.margin(),
+        "worst_pose": answer.worst_pose(),
+    })
 }
 
 /// Returns the text of `numbers.json`: every table, every answer, the chain.
@@ -179,45 +118,42 @@ pub fn numbers(study: &CaseStudy) -> Result<String, StudyError> {
     let mut tables = Vec::new();
     for proven in &study.tables {
         let cells = *study.table(&proven.task)?.cells();
-        tables.push(TableNumbers {
-            task: &proven.task,
-            bytes: proven.bytes.len(),
-            layout: "facets",
-            cells: [cells.columns, cells.rows, cells.slabs],
-            proven_cells: proven.proof.cells,
-            proven_runs: proven.proof.runs,
-            proven_corners: proven.proof.corners,
-            bake_s: proven.bake_s,
-            prove_s: proven.prove_s,
-        });
+        tables.push(json!({
+            "task": proven.task,
+            "bytes": proven.bytes.len(),
+            "layout": "facets",
+            // Columns, rows, slabs.
+            "cells": [cells.columns, cells.rows, cells.slabs],
+            "proven_cells": proven.proof.cells,
+            "proven_runs": proven.proof.runs,
+            "proven_corners": proven.proof.corners,
+            "bake_s": proven.bake_s,
+            "prove_s": proven.prove_s,
+        }));
     }
+    let answers = study.answers.iter();
+    let containments = answers.map(|answer| containment(answer, study.site.epsilon));
     let chain = chain(study)?;
-    let numbers = Numbers {
-        tool_version: env!("CARGO_PKG_VERSION"),
-        epsilon: study.site.epsilon,
-        tables,
-        containments: study
-            .answers
-            .iter()
-            .map(|answer| containment(answer, study.site.epsilon))
-            .collect(),
-        chain: ChainNumbers {
-            assumption: "as in the paper, every task starts with the estimate at its goal",
-            holds: chain.iter().all(|step| step.as_argued),
-            steps: chain.iter().map(Step::to_string).collect(),
+    let numbers = json!({
+        "tool_version": env!("CARGO_PKG_VERSION"),
+        "epsilon": study.site.epsilon,
+        "tables": tables,
+        "containments": containments.collect::<Vec<_>>(),
+        "chain": {
+            "assumption": "as in the paper, every task starts with the estimate at its goal",
+            "steps": chain.iter().map(Step::to_string).collect::<Vec<_>>(),
+            "holds": chain.iter().all(|step| step.as_argued),
         },
-        placements: study.places.iter().map(placement).collect(),
-    };
-    // Only numbers and strings: this cannot fail.
-    let mut text = serde_json::to_string_pretty(&numbers).unwrap_or_default();
-    text.push('\n');
-    Ok(text)
+        // Fig. 4.
+        "placements": study.places.iter().map(placement).collect::<Vec<_>>(),
+    });
+    Ok(format!("{numbers:#}\n"))
 }
 
 /// A place of Fig. 4.
-fn placement(column: &Column) -> serde_json::Value {
+fn placement(column: &Column) -> Value {
     let mut value = column.placed.to_json();
-    value["case"] = serde_json::json!(column.heading);
+    value["case"] = json!(column.heading);
     value
 }
 

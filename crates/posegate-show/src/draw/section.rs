@@ -2,33 +2,8 @@
 
 use super::panel::{Cell, Window};
 use posegate::num::BinaryAngle;
-use posegate::shape::{Scalar, SuccessSet};
 use posegate::table::{Run, Slab, Table};
 use std::collections::BTreeMap;
-
-/// Returns the border of a set's section at a heading of the goal frame, as closed polygons in the
-/// goal frame.
-///
-/// Like [`border`], for membership in the set.
-#[must_use]
-pub fn outline(
-    set: &SuccessSet,
-    yaw_deg: f64,
-    window: &Window,
-    spacing: f64,
-) -> Vec<Vec<[f64; 2]>> {
-    let inside = |[x, y]: [f64; 2]| {
-        let goal = set.goal;
-        let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
-        let world = [
-            goal.x + c * x - s * y,
-            goal.y + s * x + c * y,
-            (goal.yaw_deg + yaw_deg).to_radians(),
-        ];
-        set.membership(world).inside
-    };
-    border(&inside, window, spacing)
-}
 
 /// Returns the border of an area as closed polygons, counter-clockwise around the inside and
 /// clockwise around holes.
@@ -94,28 +69,13 @@ struct Edge {
 impl Edge {
     /// Side 0 to 3 of a square: below, right, above, left.
     fn of_square(i: usize, j: usize, side: usize) -> Self {
-        match side {
-            0 => Self {
-                i,
-                j,
-                along_y: false,
-            },
-            1 => Self {
-                i: i + 1,
-                j,
-                along_y: true,
-            },
-            2 => Self {
-                i,
-                j: j + 1,
-                along_y: false,
-            },
-            _ => Self {
-                i,
-                j,
-                along_y: true,
-            },
-        }
+        let (i, j, along_y) = match side {
+            0 => (i, j, false),
+            1 => (i + 1, j, true),
+            2 => (i, j + 1, false),
+            _ => (i, j, true),
+        };
+        Self { i, j, along_y }
     }
 }
 
@@ -280,7 +240,27 @@ fn common(runs: &[Run], other: impl Iterator<Item = Run>) -> Vec<Run> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use posegate::shape::{BoxSet, PoseDeg, Shape};
+    use posegate::shape::{BoxSet, PoseDeg, Scalar, Shape, SuccessSet};
+
+    /// Returns the border of a set's section at a heading of the goal frame.
+    fn outline(
+        set: &SuccessSet,
+        yaw_deg: f64,
+        window: &Window,
+        spacing: f64,
+    ) -> Vec<Vec<[f64; 2]>> {
+        let inside = |[x, y]: [f64; 2]| {
+            let goal = set.goal;
+            let [c, s] = f64::cos_sin_deg(goal.yaw_deg);
+            let world = [
+                goal.x + c * x - s * y,
+                goal.y + s * x + c * y,
+                (goal.yaw_deg + yaw_deg).to_radians(),
+            ];
+            set.membership(world).inside
+        };
+        border(&inside, window, spacing)
+    }
 
     fn unit_box(goal: PoseDeg) -> SuccessSet {
         SuccessSet {

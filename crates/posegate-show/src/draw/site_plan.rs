@@ -1,6 +1,6 @@
 //! Floor plan of a whole site, and of the routes that a build of the site found.
 
-use super::hall::{hall, hall_legend};
+use super::hall::{hall, hall_entries, hall_legend, hall_panel, legend_height};
 use super::legend::LINE;
 use super::measure::{fitted, text_width};
 use super::palette;
@@ -102,12 +102,9 @@ fn with_notes(site: &Site, routes: &[Route], title: &str, notes: &[Note]) -> Str
             lines.into_iter().map(|line| (line, *good))
         })
         .collect();
-    // The panel determines the height: draw it once for its size.
-    let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
-    let bottom = hall(&mut trial, site, routes, "", [LEFT, 50.0], LARGEST).bottom();
-    let mut trial = Picture::new(WIDTH, 2.0 * LARGEST[1], title);
-    let legend = hall_legend(&mut trial, site, routes, [MARGIN, bottom]);
-    let below = bottom + 46.0 + legend + 12.0;
+    let panel = hall_panel(site, routes, [LEFT, 50.0], LARGEST);
+    let (bottom, entries) = (panel.bottom(), hall_entries(site, routes));
+    let below = bottom + 46.0 + legend_height(&entries) + 12.0;
     let height = below
         + match lines.len() {
             0 => 0.0,
@@ -116,8 +113,8 @@ fn with_notes(site: &Site, routes: &[Route], title: &str, notes: &[Note]) -> Str
     let mut picture = Picture::new(WIDTH, height, title);
     let font = Font::new(19.0, palette::INK).bold();
     picture.text([MARGIN, 30.0], title, &font);
-    hall(&mut picture, site, routes, "", [LEFT, 50.0], LARGEST);
-    hall_legend(&mut picture, site, routes, [MARGIN, bottom + 46.0]);
+    hall(&mut picture, &panel, site, routes, "");
+    hall_legend(&mut picture, [MARGIN, bottom + 46.0], &entries);
     for (number, (line, good)) in lines.iter().enumerate() {
         let at = [MARGIN, below + LINE * (number as f64 + 0.75)];
         picture.text(at, line, &Font::new(SIZE, palette::of_words(*good)));

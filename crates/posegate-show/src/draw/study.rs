@@ -11,16 +11,21 @@
 //! # Ok::<(), posegate_show::draw::study::StudyError>(())
 //! ```
 
+use super::belief::PoseSetF64;
+use super::ingredients::radians;
 use super::placement::Column;
-use super::tag_places::{self, NoPlaces};
+use super::subject::DrawError;
+use super::tag_places;
 use posegate::bake::{self, BakeError, BakeInput, Layout};
+use posegate::chain::StartAssumption;
 use posegate::contain::Margin;
 use posegate::gate::{Verdict, judge};
-use posegate::set::{Estimate, InputError, PoseSet};
-use posegate::table::{Table, TableError};
+use posegate::set::{InputError, RadiusSquared, Uncertainty};
+use posegate::table::Table;
 use posegate::verify::{ExpectedTable, Proof, VerifyError, verify};
+use posegate_plan::{ChainReport, evaluate};
 use posegate_replay::{coordinates, factor, factor_text};
-use posegate_site::{Site, SiteError, Task, UnknownTask};
+use posegate_site::{Site, SiteError, Task};
 use std::fmt;
 use std::time::Instant;
 
@@ -79,25 +84,32 @@ impl PoseSetSpec {
         }
     }
 
-    /// Returns the pose-set about an estimate.
-    fn about(&self, estimate: Estimate, table: &Table<'_>) -> Result<PoseSet, InputError> {
-        match *self {
+    /// Returns the pose-set about an estimate (m, m, rad), with the squared radius of a Gaussian set.
+    pub(super) fn about(&self, estimate: [f64; 3], radius_squared: RadiusSquared) -> PoseSetF64 {
+        let spread = match *self {
             Self::Bounded {
                 translation,
                 yaw_deg,
-            } => PoseSet::bounded(estimate, translation, yaw_deg.to_radians()),
+            } => Uncertainty::Bounded {
+                translation_m: translation,
+                yaw_rad: yaw_deg.to_radians(),
+            },
             Self::Gaussian {
                 sigma,
                 sigma_yaw_deg,
             } => {
                 let yaw = sigma_yaw_deg.to_radians();
-                let covariance = [
+                Uncertainty::Gaussian([
                     [sigma * sigma, 0.0, 0.0],
                     [0.0, sigma * sigma, 0.0],
                     [0.0, 0.0, yaw * yaw],
-                ];
-                PoseSet::gaussian(estimate, covariance, table.radius_squared())
+                ])
             }
+        };
+        PoseSetF64 {
+            estimate,
+            spread,
+            radius_squared,
         }
     }
 }
@@ -230,9 +242,9 @@ pub enum StudyError {
     /// The site file is not valid.
     #[error(transparent)]
     Site(#[from] SiteError),
-    /// A question about a task that the site does not have.
+    /// The site does not have a task, its table cannot be read, or it has no picture.
     #[error(transparent)]
-    Task(#[from] UnknownTask),
+    Draw(#[from] DrawError),
     /// A task's table has no extent or no step.
     #[error("the task `{0}` has no table")]
     NoTable(String),
@@ -242,9 +254,6 @@ pub enum StudyError {
     /// The table is not proven.
     #[error("the table of `{0}` is not proven: {1}")]
     Verify(String, VerifyError),
-    /// The bytes of a new table cannot be parsed.
-    #[error("the table of `{0}` cannot be parsed: {1}")]
-    Table(String, TableError),
     /// A pose-set is not valid.
     #[error("the pose-set {0} is not valid: {1}")]
     PoseSet(PoseSetSpec, InputError),
@@ -254,9 +263,6 @@ pub enum StudyError {
     /// The tag has no best place.
     #[error("no place for the tag: {0}")]
     Place(String),
-    /// The success set's shape is not the one that its picture shows.
-    #[error("the success set of the task `{0}` does not have the shape that its picture shows")]
-    Shape(String),
 }
 
 impl CaseStudy {
@@ -286,7 +292,12 @@ impl CaseStudy {
         let mut study = Self {
             tables: Vec::new(),
             answers: Vec::new(),
-            places: places(&site, progress)?,
+            places: tag_places::places(
+                &site.task(SEE).map_err(DrawError::from)?.success,
+                site.epsilon,
+                progress,
+            )
+            .map_err(StudyError::Place)?,
             site,
         };
         for (name, task) in &study.site.tasks {
@@ -304,22 +315,20 @@ impl CaseStudy {
     /// Returns the task with a name.
     ///
     /// # Errors
-    /// [`StudyError::Task`] if there is no such task.
+    /// [`StudyError::Draw`] if there is no such task.
     pub fn task(&self, name: &str) -> Result<&Task, StudyError> {
-        Ok(self.site.task(name)?)
+        Ok(self.site.task(name).map_err(DrawError::from)?)
     }
 
     /// Returns the table of a task.
     ///
     /// # Errors
-    /// [`StudyError::NoTable`] if the task has no table, [`StudyError::Table`] if its bytes cannot
+    /// [`StudyError::NoTable`] if the task has no table, [`StudyError::Draw`] if its bytes cannot
     /// be parsed.
     pub fn table(&self, task: &str) -> Result<Table<'_>, StudyError> {
         let proven = self.tables.iter().find(|table| table.task == task);
-        let bytes = &proven
-            .ok_or_else(|| StudyError::NoTable(task.into()))?
-            .bytes;
-        Table::parse(bytes).map_err(|error| StudyError::Table(task.into(), error))
+        let proven = proven.ok_or_else(|| StudyError::NoTable(task.into()))?;
+        Ok(Table::parse(&proven.bytes).map_err(DrawError::Table)?)
     }
 
     /// Returns the gate's verdict on whether a pose-set about the task's goal is inside the task's
@@ -328,35 +337,45 @@ impl CaseStudy {
     /// # Errors
     /// [`StudyError`] if the site does not have the task or its table.
     pub fn ask(&self, task: &str, known: PoseSetSpec) -> Result<Answer, StudyError> {
-        let goal = self.task(task)?.success.goal;
-        let estimate = Estimate {
-            x_m: goal.x,
-            y_m: goal.y,
-            yaw_rad: goal.yaw_deg.to_radians(),
-        };
+        let goal = radians(self.task(task)?.success.goal);
         let table = self.table(task)?;
-        let set = known
-            .about(estimate, &table)
-            .map_err(|why| StudyError::PoseSet(known, why))?;
+        let set = known.about(goal, table.radius_squared()).pose_set();
+        let set = set.map_err(|why| StudyError::PoseSet(known, why))?;
         Ok(Answer {
             task: task.into(),
             known,
             verdict: judge(&table, &set),
         })
     }
+
+    /// Returns the chain of Fig. 2: each task begins with the estimate at its goal, as in the paper. The margin of a step is the
+    /// larger of two proven ones, its own and that of the task's table.
+    ///
+    /// # Errors
+    /// [`StudyError::Chain`] if the chain cannot be evaluated.
+    pub fn chain(&self) -> Result<ChainReport, StudyError> {
+        let fault = |error: &dyn fmt::Display| StudyError::Chain(error.to_string());
+        let chain = self.site.chain(CHAIN).map_err(|error| fault(&error))?;
+        let report = evaluate(&self.site, CHAIN, chain, StartAssumption::AtGoal);
+        let mut report = report.map_err(|error| fault(&error))?;
+        for step in &mut report.steps {
+            let [translation, yaw] = step.before.enclosing();
+            let known = PoseSetSpec::Bounded {
+                translation,
+                yaw_deg: yaw.to_degrees(),
+            };
+            let answer = self.ask(step.task.as_deref().unwrap_or_default(), known)?;
+            if answer.holds() == step.failure.is_none() {
+                let own = step.margin.map_or(0, Margin::q16);
+                step.margin = Some(Margin::from_q16(own.max(answer.scale().q16())));
+            }
+        }
+        Ok(report)
+    }
 }
 
 fn site() -> Result<Site, StudyError> {
     Ok(Site::parse(SITE, "site.toml")?)
-}
-
-/// Returns the tag's places of Fig. 4.
-fn places(site: &Site, progress: &(dyn Fn() + Sync)) -> Result<Vec<Column>, StudyError> {
-    let set = &site.task(SEE)?.success;
-    tag_places::places(set, site.epsilon, progress).map_err(|why| match why {
-        NoPlaces::Shape => StudyError::Shape(SEE.into()),
-        NoPlaces::Search(why) => StudyError::Place(why),
-    })
 }
 
 fn order<'a>(site: &Site, name: &'a str, task: &'a Task) -> Result<BakeInput<'a>, StudyError> {

@@ -3,9 +3,9 @@
 //! The same calls give the same bytes on every host. A picture needs no other file: fonts are the
 //! reader's `sans-serif`.
 
-pub use super::letters::literal;
+pub use super::letters::{literal, number};
 
-use super::letters::{UNDERSCORE, escaped, lowered, number};
+use super::letters::{UNDERSCORE, escaped, lowered};
 use std::fmt::Write;
 
 /// The style of an outline and its inside.

@@ -34,27 +34,19 @@ const EVALUATIONS_EXACT: u64 = 2_000;
 /// Number of places evaluated by a search for an uncertain pose.
 const EVALUATIONS: u64 = 300;
 
-/// The reason why there are no places.
-pub(super) enum NoPlaces {
-    /// The success set needs no tag, or its tag cannot be moved.
-    Shape,
-    /// A search failed.
-    Search(String),
-}
-
 /// Returns the tag at the start, at its best place for an exactly known pose, and at two best places for an uncertain
 /// pose. These have the least E\[c\], and the least E\[c\] if the complete pose-set must see the tag. `progress` is
 /// called after each search.
 ///
 /// # Errors
-/// [`NoPlaces`] if the set needs no tag, or the tag has no best place.
+/// The reason if the set needs no tag, its tag cannot be moved, or the tag has no best place.
 pub(super) fn places(
     set: &SuccessSet,
     epsilon: f64,
     progress: &(dyn Fn() + Sync),
-) -> Result<Vec<Column>, NoPlaces> {
+) -> Result<Vec<Column>, String> {
     let set = set.clone();
-    let tag = *set.tags().first().ok_or(NoPlaces::Shape)?;
+    let tag = *set.tags().first().ok_or("the success set needs no tag")?;
     let task = Task {
         set,
         tag,
@@ -63,17 +55,16 @@ pub(super) fn places(
         reserve: Tolerance::NONE,
     };
     let cost = Cost::default();
-    let space = Space::free(tag.pose, FREE).map_err(|_| NoPlaces::Shape)?;
+    let space = Space::free(tag.pose, FREE).map_err(|error| error.to_string())?;
     let order = |known, objective| PlacementProblem {
         task: &task,
         known,
         cost: &cost,
         objective,
     };
-    let failed = |error: posegate_place::PlaceError| NoPlaces::Search(error.to_string());
+    let failed = |error: posegate_place::PlaceError| error.to_string();
     let sigmas = [SIGMA, SIGMA, 1f64.to_radians()];
-    let known = Gaussian::of_sigmas(sigmas, epsilon)
-        .map_err(|error| NoPlaces::Search(error.to_string()))?;
+    let known = Gaussian::of_sigmas(sigmas, epsilon).map_err(|error| error.to_string())?;
     let known = PosePrior::About(known);
     let column = |heading: String, known, placed: posegate_place::Placed| Column {
         heading,
@@ -84,7 +75,7 @@ pub(super) fn places(
         },
         placed,
     };
-    let start = || -> Result<_, NoPlaces> {
+    let start = || -> Result<_, String> {
         let placed = order(known, Objective::Cost)
             .placed(START)
             .map_err(failed)?;
@@ -123,7 +114,7 @@ pub(super) fn places(
             found.map_err(failed)?.best,
         ))
     };
-    let (start, found): (_, Result<Vec<_>, NoPlaces>) =
+    let (start, found): (_, Result<Vec<_>, String>) =
         rayon::join(start, || // In sequence the searches are too slow.
             cases.into_par_iter().with_max_len(1).map(best).collect());
     let mut columns = std::vec![start?];

@@ -3,7 +3,7 @@
 use super::ingredients::Ingredients;
 use super::legend::{LINE, Sample, legend};
 use super::palette;
-use super::panel::{multiples, signed, tick_at_scale};
+use super::panel::{axes, multiples, signed, tick_at_scale};
 use super::subject::{DrawError, Subject};
 use super::svg::{Anchor, Font, Picture, Style, literal, points_path};
 use posegate::shape::{Camera, Lens, Shape, SuccessSet, Visibility, Window, hull};
@@ -65,18 +65,16 @@ impl Frame {
     }
 }
 
-/// A pose with the tag's corners as seen from there.
+/// A tag as seen from a pose, with the least slack there and the name of its constraint.
 #[derive(Clone, Debug, PartialEq)]
 struct Look {
-    pose: [f64; 3],
+    seen: SeenFrom,
     name: &'static str,
     slack: f64,
-    corners: [Option<[f64; 2]>; 4],
 }
 
 /// The looks at one tag.
 struct Looks {
-    tag: String,
     goal: Look,
     worst: Vec<Look>,
     hull: Vec<[f64; 2]>,
@@ -95,22 +93,6 @@ pub struct SeenFrom {
     /// The four corners in AprilTag's order ([`posegate::shape::Sight`]), pixels; `None` for a corner that is not in
     /// front of the camera.
     pub corners: [Option<[f64; 2]>; 4],
-}
-
-impl SeenFrom {
-    fn of(looks: &Looks) -> impl Iterator<Item = Self> + '_ {
-        let one = |worst_for, look: &Look| Self {
-            tag: looks.tag.clone(),
-            worst_for,
-            pose: look.pose,
-            corners: look.corners,
-        };
-        let worst = looks
-            .worst
-            .iter()
-            .map(move |look| one(Some(look.name), look));
-        std::iter::once(one(None, &looks.goal)).chain(worst)
-    }
 }
 
 /// Returns an SVG of the tags of a task in the image of its camera, or of the first camera if there are several.
@@ -186,13 +168,17 @@ pub fn task_image_with_numbers(
                 let lowest = quad.iter().map(|p| frame.at(*p)[1]).fold(0.0, f64::max);
                 let [x, _] = frame.at(middle(&quad));
                 let font = Font::new(11.0, palette::INK).anchored(Anchor::Middle);
-                picture.text([x, lowest + 28.0], &looks.tag, &font);
+                picture.text([x, lowest + 28.0], &looks.goal.seen.tag, &font);
             }
         }
     });
     let outline = [LEFT, TOP, width, height];
     picture.rectangle(outline, &Style::outlined(palette::FRAME, 1.0));
-    ticks(&frame, &mut picture);
+    let tick = tick_at_scale(frame.scale, 60.0);
+    let shown = |size: f64| multiples([-ROOM * size, (1.0 + ROOM) * size], tick);
+    let u = shown(camera.width_px).map(|u| (frame.at([u, 0.0])[0], signed(u)));
+    let v = shown(camera.height_px).map(|v| (frame.at([0.0, v])[1], signed(v)));
+    axes(&mut picture, outline, u, v, ["u (px)", "v (px)"]);
     let mut entries = std::vec![
         (Sample::Line(IMAGE), "the image"),
         (
@@ -218,8 +204,9 @@ pub fn task_image_with_numbers(
     for looks in &all {
         write_looks(&frame, looks, side, &mut top, &mut letters, &mut picture);
     }
-    let numbers = all.iter().flat_map(SeenFrom::of).collect();
-    Ok((picture.finish(), numbers))
+    let shown = |looks: Looks| std::iter::once(looks.goal).chain(looks.worst);
+    let numbers = all.into_iter().flat_map(shown).map(|look| look.seen);
+    Ok((picture.finish(), numbers.collect()))
 }
 
 fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {
@@ -228,20 +215,25 @@ fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {
         shape: Shape::Visibility(*view),
     };
     let goal = super::ingredients::radians(subject.goal());
-    let look = |pose: [f64; 3], name: Option<&'static str>| {
+    let tags = &subject.site.tags;
+    let named = tags.iter().find(|(_, tag)| tag.tag == view.tag);
+    let name = named.map_or("tag", |(name, _)| name.as_str());
+    let tag = format!("{}, id {}", literal(name), view.tag.id);
+    let look = |pose: [f64; 3], worst_for: Option<&'static str>| {
         let membership = set.membership(pose);
         let slacks = membership.slack.iter();
         let (name, slack) = slacks
-            .filter(|(own, _)| name.is_none_or(|name| name == *own))
+            .filter(|(own, _)| worst_for.is_none_or(|name| name == *own))
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .copied()
             .unwrap_or(("", f64::INFINITY));
-        Look {
+        let seen = SeenFrom {
+            tag: tag.clone(),
+            worst_for,
             pose,
-            name,
-            slack,
             corners: membership.sight.map_or([None; 4], |sight| sight.corners_px),
-        }
+        };
+        Look { seen, name, slack }
     };
     let poses: Vec<[f64; 3]> = subject.beliefs.iter().flat_map(|b| b.border()).collect();
     // The worst pose for each constraint, sorted by slack, each pose once.
@@ -255,7 +247,7 @@ fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {
     worst.sort_by(|a, b| a.slack.total_cmp(&b.slack));
     let mut kept: Vec<Look> = Vec::new();
     for look in worst {
-        if kept.iter().all(|known| known.pose != look.pose) {
+        if kept.iter().all(|known| known.seen.pose != look.seen.pose) {
             kept.push(look);
         }
     }
@@ -269,11 +261,7 @@ fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {
             None => behind += 1,
         }
     }
-    let tags = &subject.site.tags;
-    let named = tags.iter().find(|(_, tag)| tag.tag == view.tag);
-    let name = named.map_or("tag", |(name, _)| name.as_str());
     Looks {
-        tag: format!("{}, id {}", literal(name), view.tag.id),
         goal: look(goal, None),
         worst: kept,
         hull: hull(points),
@@ -282,7 +270,7 @@ fn looks(subject: &Subject<'_>, view: &Visibility, of: usize) -> Looks {
 }
 
 fn quad(look: &Look) -> Option<Vec<[f64; 2]>> {
-    look.corners.iter().copied().collect()
+    look.seen.corners.iter().copied().collect()
 }
 
 fn rectangle(camera: &Camera) -> [[f64; 2]; 4] {
@@ -360,36 +348,6 @@ fn middle(quad: &[[f64; 2]]) -> [f64; 2] {
     })
 }
 
-fn ticks(frame: &Frame, picture: &mut Picture) {
-    let tick = tick_at_scale(frame.scale, 60.0);
-    let style = Style::outlined(palette::FRAME, 1.0);
-    let label = Font::new(11.0, palette::INK);
-    let [width, height] = frame.extent();
-    let bottom = TOP + height;
-    let shown = |i: usize| [-ROOM * frame.size[i], (1.0 + ROOM) * frame.size[i]];
-    for u in multiples(shown(0), tick) {
-        let [x, _] = frame.at([u, 0.0]);
-        picture.line(&[[x, bottom], [x, bottom + 4.0]], &style);
-        picture.text(
-            [x, bottom + 16.0],
-            &signed(u),
-            &label.anchored(Anchor::Middle),
-        );
-    }
-    for v in multiples(shown(1), tick) {
-        let [_, y] = frame.at([0.0, v]);
-        picture.line(&[[LEFT - 4.0, y], [LEFT, y]], &style);
-        picture.text(
-            [LEFT - 6.0, y + 4.0],
-            &signed(v),
-            &label.anchored(Anchor::End),
-        );
-    }
-    let middle = label.anchored(Anchor::Middle);
-    picture.text([LEFT + 0.5 * width, bottom + 32.0], "u (px)", &middle);
-    picture.text_turned([LEFT - 42.0, TOP + 0.5 * height], -90.0, "v (px)", &middle);
-}
-
 /// Writes the text about each look.
 fn write_looks(
     frame: &Frame,
@@ -404,7 +362,7 @@ fn write_looks(
         picture.text([left, *top], text, font);
         *top += 16.0;
     };
-    line(&looks.tag, &plain.bold(), picture);
+    line(&looks.goal.seen.tag, &plain.bold(), picture);
     let slack = |look: &Look| {
         let sign = if look.slack < 0.0 { "" } else { "+" };
         format!("{}: {sign}{}", literal(look.name), signed(look.slack))
@@ -412,7 +370,7 @@ fn write_looks(
     let from_goal = format!("from the goal, least slack {}", slack(&looks.goal));
     line(&from_goal, &plain, picture);
     for look in &looks.worst {
-        let [x, y, yaw] = look.pose;
+        let [x, y, yaw] = look.seen.pose;
         let letter = letters.next().unwrap_or('?');
         let text = format!("{letter}: slack {}", slack(look));
         line(&text, &Font::new(12.0, palette::NO).bold(), picture);

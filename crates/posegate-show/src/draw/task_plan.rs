@@ -25,15 +25,7 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
     let goal = subject.goal();
     let own = Ingredients::of(&subject.task.success.shape);
     let window = window(subject, &own)?;
-    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
-    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
-    let panel = Panel {
-        window,
-        left: LEFT,
-        top: 76.0,
-        scale,
-        y_title: true,
-    };
+    let panel = Panel::fitted(window, [LEFT, 76.0], LARGEST);
     let side = LEFT + panel.width() + 28.0;
     let title = format!("Floor plan of {}", literal(subject.name));
     let height = (panel.bottom() + 46.0).max(360.0);
@@ -41,18 +33,23 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
     picture.text([24.0, 32.0], &title, &Font::new(19.0, palette::INK).bold());
     let held: Vec<_> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
     let shown = format!("S at the goal's heading, {}°", signed(goal.yaw_deg));
-    panel.draw(&mut picture, &shown, tick_at_scale(scale, 60.0), |inside| {
-        draw_areas(inside, subject, &own, &panel);
-        draw_bodies(inside, subject, &own);
-        let heading = radians(goal)[2];
-        for (belief, held) in subject.beliefs.iter().zip(&held) {
-            if let Some(section) = belief.section(heading) {
-                inside.polygons(&[section], &palette::of_set(held.inside));
+    panel.draw(
+        &mut picture,
+        &shown,
+        tick_at_scale(panel.scale, 60.0),
+        |inside| {
+            draw_areas(inside, subject, &own, &panel);
+            draw_bodies(inside, subject, &own);
+            let heading = radians(goal)[2];
+            for (belief, held) in subject.beliefs.iter().zip(&held) {
+                if let Some(section) = belief.section(heading) {
+                    inside.polygons(&[section], &palette::of_set(held.inside));
+                }
             }
-        }
-        draw_tags_and_cameras(inside, subject, &own);
-        draw_names(inside, subject, &own);
-    });
+            draw_tags_and_cameras(inside, subject, &own);
+            draw_names(inside, subject, &own);
+        },
+    );
     let top = 76.0 + draw_verdict(&mut picture, [side, 76.0], subject, &held);
     legend(&mut picture, [side, top], &entries(subject, &own));
     Ok(picture.finish())
@@ -180,12 +177,8 @@ fn entries(subject: &Subject<'_>, own: &Ingredients) -> Vec<(Sample, &'static st
     if !own.obstacles.is_empty() || !subject.site.walls.is_empty() {
         entries.push((Sample::Hatched(palette::WALL), "obstacles and blocks"));
     }
-    if subject
-        .site
-        .walls
-        .iter()
-        .any(|wall| wall.corners.len() == 2)
-    {
+    let mut walls = subject.site.walls.iter();
+    if walls.any(|wall| wall.corners.len() == 2) {
         entries.push((
             Sample::Line(palette::WALL.with_outline("#444444", 3.5)),
             "walls",
@@ -210,29 +203,15 @@ fn window(subject: &Subject<'_>, own: &Ingredients) -> Result<Window, DrawError>
     for x in extent.x {
         points.extend(extent.y.map(|y| subject.in_world([x, y])));
     }
-    points.extend(
-        own.views
-            .iter()
-            .map(|view| [view.tag.pose.x, view.tag.pose.y]),
-    );
+    let at = |tag: &Tag| [tag.pose.x, tag.pose.y];
+    points.extend(own.views.iter().map(|view| at(&view.tag)));
     let place = frame(radians(goal));
     points.extend(own.outlines.iter().flatten().map(|p| place.to_goal(*p)));
     points.extend(own.regions.iter().flatten().map(|p| subject.in_world(*p)));
     let near = about(&points);
-    points.extend(
-        subject
-            .site
-            .walls
-            .iter()
-            .flat_map(|wall| wall.corners.iter().copied()),
-    );
-    points.extend(
-        subject
-            .site
-            .tags
-            .values()
-            .map(|t| [t.tag.pose.x, t.tag.pose.y]),
-    );
+    let walls = subject.site.walls.iter();
+    points.extend(walls.flat_map(|wall| wall.corners.iter().copied()));
+    points.extend(subject.site.tags.values().map(|tag| at(&tag.tag)));
     let all = about(&points);
     let size = |w: &Window| (w.x[1] - w.x[0]).max(w.y[1] - w.y[0]);
     Ok(if size(&all) <= 2.5 * size(&near) {

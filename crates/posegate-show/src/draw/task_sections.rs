@@ -29,19 +29,20 @@ const MOST: usize = 9;
 pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
     let (window, yaw_deg) = subject.extent()?;
     let headings = headings(yaw_deg, &subject.beliefs, subject.goal().yaw_deg);
-    let wide = [window.x[1] - window.x[0], window.y[1] - window.y[0]];
-    let scale = (LARGEST[0] / wide[0]).min(LARGEST[1] / wide[1]);
-    let [panel_width, panel_height] = wide.map(|w| w * scale);
-    let columns = ((WIDTH + GAP[0]) / (panel_width + GAP[0])).max(1.0) as usize;
+    let first = Panel::fitted(window, [LEFT, 96.0], LARGEST);
+    let pitch = [first.width() + GAP[0], first.height() + GAP[1]];
+    let columns = ((WIDTH + GAP[0]) / pitch[0]).max(1.0) as usize;
     let rows = headings.len().div_ceil(columns);
     let columns = headings.len().div_ceil(rows);
     let held: Vec<ContainmentResult> = subject.beliefs.iter().map(|b| subject.held(b)).collect();
 
-    let top = if held.is_empty() { 96.0 } else { 138.0 };
-    let below = top + rows as f64 * (panel_height + GAP[1]) - 22.0;
+    let results = results(subject, &held);
+    let top = first.top + 42.0 * results.len() as f64;
+    let first = Panel { top, ..first };
+    let below = top + rows as f64 * pitch[1] - 22.0;
     let entries = entries(subject, &held);
     let height = below + 8.0 + entries.len().div_ceil(2) as f64 * LINE + 12.0;
-    let across = columns as f64 * (panel_width + GAP[0]) - GAP[0];
+    let across = columns as f64 * pitch[0] - GAP[0];
     let width = (LEFT + across + 24.0).max(760.0);
     let title = format!(
         "Success set S of {}, heading by heading",
@@ -57,31 +58,34 @@ pub fn task_sections(subject: &Subject<'_>) -> Result<String, DrawError> {
         signed(goal.yaw_deg)
     );
     picture.text([24.0, 54.0], &note, &Font::new(12.0, palette::FAINT));
-    write_results(subject, &held, &mut picture);
+    let proof = proof(subject);
+    for (row, (inside, bold)) in results.iter().enumerate() {
+        let at = [24.0, 68.0 + 42.0 * row as f64];
+        verdict(&mut picture, at, *inside, bold, &proof);
+    }
 
     // A finer border than a pixel is not visible.
     let borders: Vec<Vec<Vec<[f64; 2]>>> = headings
         .par_iter()
-        .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / scale))
+        .map(|yaw_deg| subject.section(*yaw_deg, &window, 1.0 / first.scale))
         .collect();
     for (index, (yaw_deg, border)) in headings.iter().zip(&borders).enumerate() {
-        let panel = Panel {
-            window,
-            left: LEFT + (panel_width + GAP[0]) * (index % columns) as f64,
-            top: top + (panel_height + GAP[1]) * (index / columns) as f64,
-            scale,
-            y_title: index % columns == 0,
-        };
+        let panel = first.in_rows(index, columns, pitch);
         let empty = if border.is_empty() { ": empty" } else { "" };
         let title = format!("yaw {}°{empty}", signed(*yaw_deg));
-        panel.draw(&mut picture, &title, tick_at_scale(scale, 42.0), |inside| {
-            inside.polygons(border, &palette::AREA);
-            table_at(subject, *yaw_deg, &window, inside);
-            inside.polygons(border, &palette::BORDER);
-            for (belief, held) in subject.beliefs.iter().zip(&held) {
-                pose_set(subject, belief, held.inside, *yaw_deg, inside);
-            }
-        });
+        panel.draw(
+            &mut picture,
+            &title,
+            tick_at_scale(first.scale, 42.0),
+            |inside| {
+                inside.polygons(border, &palette::AREA);
+                table_at(subject, *yaw_deg, &window, inside);
+                inside.polygons(border, &palette::BORDER);
+                for (belief, held) in subject.beliefs.iter().zip(&held) {
+                    pose_set(subject, belief, held.inside, *yaw_deg, inside);
+                }
+            },
+        );
     }
     let half = entries.len().div_ceil(2);
     let (first, second) = entries.split_at(half);
@@ -123,30 +127,23 @@ pub(super) fn pose_set(
     }
 }
 
-/// Writes the results of the containment tests.
-fn write_results(subject: &Subject<'_>, held: &[ContainmentResult], picture: &mut Picture) {
-    let within = held.iter().filter(|held| held.inside).count();
-    match held {
-        [] => {}
-        [only] => {
-            let name = name_of(&subject.beliefs[0]);
-            let bold = format!("The pose-set of {name}: {}", only.words);
-            verdict(picture, [24.0, 68.0], only.inside, &bold, &note(subject));
-        }
-        all => {
-            let bold = format!("{within} of {} pose-sets are inside", all.len());
-            verdict(
-                picture,
-                [24.0, 68.0],
-                within == all.len(),
-                &bold,
-                &note(subject),
-            );
-        }
+/// Returns the results of the containment tests: one for each pose-set if their names differ, else one for all.
+fn results(subject: &Subject<'_>, held: &[ContainmentResult]) -> Vec<(bool, String)> {
+    let is_bounded = |set: &PoseSetF64| matches!(set.spread, Uncertainty::Bounded { .. });
+    if held.len() > 1 && !subject.beliefs.iter().all(is_bounded) {
+        let within = held.iter().filter(|held| held.inside).count();
+        let words = format!("{within} of {} pose-sets are inside", held.len());
+        return vec![(within == held.len(), words)];
     }
+    let each = subject.beliefs.iter().zip(held);
+    each.map(|(set, ContainmentResult { inside, words })| {
+        let words = format!("The pose-set of {}: {words}", name_of(set));
+        (*inside, words)
+    })
+    .collect()
 }
 
-fn note(subject: &Subject<'_>) -> String {
+fn proof(subject: &Subject<'_>) -> String {
     let proven = if subject.table.is_some() {
         "by the gate, on the table"
     } else {

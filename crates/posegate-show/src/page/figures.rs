@@ -29,19 +29,16 @@ pub(super) fn figure(svg: &str, caption: &str) -> String {
 }
 
 /// Returns an HTML table.
-pub(super) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
-    let row = |cells: Vec<String>, kind: &str| {
-        let cells: Vec<String> = cells
-            .iter()
-            .map(|cell| format!("<{kind}>{}</{kind}>", escaped(cell)))
-            .collect();
-        format!("<tr>{}</tr>\n", cells.join(""))
-    };
-    let head = row(head.iter().map(|cell| (*cell).into()).collect(), "th");
-    let rows: Vec<String> = rows.iter().map(|cells| row(cells.clone(), "td")).collect();
+pub(super) fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    fn row(cells: &[impl AsRef<str>], kind: &str) -> String {
+        let cell = |cell: &_| format!("<{kind}>{}</{kind}>", escaped(AsRef::as_ref(cell)));
+        format!("<tr>{}</tr>\n", cells.iter().map(cell).collect::<String>())
+    }
+    let rows = rows.into_iter().map(|cells| row(&cells, "td"));
     format!(
-        "<div class=\"wide\"><table><thead>{head}</thead><tbody>{}</tbody></table></div>\n",
-        rows.join("")
+        "<div class=\"wide\"><table><thead>{}</thead><tbody>{}</tbody></table></div>\n",
+        row(head, "th"),
+        rows.collect::<String>()
     )
 }
 
@@ -54,12 +51,12 @@ pub(super) fn folded(title: &str, inside: &str) -> String {
 }
 
 /// Returns the numbers of a figure as a folded table with a title.
-pub(super) fn numbers(of: &str, head: &[&str], rows: &[Vec<String>]) -> String {
-    format!(
-        "<details><summary>the numbers behind it: {}</summary>\n{}</details>\n",
-        escaped(of),
-        table(head, rows)
-    )
+pub(super) fn numbers(
+    of: &str,
+    head: &[&str],
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> String {
+    folded(&format!("the numbers behind it: {of}"), &table(head, rows))
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::draw::{
     Mounted, MountingSheet, SeenFrom, Subject, borders_picture, mounting_sheet, task_plan,
 };
 use data_encoding::BASE64;
-use posegate::shape::{Pose3Deg, Tag};
+use posegate::shape::{Pose3Deg, PoseDeg, Tag};
 use posegate::table::Table;
 use posegate_files::printable::fixed;
 use posegate_plan::{ChainReport, StepKind, margin_text};
@@ -103,47 +103,22 @@ fn plan(site: &Site, contents: &Contents) -> String {
         &contents.plan,
         "The site from above: walls, tags and which way they look, goals, routes and where the robots look",
     );
-    let rows: Vec<Vec<String>> = site
-        .tasks
-        .iter()
-        .map(|(name, task)| {
-            let goal = task.success.goal;
-            vec![
-                name.clone(),
-                fixed(goal.x, 3),
-                fixed(goal.y, 3),
-                fixed(goal.yaw_deg, 2),
-            ]
-        })
-        .collect();
-    text += &numbers(
-        "the goals of the site",
-        &["goal of", "x, m", "y, m", "yaw, deg"],
-        &rows,
-    );
-    let walls: Vec<Vec<String>> = site
-        .walls
-        .iter()
-        .map(|wall| {
-            let corners: Vec<String> = wall
-                .corners
-                .iter()
-                .map(|[x, y]| format!("({x:.3}, {y:.3})"))
-                .collect();
-            let [low, high] = wall.z;
-            vec![
-                wall.name.clone(),
-                corners.join(" "),
-                format!("{low:.3} to {high:.3}"),
-            ]
-        })
-        .collect();
-    if !walls.is_empty() {
-        text += &numbers(
-            "the walls of the site",
-            &["wall", "corners, m", "z, m"],
-            &walls,
-        );
+    let goals = site.tasks.iter().map(|(name, task)| {
+        let PoseDeg { x, y, yaw_deg } = task.success.goal;
+        vec![name.clone(), fixed(x, 3), fixed(y, 3), fixed(yaw_deg, 2)]
+    });
+    let head = ["goal of", "x, m", "y, m", "yaw, deg"];
+    text += &numbers("the goals of the site", &head, goals);
+    let walls = site.walls.iter().map(|wall| {
+        let corners = wall.corners.iter();
+        let corners: Vec<String> = corners.map(|[x, y]| format!("({x:.3}, {y:.3})")).collect();
+        let [low, high] = wall.z.map(|z| format!("{z:.3}"));
+        let ends = format!("{low} to {high}");
+        vec![wall.name.clone(), corners.join(" "), ends]
+    });
+    if !site.walls.is_empty() {
+        let head = ["wall", "corners, m", "z, m"];
+        text += &numbers("the walls of the site", &head, walls);
     }
     text
 }
@@ -160,13 +135,11 @@ fn tasks(site: &Site, contents: &Contents) -> String {
         match &shown.table {
             Ok((bytes, proof)) => {
                 let parsed = Table::parse(bytes).ok();
-                let layout = parsed.as_ref().map_or("", |table| {
-                    if table.facets().is_some() {
-                        "facets"
-                    } else {
-                        "grid"
-                    }
-                });
+                let layout = match &parsed {
+                    Some(table) if table.facets().is_some() => "facets",
+                    Some(_) => "grid",
+                    None => "",
+                };
                 let crc = parsed.map_or(0, |table| table.crc());
                 row.extend([
                     layout.to_string(),
@@ -182,17 +155,7 @@ fn tasks(site: &Site, contents: &Contents) -> String {
     for (name, why) in &contents.left_out {
         rows.push(vec![name.clone(), format!("not shown: {why}")]);
     }
-    let mut text = table(
-        &[
-            "task",
-            "kind",
-            "layout",
-            "bytes in flash",
-            "CRC-32C",
-            "proven",
-        ],
-        &rows,
-    );
+    let mut text = table(&TASK_HEAD, rows);
     for group in groups_of_equal(site, &contents.tasks) {
         let Some((first, others)) = group.split_first() else {
             continue;
@@ -201,6 +164,15 @@ fn tasks(site: &Site, contents: &Contents) -> String {
     }
     text
 }
+
+const TASK_HEAD: [&str; 6] = [
+    "task",
+    "kind",
+    "layout",
+    "bytes in flash",
+    "CRC-32C",
+    "proven",
+];
 
 /// Returns the figures of a task. Those of equal tasks are folded.
 fn one_task(shown: &Shown, others: &[&Shown]) -> String {
@@ -226,85 +198,59 @@ fn one_task(shown: &Shown, others: &[&Shown]) -> String {
 }
 
 fn figures_of(shown: &Shown) -> String {
-    let mut text = String::new();
-    text += &figure(
-        &borders_picture(
-            &format!("Success set S of {}", shown.name),
-            &shown.window,
-            &shown.sections,
-        ),
-        &format!(
-            "{}: from where it succeeds, at some of its headings",
-            shown.name
-        ),
+    let name = &shown.name;
+    let title = format!("Success set S of {name}");
+    let mut text = figure(
+        &borders_picture(&title, &shown.window, &shown.sections),
+        &format!("{name}: from where it succeeds, at some of its headings"),
     );
     text += "<div class=\"pair\">\n";
-    text += &figure(
-        &shown.floor,
-        &format!("{}: the floor about the goal", shown.name),
-    );
+    text += &figure(&shown.floor, &format!("{name}: the floor about the goal"));
     if let Some((image, _)) = &shown.image {
         text += &figure(
             image,
-            &format!(
-                "{}: the camera's image from the goal and the worst poses",
-                shown.name
-            ),
+            &format!("{name}: the camera's image from the goal and the worst poses"),
         );
     }
     text += "</div>\n";
     if let Some((_, seen)) = &shown.image {
-        let rows: Vec<Vec<String>> = seen.iter().map(seen_from).collect();
-        text += &numbers(
-            &format!("the camera's image in {}", shown.name),
-            &[
-                "tag",
-                "seen from",
-                "x, m",
-                "y, m",
-                "yaw, deg",
-                "its corners in the image, px",
-            ],
-            &rows,
-        );
+        let of = format!("the camera's image in {name}");
+        text += &numbers(&of, &SEEN_HEAD, seen.iter().map(seen_from));
     }
-    let rows: Vec<Vec<String>> = shown
-        .sections
-        .iter()
-        .map(|(yaw_deg, rings)| {
-            let points = || rings.iter().flatten();
-            let range = |axis: usize| {
-                let all = points().map(|point| point[axis]);
-                let lo = all.clone().fold(f64::INFINITY, f64::min);
-                let hi = all.fold(f64::NEG_INFINITY, f64::max);
-                if lo <= hi {
-                    format!("{lo:.3} to {hi:.3}")
-                } else {
-                    "empty".into()
-                }
-            };
-            // `sum` of no rings would be -0.
-            let area = rings.iter().fold(0.0, |sum, ring| sum + area(ring));
-            vec![
-                format!("{yaw_deg:.2}"),
-                format!("{area:.4}"),
-                range(0),
-                range(1),
-            ]
-        })
-        .collect();
-    text += &numbers(
-        &format!("the sections of {}", shown.name),
-        &[
-            "heading from the goal's, deg",
-            "area of the section, m²",
-            "x, m",
-            "y, m",
-        ],
-        &rows,
-    );
-    text
+    let rows = shown.sections.iter().map(|(yaw_deg, rings)| {
+        let range = |axis: usize| {
+            let all = rings.iter().flatten().map(|point| point[axis]);
+            let lo = all.clone().fold(f64::INFINITY, f64::min);
+            let hi = all.fold(f64::NEG_INFINITY, f64::max);
+            if lo <= hi {
+                format!("{lo:.3} to {hi:.3}")
+            } else {
+                "empty".into()
+            }
+        };
+        // `sum` of no rings would be -0.
+        let area = rings.iter().fold(0.0, |sum, ring| sum + area(ring));
+        let [yaw, area] = [format!("{yaw_deg:.2}"), format!("{area:.4}")];
+        vec![yaw, area, range(0), range(1)]
+    });
+    text + &numbers(&format!("the sections of {name}"), &SECTION_HEAD, rows)
 }
+
+const SECTION_HEAD: [&str; 4] = [
+    "heading from the goal's, deg",
+    "area of the section, m²",
+    "x, m",
+    "y, m",
+];
+
+const SEEN_HEAD: [&str; 6] = [
+    "tag",
+    "seen from",
+    "x, m",
+    "y, m",
+    "yaw, deg",
+    "its corners in the image, px",
+];
 
 fn seen_from(seen: &SeenFrom) -> Vec<String> {
     let [x, y, yaw] = seen.pose;
@@ -347,12 +293,9 @@ fn chains(contents: &Contents) -> String {
                         ),
                         steps_text(report),
                     ]);
+                    let of = format!("the steps of {what} {name}");
                     let inside = figure(picture, &format!("{name}, step by step: {end}"))
-                        + &numbers(
-                            &format!("the steps of {what} {name}"),
-                            &STEP_HEAD,
-                            &steps(report),
-                        );
+                        + &numbers(&of, &STEP_HEAD, steps(report));
                     more += &folded(&format!("{what} {name}, step by step"), &inside);
                 }
                 Err(why) => row.extend([format!("none: {why}"), "unknown".into(), String::new()]),
@@ -363,7 +306,7 @@ fn chains(contents: &Contents) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    table(&["", "result", "worst margin", "steps"], &rows) + &more
+    table(&["", "result", "worst margin", "steps"], rows) + &more
 }
 
 /// Returns the steps of a chain as text.
@@ -399,7 +342,7 @@ const STEP_HEAD: [&str; 6] = [
     "failure",
 ];
 
-fn steps(report: &ChainReport) -> Vec<Vec<String>> {
+fn steps(report: &ChainReport) -> impl Iterator<Item = Vec<String>> {
     let rows = report.steps.iter().enumerate();
     rows.map(|(number, step)| {
         let task = step.task.clone().unwrap_or_default();
@@ -419,7 +362,6 @@ fn steps(report: &ChainReport) -> Vec<Vec<String>> {
                 .map_or_else(String::new, |failure| failure.to_string()),
         ]
     })
-    .collect()
 }
 
 /// Formats a bound, rounded up.
@@ -496,7 +438,7 @@ fn placements(order: &PageInput<'_>) -> Result<String, PageError> {
             }
         }
         text += "</div>\n";
-        text += &table(&PLACE_HEAD, &rows);
+        text += &table(&PLACE_HEAD, rows);
         // Older versions of `posegate place` do not state it.
         if let Some(definition) = placement["cost_definition"].as_str() {
             text += &format!("<p>Cost of a view: {}.</p>\n", escaped(definition));
@@ -607,51 +549,36 @@ fn tags(site: &Site, file: &str) -> String {
     if site.tags.is_empty() {
         return String::new();
     }
-    let rows: Vec<Vec<String>> = site
-        .tags
-        .iter()
-        .map(|(name, tag)| {
-            let pose = tag.tag.pose;
-            let degrees = [pose.roll_deg, pose.pitch_deg, pose.yaw_deg];
-            let mut row = vec![
-                name.clone(),
-                format!("{} {}", tag.family, tag.tag.id),
-                format!("{:.3}", tag.tag.size),
-            ];
-            row.extend([pose.x, pose.y, pose.z].map(|v| fixed(v, 4)));
-            row.extend(degrees.map(|v| fixed(v, 2)));
-            row.push(if tag.tolerance.is_none() {
-                "unknown".to_owned()
-            } else {
-                format!(
-                    "{:.3} m, {:.2} deg",
-                    tag.tolerance.translation, tag.tolerance.turn_deg
-                )
-            });
-            row
-        })
-        .collect();
-    let mut text = table(
-        &[
-            "tag",
-            "number",
-            "size, m",
-            "x, m",
-            "y, m",
-            "z, m",
-            "roll, deg",
-            "pitch, deg",
-            "yaw, deg",
-            "may be off by",
-        ],
-        &rows,
-    );
-    text += &folded(
-        "the mounting sheet",
-        &figure(
-            &sheet(site, file),
-            "The mounting sheet: each tag with its place and size",
-        ),
-    );
-    text
+    let rows = site.tags.iter().map(|(name, tag)| {
+        let (pose, off) = (tag.tag.pose, tag.tolerance);
+        let mut row = vec![
+            name.clone(),
+            format!("{} {}", tag.family, tag.tag.id),
+            format!("{:.3}", tag.tag.size),
+        ];
+        row.extend([pose.x, pose.y, pose.z].map(|v| fixed(v, 4)));
+        row.extend([pose.roll_deg, pose.pitch_deg, pose.yaw_deg].map(|v| fixed(v, 2)));
+        row.push(if off.is_none() {
+            "unknown".to_owned()
+        } else {
+            format!("{:.3} m, {:.2} deg", off.translation, off.turn_deg)
+        });
+        row
+    });
+    let caption = "The mounting sheet: each tag with its place and size";
+    let sheet = figure(&sheet(site, file), caption);
+    table(&TAG_HEAD, rows) + &folded("the mounting sheet", &sheet)
 }
+
+const TAG_HEAD: [&str; 10] = [
+    "tag",
+    "number",
+    "size, m",
+    "x, m",
+    "y, m",
+    "z, m",
+    "roll, deg",
+    "pitch, deg",
+    "yaw, deg",
+    "may be off by",
+];

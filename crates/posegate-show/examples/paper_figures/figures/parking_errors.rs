@@ -1,13 +1,12 @@
 //! The parts of Fig. 1 about errors of the car's pose: along, across and in heading, each alone. A further panel
 //! shows all three: yaw over x, with y as the colour.
 
-use super::letters::number;
-use super::palette;
-use super::panel::{Inside, Panel, Window};
-use super::section::border;
-use super::study::PoseSetSpec;
-use super::svg::{Anchor, Font, Picture, Style};
 use posegate::shape::{Footprint, Planar, SuccessSet};
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{
+    Anchor, Font, Inside, Panel, Picture, Style, Window, border, number,
+};
+use posegate_show::draw::study::PoseSetSpec;
 
 /// An error: its name, its pose at size 1 (m, m, rad), the largest size that is tried, and its notation.
 struct PoseError {

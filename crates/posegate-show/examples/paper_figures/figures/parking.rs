@@ -1,14 +1,13 @@
 //! Fig. 1 of the paper: a car in a parking space, and the poses at which the car is inside.
 
+use super::Result;
 use super::answers::{row_heading, words};
-use super::legend::{Sample, legend, verdict};
 use super::multiple::Row;
-use super::palette;
-use super::panel::{Panel, Window};
 use super::parking_errors::{single_errors, yaw_over_x};
-use super::study::{Answer, CaseStudy, PARK, PoseSetSpec, StudyError};
-use super::svg::{Font, Picture};
 use posegate::shape::Shape;
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{Font, Panel, Picture, Sample, Window, legend, verdict};
+use posegate_show::draw::study::{Answer, CaseStudy, PARK, PoseSetSpec};
 
 const WIDTH: f64 = 1160.0;
 const HEIGHT: f64 = 1110.0;
@@ -19,10 +18,10 @@ const YAWS_DEG: [f64; 7] = [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0];
 /// Returns an SVG of Fig. 1: the errors at which the car is still in its space, and the parking success set at several headings.
 ///
 /// # Errors
-/// [`StudyError`] if the study has no parking task.
-pub fn fig1_parking(study: &CaseStudy) -> Result<String, StudyError> {
+/// If the study has no parking task.
+pub fn fig1_parking(study: &CaseStudy) -> Result<String> {
     let Shape::Footprint(shape) = &study.task(PARK)?.success.shape else {
-        return Err(StudyError::Shape(PARK.into()));
+        return Err("the success set of parking is not a footprint".into());
     };
     let small = study.ask(PARK, PoseSetSpec::TEN_CENTIMETRES)?;
     let large = study.ask(PARK, PoseSetSpec::ONE_METRE)?;

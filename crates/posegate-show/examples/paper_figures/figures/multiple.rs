@@ -1,10 +1,10 @@
 //! One of several small panels: a success set, and pose-sets about the goal, at one heading.
 
-use super::palette;
-use super::panel::{Inside, Panel, signed};
-use super::section::outline;
-use super::study::{Answer, CaseStudy, PoseSetSpec, StudyError};
-use super::svg::Picture;
+use super::Result;
+use posegate_show::draw::Subject;
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{Inside, Panel, Picture, signed};
+use posegate_show::draw::study::{Answer, CaseStudy, PoseSetSpec};
 
 /// The data that all panels of a row share.
 pub struct Row<'a> {
@@ -28,10 +28,10 @@ impl Row<'_> {
         yaw_deg: f64,
         note: &str,
         more: impl FnOnce(&mut Inside<'_>),
-    ) -> Result<(), StudyError> {
-        let success = &self.study.task(self.task)?.success;
+    ) -> Result<()> {
+        let subject = Subject::new(&self.study.site, self.task)?;
         // A finer border than a pixel is not visible.
-        let border = outline(success, yaw_deg, &panel.window, 1.0 / panel.scale);
+        let border = subject.section(yaw_deg, &panel.window, 1.0 / panel.scale);
         let title = format!("{name}yaw {}°{note}", signed(yaw_deg));
         panel.draw(picture, &title, self.tick, |inside| {
             inside.success_set(&border);

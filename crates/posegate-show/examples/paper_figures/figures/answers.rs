@@ -1,8 +1,8 @@
 //! The study's answers as text in its pictures.
 
-use super::palette;
-use super::study::Answer;
-use super::svg::{Font, Picture};
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{Font, Picture};
+use posegate_show::draw::study::Answer;
 
 /// Returns the text of an answer in a picture: `1 m / 2° inside S_l, margin 1.366`.
 #[must_use]

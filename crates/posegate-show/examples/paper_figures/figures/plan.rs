@@ -1,14 +1,15 @@
 //! The floor plan of Fig. 3: the camera's view at the goal, and the robot's pose-sets.
 
 use super::answers::words;
-use super::legend::{Sample, legend, verdict};
 use super::localization::tag;
-use super::palette;
-use super::panel::{Inside, Panel, Window};
-use super::section::outline;
-use super::study::{CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
-use super::svg::{Font, Picture, Style};
-use posegate::shape::{Shape, Visibility};
+use super::{Result, sight};
+use posegate::shape::Visibility;
+use posegate_show::draw::Subject;
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{
+    Font, Inside, Panel, Picture, Sample, Style, Window, legend, verdict,
+};
+use posegate_show::draw::study::{CaseStudy, DOCK, PoseSetSpec, SEE};
 
 const VIEW: Style = Style::outlined("#8a6d00", 1.2).with_fill_opacity("#f0e442", 0.22);
 const CONE: Style = Style::outlined("#aa4499", 1.4).dashed("8 3 2 3");
@@ -18,12 +19,9 @@ const CONE: Style = Style::outlined("#aa4499", 1.4).dashed("8 3 2 3");
 /// heading.
 ///
 /// # Errors
-/// [`StudyError`] if the study lacks one of the tasks.
-pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
-    let success = &study.task(SEE)?.success;
-    let Shape::Visibility(sight) = &success.shape else {
-        return Err(StudyError::Shape(SEE.into()));
-    };
+/// If the study lacks one of the tasks.
+pub fn fig3_plan(study: &CaseStudy) -> Result<String> {
+    let sight = sight(study)?;
     let before = study.ask(SEE, PoseSetSpec::ONE_METRE)?;
     let after = study.ask(DOCK, PoseSetSpec::FIVE_CENTIMETRES)?;
     let title = "Fig. 3, floor plan: the robot at its goal, camera front, tag t7";
@@ -40,7 +38,8 @@ pub fn fig3_plan(study: &CaseStudy) -> Result<String, StudyError> {
         scale: 92.0,
         y_title: true,
     };
-    let border = outline(success, 0.0, &panel.window, 1.0 / panel.scale);
+    let subject = Subject::new(&study.site, SEE)?;
+    let border = subject.section(0.0, &panel.window, 1.0 / panel.scale);
     panel.draw(&mut picture, "S_l at yaw 0°", 1.0, |inside| {
         let wedge = [view(sight)];
         inside.polygons(&wedge, &VIEW);

@@ -1,15 +1,14 @@
 //! Fig. 2 of the paper: a look at the tag makes docking certain. The pose-set before and after each task.
 
-use super::legend::{Sample, legend};
-use super::palette;
-use super::panel::{Panel, Window, tick_at_scale};
-use super::section::border;
-use super::study::{CHAIN, CaseStudy, PoseSetSpec, StudyError};
-use super::svg::{Anchor, Font, Picture, Style, literal};
-use posegate::chain::StartAssumption;
+use super::Result;
 use posegate::shape::SuccessSet;
-use posegate_plan::{BeliefStateF64, StepReport, evaluate};
-use posegate_replay::{factor, factor_text};
+use posegate_plan::{BeliefStateF64, StepReport};
+use posegate_replay::factor_text;
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{
+    Anchor, Font, Panel, Picture, Sample, Style, Window, border, legend, literal, tick_at_scale,
+};
+use posegate_show::draw::study::CaseStudy;
 
 const EDGE: f64 = 230.0;
 const LEFT: f64 = 66.0;
@@ -21,13 +20,10 @@ const PITCH: [f64; 2] = [EDGE + 118.0, EDGE + 64.0];
 /// its goal, as in the paper.
 ///
 /// # Errors
-/// [`StudyError::Chain`] if the chain cannot be evaluated.
-pub fn fig2_chain(study: &CaseStudy) -> Result<String, StudyError> {
-    let fault = |error: &dyn std::fmt::Display| StudyError::Chain(error.to_string());
+/// If the chain cannot be evaluated.
+pub fn fig2_chain(study: &CaseStudy) -> Result<String> {
     let site = &study.site;
-    let chain = site.chain(CHAIN).map_err(|error| fault(&error))?;
-    let report =
-        evaluate(site, CHAIN, chain, StartAssumption::AtGoal).map_err(|error| fault(&error))?;
+    let report = study.chain()?;
     let title = "Fig. 2: the chain, with the pose-set before and after each task";
     let width = LEFT + (PITCH[0] + PITCH[1]) * report.steps.len() as f64;
     let mut picture = Picture::new(width, TOP + EDGE + 190.0, title);
@@ -44,7 +40,7 @@ pub fn fig2_chain(study: &CaseStudy) -> Result<String, StudyError> {
         let set = site.tasks.get(name).map(|task| &task.success);
         let before = format!("{}. before {}", index + 1, literal(name));
         panel(&mut picture, left, &before, &step.before, set, index == 0);
-        verdict(&mut picture, left, step, study);
+        verdict(&mut picture, left, step);
         let [from, to] = [left + EDGE + 18.0, left + PITCH[0] - 46.0];
         let middle = TOP + 0.5 * EDGE;
         let arrow = Style::outlined(palette::INK, 2.4);
@@ -130,27 +126,10 @@ fn known(picture: &mut Picture, left: f64, belief: &BeliefStateF64) {
     picture.text([left, TOP + EDGE + 54.0], &text, &font);
 }
 
-/// Returns the larger of two proven margins: that of the step, and that of the controller's table of the task, which Fig. 3
-/// shows.
-fn margin(step: &StepReport, study: &CaseStudy) -> Option<String> {
-    let own = step.margin.map(factor_text);
-    let [translation, yaw] = step.before.enclosing();
-    let known = PoseSetSpec::Bounded {
-        translation,
-        yaw_deg: yaw.to_degrees(),
-    };
-    let of_table = study.ask(step.task.as_deref()?, known).ok();
-    let of_table = of_table.filter(|answer| {
-        answer.holds() == step.failure.is_none()
-            && step.margin.is_some_and(|own| answer.margin() > factor(own))
-    });
-    of_table.map(|answer| answer.margin_text()).or(own)
-}
-
 /// Writes the pose-set and the verdict below a panel.
-fn verdict(picture: &mut Picture, left: f64, step: &StepReport, study: &CaseStudy) {
+fn verdict(picture: &mut Picture, left: f64, step: &StepReport) {
     known(picture, left, &step.before);
-    let margin = margin(step, study).unwrap_or_else(|| "unknown".into());
+    let margin = step.margin.map_or_else(|| "unknown".into(), factor_text);
     let inside = if step.failure.is_none() {
         "all of X\u{302} is in S"
     } else {

@@ -1,14 +1,15 @@
 //! Fig. 3 of the paper: the pose-sets inside S_l (seeing the tag) and S_w (docking).
 
 use super::answers::{row_heading, words};
-use super::legend::{Sample, legend, verdict};
 use super::multiple::Row;
-use super::palette;
-use super::panel::{Inside, Panel, Window, signed};
-use super::report::chain;
-use super::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE, StudyError};
-use super::svg::{Font, Picture, Style};
-use posegate::shape::{Shape, Visibility};
+use super::{Result, sight};
+use posegate::shape::Visibility;
+use posegate_show::draw::palette;
+use posegate_show::draw::report::chain;
+use posegate_show::draw::scene::{
+    Font, Inside, Panel, Picture, Sample, Style, Window, legend, signed, verdict,
+};
+use posegate_show::draw::study::{Answer, CaseStudy, DOCK, PoseSetSpec, SEE};
 use posegate_site::inscribe::{InscribedBox, inscribed_box};
 
 const WIDTH: f64 = 660.0;
@@ -31,8 +32,8 @@ const DOCK_DEG: [f64; 3] = [-2.0, 0.0, 2.0];
 /// Returns an SVG of Fig. 3: sections of S_l and S_w with the pose-sets before and after the localization.
 ///
 /// # Errors
-/// [`StudyError`] if one of the tasks is missing from the study.
-pub fn fig3_sections(study: &CaseStudy) -> Result<String, StudyError> {
+/// If one of the tasks is missing from the study.
+pub fn fig3_sections(study: &CaseStudy) -> Result<String> {
     let title = "Fig. 3: which containments hold: pose-sets in S_l and in S_w";
     let mut picture = Picture::new(WIDTH, HEIGHT, title);
     let font = Font::new(18.0, palette::INK).bold();
@@ -48,11 +49,8 @@ pub fn fig3_sections(study: &CaseStudy) -> Result<String, StudyError> {
     Ok(picture.finish())
 }
 
-fn see(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
-    let task = study.task(SEE)?;
-    let Shape::Visibility(sight) = &task.success.shape else {
-        return Err(StudyError::Shape(SEE.into()));
-    };
+fn see(study: &CaseStudy, picture: &mut Picture) -> Result<()> {
+    let sight = sight(study)?;
     let answers = [
         study.ask(SEE, PoseSetSpec::ONE_METRE)?,
         study.ask(SEE, PoseSetSpec::TWO_METRES)?,
@@ -105,19 +103,14 @@ const BOXES: [Style; 2] = [
 ];
 
 /// Returns boxes that are proven inside S_l (the paper's TSR_l): a large one, and one for the headings of the pose-sets.
-fn boxes(study: &CaseStudy) -> Result<[InscribedBox; 2], StudyError> {
+fn boxes(study: &CaseStudy) -> Result<[InscribedBox; 2]> {
     let success = &study.task(SEE)?.success;
-    let found =
-        |yaw_deg| inscribed_box(success, yaw_deg).ok_or_else(|| StudyError::Shape(SEE.into()));
+    let found = |yaw_deg| inscribed_box(success, yaw_deg).ok_or("S_l has no box");
     Ok([found(None)?, found(Some(2.0))?])
 }
 
 /// Draws the legend.
-fn explain(
-    study: &CaseStudy,
-    picture: &mut Picture,
-    [left, top]: [f64; 2],
-) -> Result<(), StudyError> {
+fn explain(study: &CaseStudy, picture: &mut Picture, [left, top]: [f64; 2]) -> Result<()> {
     let entries = [
         (Sample::SuccessSet, "success set S at this heading"),
         (
@@ -172,7 +165,7 @@ fn label_radius(inside: &mut Inside<'_>, answer: &Answer) {
     }
 }
 
-fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<(), StudyError> {
+fn dock(study: &CaseStudy, picture: &mut Picture) -> Result<()> {
     let answers = [
         study.ask(DOCK, PoseSetSpec::FIVE_CENTIMETRES)?,
         study.ask(DOCK, PoseSetSpec::ONE_METRE)?,

@@ -1,8 +1,7 @@
 //! Curves on logarithmic axes, to show the growth of a cost.
 
-use super::legend::{Sample, legend};
-use super::palette;
-use super::svg::{Anchor, Font, Picture, Style, literal};
+use posegate_show::draw::palette;
+use posegate_show::draw::scene::{Anchor, Font, Picture, Sample, Style, legend, literal};
 
 const LEFT: f64 = 74.0;
 const TOP: f64 = 56.0;
