@@ -1,7 +1,7 @@
 //! Blocks of poses: a rectangle of positions over an interval of headings.
 //!
-//! For fixed yaw, footprint and visibility sets (pinhole) are convex in (x, y): their slacks are concave functions
-//! of the position. A rectangle is then inside exactly if its four corners are, for every yaw of the block; the
+//! For fixed yaw, each convex part of a set (a box, a footprint, a view by a pinhole camera, one side of what is excluded) has slacks that are
+//! concave functions of the position (x, y). A rectangle is then inside exactly if its four corners are, for every yaw of the block; the
 //! remaining problem is one-dimensional. Over the yaw, a slack is bounded from below by its values, or by its middle
 //! value and its derivative (mean value form). A monotonic slack is bounded by its smaller end. If none of these
 //! suffices, the yaw interval is halved.
