@@ -9,7 +9,7 @@ const SITE: &str = "examples/sites/loading-bay.toml";
 /// The least number of pictures.
 const DRAWN: usize = 15;
 
-/// Draws every picture into a folder: the paper's, those of the loading bay, of which two are in docs/, and a plan's. Fails if one in docs/ is
+/// Draws every picture into a folder: the case study's, those of the loading bay, of which two are in docs/, and a plan's. Fails if one in docs/ is
 /// not what the program draws.
 pub fn figures(given: &Arguments) -> Result {
     given.required(0, "the folder for the pictures")?;
