@@ -111,8 +111,9 @@ struct Slab<'a> {
     step: f64,
 }
 
-/// Number of places from one edge to the next at which a line is tried.
-const PLACES: u32 = 1024;
+/// Number of places from one edge to the next at which a line is tried: as many as a table can have rows. Then a set that widens from row to row
+/// has a cell before the places miss it.
+const PLACES: u32 = 32_768;
 
 impl<'a> Slab<'a> {
     fn of(cells: &'a Cells) -> Self {
@@ -146,40 +147,39 @@ impl<'a> Slab<'a> {
             .map(|number| from + width * f64::from(number))
             .map(|yaw| [libm::cos(yaw), libm::sin(yaw)])
             .collect();
-        // The least slack near a place of a line, moved by the clearance to each of these sides.
-        let least = |line: u16, place: u32, sides: &[f64]| {
+        // The slacks near a place of a line, moved by the clearance to a side.
+        let slacks = |line: u16, place: u32, side: f64| {
             let x = self.x_lo + f64::from(place) * (self.step / f64::from(PLACES));
+            let x = x + side * (CLEARANCE - ROUNDING);
             let y = self.y_lo + f64::from(line) * self.step;
-            let mut least = f64::INFINITY;
-            for side in sides {
-                let x = x + side * (CLEARANCE - ROUNDING);
-                for [cos, sin] in &turns {
-                    let (cos, sin) = (*cos, *sin);
-                    least = least.min(part.slack_without_boxes(&Planar { x, y, cos, sin }));
-                }
-            }
-            least - dip
+            let at = turns.iter().map(move |[cos, sin]| [x, y, *cos, *sin]);
+            at.map(|[x, y, cos, sin]| part.slack_without_boxes(&Planar { x, y, cos, sin }))
         };
-        let both = |line: u16, place: u32| least(line, place, &[-1.0, 1.0]);
+        let least = |line: u16, place: u32| {
+            let both = slacks(line, place, -1.0).chain(slacks(line, place, 1.0));
+            both.fold(f64::INFINITY, f64::min) - dip
+        };
+        let is_clear =
+            |line: u16, place: u32, side: f64| slacks(line, place, side).all(|slack| slack >= dip);
         let columns = self.cells.columns;
-        let top = |line: u16| highest(u32::from(columns) * PLACES, |place| both(line, place));
+        let top = |line: u16| highest(u32::from(columns) * PLACES, |place| least(line, place));
         let middle = highest(self.cells.rows.into(), |line| {
-            both(line as u16, top(line as u16))
+            least(line as u16, top(line as u16))
         }) as u16;
         let mut edges = vec![NONE; self.lines()];
         let mut fill = |lines: &mut dyn Iterator<Item = u16>| {
             let mut place = top(middle);
             for line in lines {
-                if both(line, place) < 0.0 {
+                let is_inside = |place| is_clear(line, place, -1.0) && is_clear(line, place, 1.0);
+                if !is_inside(place) {
                     place = top(line);
-                    if both(line, place) < 0.0 {
+                    if !is_inside(place) {
                         return;
                     }
                 }
-                let before = (place / PLACES) as u16;
-                let clear =
-                    |edge: u16, side: f64| least(line, u32::from(edge) * PLACES, &[side]) >= 0.0;
-                let first = farthest(before + 1, 0, |edge| clear(edge, -1.0));
+                let clear = |edge: u16, side| is_clear(line, u32::from(edge) * PLACES, side);
+                let [before, after] = [place / PLACES, place.div_ceil(PLACES)].map(|at| at as u16);
+                let first = farthest(after, 0, |edge| clear(edge, -1.0));
                 let last = farthest(before, columns, |edge| clear(edge, 1.0));
                 edges[usize::from(line)] = [first, last];
                 place = u32::from(first.midpoint(last)) * PLACES;

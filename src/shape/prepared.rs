@@ -157,14 +157,14 @@ impl Node {
             }
             Kind::Near(view, d_min) => {
                 let ray = view.tag_to_camera(pose);
-                note("d_min", dot(ray, ray).root() - d_min - view.less.ray);
+                note("d_min", libm::sqrt(dot(ray, ray)) - d_min - view.less.ray);
             }
             Kind::Square { view, cosine, back } => {
                 let ray = view.tag_to_camera(pose);
                 let ray = [0, 1, 2].map(|i| ray[i] + back * view.normal[i]);
                 note(
                     "psi_min",
-                    cosine * dot(ray, ray).root() - dot(view.normal, ray),
+                    cosine * libm::sqrt(dot(ray, ray)) - dot(view.normal, ray),
                 );
             }
             Kind::Sides { set, lines } => {

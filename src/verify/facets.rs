@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A facet that is not proven.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, thiserror::Error)]
 #[error("facet {facet} of frame {frame} of piece {piece}")]
 pub struct UnprovenFacet {
     /// Index of the piece.
@@ -111,8 +111,7 @@ fn each(
             };
         let first = UnprovenFacet {
             piece: number,
-            frame: 0,
-            facet: 0,
+            ..UnprovenFacet::default()
         };
         let part = prover.part(&corners(&lines, goal, [from, to]));
         let turns = part.arc_holds([from, to]);
@@ -247,21 +246,15 @@ struct Sight {
     middle: Interval,
     over: Vec<HalfPlane<Slope>>,
     mid: Vec<HalfPlane<Interval>>,
+    /// The middles of `mid`: normal and b.
+    plain: Vec<[f64; 3]>,
 }
 
 impl Polygon<'_> {
     /// Proves the polygon over a range of headings above the goal's.
     fn hold(&self, range: [i64; 2]) -> Result<u64, UnprovenFacet> {
-        let first = self.lines.first().map_or(
-            UnprovenFacet {
-                piece: 0,
-                frame: 0,
-                facet: 0,
-            },
-            |line| line.at,
-        );
         if !self.is_bounded(range, DEEPEST) {
-            return Err(first);
+            return Err(self.lines.first().map(|line| line.at).unwrap_or_default());
         }
         let mut corners = 0;
         for i in 0..self.lines.len() {
@@ -289,12 +282,17 @@ impl Polygon<'_> {
         let middle = Interval::point(whole.middle());
         let turn = self.turn(Slope::cos_sin_of(whole));
         let turn_middle = self.turn(middle.cos_sin());
+        let mid: Vec<_> = self.lines.iter().map(|line| line.at(turn_middle)).collect();
         let sight = Rc::new(Sight {
             offset: whole - middle,
             whole,
             middle,
             over: self.lines.iter().map(|line| line.at(turn)).collect(),
-            mid: self.lines.iter().map(|line| line.at(turn_middle)).collect(),
+            plain: mid
+                .iter()
+                .map(|line| [line.normal[0], line.normal[1], line.b].map(Interval::middle))
+                .collect(),
+            mid,
         });
         self.sights.borrow_mut().insert(range, sight.clone());
         sight
@@ -379,7 +377,7 @@ impl Polygon<'_> {
         // that cut most at the middle are evaluated.
         let point = mid.map(Interval::middle);
         let others = (0..self.lines.len()).filter(|k| *k != i && *k != j);
-        let depths = others.map(|k| (about(&sight.mid[k], point), k));
+        let depths = others.map(|k| (about(sight.plain[k], point), k));
         let (least, most) = depths.fold(
             ((f64::INFINITY, i), (f64::NEG_INFINITY, i)),
             |(least, most), at| {
@@ -557,7 +555,6 @@ fn beyond<S: Scalar>(line: &HalfPlane<S>, [x, y, weight]: [S; 3]) -> S {
 }
 
 /// Returns the same distance, approximately.
-fn about(line: &HalfPlane<Interval>, [x, y, weight]: [f64; 3]) -> f64 {
-    let [nx, ny] = line.normal.map(Interval::middle);
-    nx * x + ny * y - line.b.middle() * weight
+fn about([nx, ny, b]: [f64; 3], [x, y, weight]: [f64; 3]) -> f64 {
+    nx * x + ny * y - b * weight
 }

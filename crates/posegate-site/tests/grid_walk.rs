@@ -1,12 +1,14 @@
 //! The walk over grids that `bake` does not make: several runs in a row, the full circle, sets wider than the table,
 //! and the worst pose.
 
+use posegate_site::Site;
 use posegate_testkit::sites;
 
-use posegate::bake::{Extent, Layout, Step, TableSpec};
+use posegate::bake::{Extent, Layout, Step, TableSpec, grid};
 use posegate::contain::{Cause, Decision, decide, examine};
 use posegate::set::{Estimate, PoseSet, RadiusSquared};
 use posegate::table::{Run, Table};
+use posegate::verify::verify;
 use sites::table_of;
 
 fn spec(yaw_deg: [f64; 2], step_deg: f64) -> TableSpec {
@@ -227,4 +229,33 @@ fn worst_pose_is_at_the_exit_of_the_set() {
     assert!(level <= 1.0 && level > 0.99, "{level}");
     assert!(examination.margin.q16() < 1 << 16);
     assert!(dx > 0.0, "{worst:?}");
+}
+
+/// The last edge of the most columns that a table can have is the only place of a part; and a wedge of 16,000 rows widens by a part of a cell a row.
+/// The numbers of cells are those of another search, which solved for the borders.
+#[test]
+fn grids_of_the_most_columns_and_of_many_rows_have_their_cells() {
+    let far = "{ any = [ { shape = \"box\", x = [1.0, 2.0], y = [-0.01, 0.01], yaw_deg = [-3.0, 3.0] }, \
+               { shape = \"footprint\", footprint = [[0.0, 0.0]], region = [[32.76745, -0.5], [33.5, -0.5], [33.5, 0.5], [32.76745, 0.5]] } ] }";
+    let wedge = "{ all = [ { shape = \"footprint\", footprint = [[0.0, 0.0]], region = [[0.0, 0.0], [0.00140624, -8.0], [0.0064062400000000005, -8.0]] }, \
+                 { shape = \"box\", x = [-1.0, 1.0], y = [-40.0, 40.0], yaw_deg = [-3.0, 3.0] } ] }";
+    for (success, x, y, xy, expected) in [
+        (far, [0.0, 32.7675], [-0.005, 0.005], 0.0005, 80_000),
+        (
+            wedge,
+            [-0.005_800, 0.009_406],
+            [-7.9985, 8.0015],
+            0.001,
+            25_188,
+        ),
+    ] {
+        let site = format!(
+            "[task.t]\nkind = \"work\"\ngoal = {{ x = 0.0, y = 0.0, yaw_deg = 0.0 }}\nsuccess = {success}\n\
+             [task.t.table]\nextent = {{ x = {x:?}, y = {y:?}, yaw_deg = [-1.0, 1.0] }}\nstep = {{ xy = {xy:?}, yaw_deg = 1.0 }}\n"
+        );
+        let site = Site::parse(&site, "site.toml").unwrap();
+        let bytes = grid(&sites::order(&site, "t"), &|| ()).unwrap();
+        let proof = verify(&bytes, &sites::claim(&site, "t"), &|| ()).unwrap();
+        assert_eq!(proof.cells, expected, "{success}");
+    }
 }

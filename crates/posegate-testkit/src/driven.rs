@@ -12,8 +12,9 @@ pub struct Found {
     pub moments: u64,
     /// Moments with a possible pose outside of the success set.
     pub outside: u64,
-    /// Fixes that arrived late, and before the odometry of their time.
+    /// Fixes that arrived late.
     pub late: u64,
+    /// Fixes that arrived before the odometry of their time.
     pub early: u64,
     /// Moments with less than a centimetre of slack.
     pub near: u64,
