@@ -1,4 +1,5 @@
-//! The order in which a call checks its pointers, reads its inputs and writes its answer: the same for every function.
+//! The order in which a call checks its pointers, reads its inputs and writes its answer: the same for most functions. Those that
+//! change storage in their own order state it.
 
 use super::memory::{Plain, Storage, check, close, take, write};
 use super::posegate_status;

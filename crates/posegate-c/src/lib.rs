@@ -2,7 +2,7 @@
 //!
 //! C firmware links `libposegate_c.a` and uses plain structs, integers of fixed size and functions that return a
 //! [`posegate_status`]. The doc comments of types and functions are written for C programs, because the header contains
-//! them. The header is generated from this crate and from [`posegate::gate::Reason`]
+//! them. The header is generated from this crate and from the core's types that C uses
 //! (`crates/posegate-c/tests/c_header.rs`), so there is one list of reasons.
 //!
 //! - **Memory** belongs to the caller: there is no allocation and no global state. Objects that are more than plain
@@ -16,7 +16,8 @@
 //!   its type and the given length. Storage is used by one context at a time. A table outlives the gate on it.
 //!
 //! This is the only library with unsafe code. Pointers are dereferenced only in `memory.rs` and `call.rs`, and in the gate, whose
-//! settings are in the same storage. `call.rs` has the order of reads and writes of every call.
+//! settings are in the same storage. `call.rs` has the order of reads and writes of most calls; the others state
+//! theirs.
 //!
 //! # The archive
 //! ```text

@@ -138,7 +138,8 @@ impl Parameters {
     }
 
     fn set(&mut self, name: &str, value: &Value, place: &str) -> Result<(), ParameterError> {
-        if !(value.is_bool() || value.is_number() || value.is_string()) {
+        // A value with a tag of YAML (`!cm 3`) is refused, since nothing reads the tag.
+        if !matches!(value, Value::Bool(_) | Value::Number(_) | Value::String(_)) {
             return Err(ParameterError::NotAScalar {
                 name: name.into(),
                 place: place.into(),
@@ -242,5 +243,7 @@ other:
             &names(),
         );
         assert!(matches!(list, Err(ParameterError::NotAScalar { .. })));
+        let tagged = Parameters::default().assign("max_speed:=!cm 3", &names());
+        assert!(matches!(tagged, Err(ParameterError::NotAScalar { .. })));
     }
 }

@@ -184,7 +184,7 @@ impl Given<'_> {
         let inflation = Inflation::new(self.number("inflation").unwrap_or(1.0));
         let cross_terms = match self.text("cross_terms", "yaw_unknown").as_str() {
             "yaw_unknown" if !is_filled => CrossTerms::YawUnknown(SplitWeight::HALF),
-            "all_unknown" => CrossTerms::AllUnknown(SplitWeight::HALF),
+            "all_unknown" if !is_filled => CrossTerms::AllUnknown(SplitWeight::HALF),
             _ => CrossTerms::Filled,
         };
         Ok(Trust {

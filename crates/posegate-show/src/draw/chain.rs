@@ -1,5 +1,4 @@
-//! Draws a chain step by step, as in the paper's Figs. 2 and 3: the pose-sets before and after each step, and
-//! S.
+//! Draws a chain step by step, as in the paper's Figs. 2 and 3: the pose-set before each step, and S.
 
 use super::hall::{hall, hall_entries, hall_legend, hall_panel, legend_height};
 use super::ingredients::ahead;

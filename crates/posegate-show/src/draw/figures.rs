@@ -23,20 +23,26 @@ pub fn figures(study: &CaseStudy) -> Result<Vec<(&'static str, String)>, StudyEr
     let report = study.chain()?;
     let success = |name: &str| success_of(&study.site, name);
     let chain = chain_picture(CHAIN, &report, &success, Some(&study.site));
+    // A title begins with the figure's number.
+    let figure = |number: u8, title: &str, picture: String| {
+        picture.replace(&format!(">{title}"), &format!(">Fig. {number}: {title}"))
+    };
+    let plan = |task, known: &[PoseSetSpec]| {
+        Ok::<_, StudyError>(task_plan(&subject(study, task, known)?)?)
+    };
     let title = format!("Fig. 4: from a bad place to the best (sigma {SIGMA} m, 1°; none in (b))");
     let places = placement_picture(&title, &Cost::default().definition(), &study.places);
+    let [set, floor] = ["Success set", "Floor plan"];
+    let parked = sections(PARK, [PoseSetSpec::TEN_CENTIMETRES, one])?;
+    let docked = sections(DOCK, [PoseSetSpec::FIVE_CENTIMETRES, one])?;
+    let seen = sections(SEE, [one, two])?;
     Ok(vec![
-        (
-            "fig1-parking.svg",
-            sections(PARK, [PoseSetSpec::TEN_CENTIMETRES, one])?,
-        ),
-        ("fig2-chain.svg", chain),
-        ("fig3-sections.svg", sections(SEE, [one, two])?),
-        (
-            "fig3-docking.svg",
-            sections(DOCK, [PoseSetSpec::FIVE_CENTIMETRES, one])?,
-        ),
-        ("fig3-plan.svg", task_plan(&subject(study, SEE, &[one])?)?),
+        ("fig1-parking.svg", figure(1, set, parked)),
+        ("fig1-plan.svg", figure(1, floor, plan(PARK, &[one])?)),
+        ("fig2-chain.svg", figure(2, "Chain", chain)),
+        ("fig3-sections.svg", figure(3, set, seen)),
+        ("fig3-docking.svg", figure(3, set, docked)),
+        ("fig3-plan.svg", figure(3, floor, plan(SEE, &[one])?)),
         ("fig4-placement.svg", places),
     ])
 }

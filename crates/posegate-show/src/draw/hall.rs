@@ -2,7 +2,7 @@
 //! tags.
 
 use super::floor::Labels;
-use super::ingredients::{Eye, Ingredients, ahead, radians};
+use super::ingredients::{Eye, Ingredients, ahead, frame, radians};
 use super::legend::{LINE, Sample, legend};
 use super::palette;
 use super::panel::{Inside, Panel, tick_at_scale};
@@ -10,7 +10,7 @@ use super::svg::{Picture, Style, literal};
 use super::task_plan::about;
 use posegate::shape::{PoseDeg, SuccessSet};
 use posegate_plan::{Route, RouteStep, StepKind};
-use posegate_site::{Site, Task};
+use posegate_site::Site;
 
 const CAMERA: Style = Style::outlined("#8a6d00", 1.8).dashed("5 2");
 const GOAL: Style = Style::outlined(palette::INK, 2.2);
@@ -35,6 +35,19 @@ fn looks(routes: &[Route]) -> Vec<&RouteStep> {
         .collect()
 }
 
+/// Returns the robots at the goals of the tasks of some routes, or of all tasks if there is no route: goals and outlines.
+fn robots(site: &Site, routes: &[Route]) -> Vec<(PoseDeg, Vec<[f64; 2]>)> {
+    let mut robots = Vec::new();
+    for (name, task) in &site.tasks {
+        let mut steps = routes.iter().flat_map(|route| &route.steps);
+        if routes.is_empty() || steps.any(|step| step.task.as_ref() == Some(name)) {
+            let outlines = Ingredients::of(&task.success.shape).outlines.into_iter();
+            robots.extend(outlines.map(|outline| (task.success.goal, outline)));
+        }
+    }
+    robots
+}
+
 /// Returns the corners of all drawn parts, in the world.
 fn points(site: &Site, routes: &[Route]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
@@ -43,6 +56,10 @@ fn points(site: &Site, routes: &[Route]) -> Vec<[f64; 2]> {
     points.extend(walls.flat_map(|wall| wall.corners.iter().copied()));
     let goals = || site.tasks.values().map(|task| task.success.goal);
     points.extend(goals().map(|goal| [goal.x, goal.y]));
+    for (goal, outline) in robots(site, routes) {
+        let place = frame(radians(goal));
+        points.extend(outline.iter().map(|p| place.to_goal(*p)));
+    }
     for camera in site.cameras.values() {
         points.extend(goals().map(|goal| {
             let [x, y, _] = Eye::of(&camera.mount, radians(goal)).centre;
@@ -123,10 +140,8 @@ impl Hall<'_> {
     /// Draws the walls, and the robots at the goals.
     fn draw_bodies(&self, inside: &mut Inside<'_>) {
         self.site.walls.iter().for_each(|wall| inside.wall(wall));
-        for task in self.site.tasks.values() {
-            for outline in Ingredients::of(&task.success.shape).outlines {
-                inside.robot(&outline, radians(task.success.goal));
-            }
+        for (goal, outline) in robots(self.site, self.routes) {
+            inside.robot(&outline, radians(goal));
         }
     }
 
@@ -250,7 +265,6 @@ pub(super) fn hall_entries(site: &Site, routes: &[Route]) -> Vec<(Sample, &'stat
         let walls = site.walls.iter();
         walls.filter(move |wall| (wall.corners.len() > 2) == is_block)
     };
-    let outlines = |task: &Task| !Ingredients::of(&task.success.shape).outlines.is_empty();
     let wall = palette::WALL.with_outline("#444444", 3.5);
     let all = [
         (
@@ -295,7 +309,7 @@ pub(super) fn hall_entries(site: &Site, routes: &[Route]) -> Vec<(Sample, &'stat
             "cameras there, where they look",
         ),
         (
-            site.tasks.values().any(outlines),
+            !robots(site, routes).is_empty(),
             Sample::Patch(palette::BODY),
             "robots at their goals",
         ),

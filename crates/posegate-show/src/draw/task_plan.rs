@@ -8,7 +8,7 @@ use super::panel::{Inside, Panel, Window, signed, tick_at_scale};
 use super::section::border;
 use super::subject::{ContainmentResult, DrawError, Subject};
 use super::svg::{Font, Picture, Style, literal};
-use super::task_sections::name_of;
+use super::task_sections::{name_of, of_sets};
 use posegate::shape::Tag;
 
 /// The largest panel, pixels.
@@ -51,7 +51,8 @@ pub fn task_plan(subject: &Subject<'_>) -> Result<String, DrawError> {
         },
     );
     let top = 76.0 + draw_verdict(&mut picture, [side, 76.0], subject, &held);
-    legend(&mut picture, [side, top], &entries(subject, &own));
+    let entries = [of_sets(&held), entries(subject, &own)].concat();
+    legend(&mut picture, [side, top], &entries);
     Ok(picture.finish())
 }
 

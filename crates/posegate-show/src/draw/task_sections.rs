@@ -183,16 +183,22 @@ fn entries(subject: &Subject<'_>, held: &[ContainmentResult]) -> Vec<(Sample, &'
             entries.push((Sample::Patch(palette::PIECE), "pieces of the table: proven"));
         }
     }
-    if held.iter().any(|held| held.inside) {
-        entries.push((Sample::Disc(palette::INSIDE), "pose-set that is inside"));
-    }
-    if held.iter().any(|held| !held.inside) {
-        entries.push((
-            Sample::Disc(palette::NOT_INSIDE),
-            "pose-set that is not inside",
-        ));
-    }
+    entries.extend(of_sets(held));
     entries
+}
+
+/// Returns the entries of a legend for pose-sets.
+pub(super) fn of_sets(held: &[ContainmentResult]) -> Vec<(Sample, &'static str)> {
+    let all = [
+        (true, palette::INSIDE, "pose-set that is inside"),
+        (false, palette::NOT_INSIDE, "pose-set that is not inside"),
+    ];
+    let drawn = all
+        .into_iter()
+        .filter(|(inside, ..)| held.iter().any(|held| held.inside == *inside));
+    drawn
+        .map(|(_, style, words)| (Sample::Disc(style), words))
+        .collect()
 }
 
 /// Returns round headings over a range of degrees, and the end headings of a single bounded pose-set.
