@@ -11,11 +11,11 @@
  * What a gate + tracker of a robot that drives takes, without its table, and the most instructions that a cycle of examples/c/robot took, without
  * a fix and with one, at -Os; -O3 (./ci.sh costs; `posegate table cost` reports it for your table, with the bound of a cycle):
  *   Cortex-M4F: flash 38 + 18 kB (boxes, -Os) to 81 + 23 kB (all shapes, -O3), stack 3,520; 3,240 B,
- *     16,510; 12,675 instructions without a fix, 37,943; 27,662 with one
+ *     16,511; 12,696 instructions without a fix, 37,979; 27,676 with one
  *   Cortex-M0+: flash 41 + 19 kB (boxes, -Os) to 83 + 24 kB (all shapes, -O3), stack 3,736; 3,552 B,
- *     38,556; 34,530 instructions without a fix, 94,298; 85,074 with one
+ *     38,564; 34,555 instructions without a fix, 94,345; 85,087 with one
  *   RV32IMC: flash 49 + 24 kB (boxes, -Os) to 104 + 33 kB (all shapes, -O3), stack 3,472; 3,216 B,
- *     21,389; 15,813 instructions without a fix, 42,951; 32,237 with one
+ *     21,352; 15,834 instructions without a fix, 43,133; 32,382 with one
  *
  * C99 and C++11. Link libposegate_c.a after your own objects, with -Wl,--gc-sections; examples/c has
  * recipes for Make and CMake.
