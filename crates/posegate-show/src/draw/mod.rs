@@ -14,7 +14,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-/// What pictures are made of: elements of SVG, panels with axes, legends. Their colours are in [`palette`](super::palette).
+/// What pictures are made of: elements of SVG, panels with axes, legends. Their colours are in [`palette`].
 pub mod scene {
     pub use super::legend::{Sample, legend, verdict};
     pub use super::panel::{Inside, Panel, Window, signed, tick_at_scale};

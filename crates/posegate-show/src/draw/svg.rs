@@ -223,7 +223,7 @@ impl Picture {
         self.line(&[wing(1.0), to, wing(-1.0)], &style.with_solid_stroke());
     }
 
-    /// Draws a path from SVG path data, as returned by [`points_path`] and [`rectangle_path`].
+    /// Draws a path from SVG path data, as `points_path` and `rectangle_path` return it.
     pub fn path(&mut self, data: &str, style: &Style) {
         if !data.is_empty() {
             self.element(format_args!("<path d=\"{data}\"{}/>", style.attributes()));
