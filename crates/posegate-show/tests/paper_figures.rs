@@ -4,6 +4,7 @@
 mod figures;
 
 use posegate_show::draw::study::CaseStudy;
+use posegate_testkit::picture::check_picture;
 
 /// The three errors of Fig. 1, before and after each task in Fig. 2, and the panels and boxes of Fig. 3.
 #[test]
@@ -11,7 +12,7 @@ fn figures_show_what_the_paper_shows() {
     let study = CaseStudy::run(&|| ()).unwrap();
     let [parking, chain, sections, plan] = figures::all(&study).unwrap();
     for (name, text) in [&parking, &chain, &sections, &plan] {
-        check_picture(text, name);
+        check(text, name);
     }
     let [parking, chain, sections, plan] = [parking, chain, sections, plan].map(|(_, text)| text);
     // A car of 4.5 m by 1.5 m in a space of 5 m by 3 m has slacks of 25 cm along and 75 cm across.
@@ -69,27 +70,8 @@ fn figures_show_what_the_paper_shows() {
     }
 }
 
-/// Checks that elements are balanced, coordinates are numbers, and nothing is fetched.
-fn check_picture(text: &str, name: &str) {
-    for bad in ["NaN", "inf", "href", "url(", "<image", "@import"] {
-        assert!(!text.contains(bad), "{name} has {bad}");
-    }
-    let mut open: Vec<&str> = Vec::new();
-    let mut rest = text;
-    while let Some(start) = rest.find('<') {
-        let end = start + rest[start..].find('>').expect("every tag ends");
-        let tag = &rest[start + 1..end];
-        assert!(!tag.contains('<'), "{name}: {tag}");
-        assert!(tag.matches('"').count().is_multiple_of(2), "{name}: {tag}");
-        if let Some(closed) = tag.strip_prefix('/') {
-            assert_eq!(open.pop(), Some(closed), "{name}");
-        } else if !tag.ends_with('/') {
-            open.push(tag.split_whitespace().next().unwrap());
-        }
-        rest = &rest[end + 1..];
-    }
-    assert!(open.is_empty(), "{name}: {open:?}");
-    assert!(text.starts_with("<svg ") && text.contains("<title>"));
+fn check(text: &str, name: &str) {
+    check_picture(text, name);
     for shown in ["x (m)", "y (m)", "yaw", "margin"] {
         assert!(text.contains(shown), "{name} has no {shown}");
     }

@@ -20,6 +20,7 @@ pub mod mcap;
 pub mod mutants;
 pub mod nature;
 pub mod oracle;
+pub mod picture;
 pub mod planning_sites;
 pub mod plant;
 pub mod replay;
